@@ -1,0 +1,18 @@
+// zstd with its checksum on and the size declared: without the checksum most flipped bits pass.
+#pragma once
+
+#include <cstddef>
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+// One zstd frame with content size and checksum. `level` 1..19.
+Bytes Compress(ByteSpan bytes, int level);
+
+// The content of one frame whose declared size must equal `expected_size` (already capped by the
+// caller). kInvalidData on another size, an unknown size, trailing bytes or damage.
+Result<Bytes> Decompress(ByteSpan frame, std::size_t expected_size);
+
+}  // namespace atlas

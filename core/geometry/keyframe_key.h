@@ -1,0 +1,36 @@
+// The name of a keyframe, chosen by the vehicle: uploads are idempotent by it.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <string_view>
+
+#include "core/base/status.h"
+
+namespace atlas {
+
+// Vehicle and session names: [A-Za-z0-9._-]{1,64}.
+Status ValidateName(std::string_view what, std::string_view name);
+
+struct SessionKey {
+  std::string vehicle;
+  std::string session;
+
+  Status Validate() const;
+  friend auto operator<=>(const SessionKey&, const SessionKey&) = default;
+};
+
+struct KeyframeKey {
+  SessionKey session;
+  std::uint32_t sequence = 0;  // grows along the drive; gaps are fine
+
+  Status Validate() const { return session.Validate(); }
+  friend auto operator<=>(const KeyframeKey&, const KeyframeKey&) = default;
+};
+
+std::ostream& operator<<(std::ostream& out, const SessionKey& key);   // "vehicle/session"
+std::ostream& operator<<(std::ostream& out, const KeyframeKey& key);  // "vehicle/session/12"
+
+}  // namespace atlas

@@ -1,0 +1,174 @@
+#include "core/geometry/map_profile.h"
+
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+constexpr std::uint8_t kProfileVersion = 1;
+
+Status OutOfRange(const char* field, double value, const char* range) {
+  return Status(StatusCode::kInvalidArgument,
+                StrCat("map profile: ", field, " is ", value, ", expected ", range));
+}
+
+bool IsPowerOfTwo(unsigned value) {
+  return value != 0 && (value & (value - 1)) == 0;
+}
+
+Status ValidateGrid(const MapProfile& profile) {
+  if (profile.cell_size_um < 20'000 || profile.cell_size_um > 1'000'000) {
+    return OutOfRange("cell size in metres", profile.cell_size_m(), "0.02 to 1");
+  }
+  if (!IsPowerOfTwo(profile.tile_cells) || profile.tile_cells < 16 || profile.tile_cells > 256) {
+    return OutOfRange("cells per tile side", profile.tile_cells, "16, 32, 64, 128 or 256");
+  }
+  if (profile.levels < 1 || profile.levels > 16) {
+    return OutOfRange("pyramid levels", profile.levels, "1 to 16");
+  }
+  if (!IsPowerOfTwo(profile.column_segments) || profile.column_segments < 2 ||
+      profile.column_segments > 16) {
+    return OutOfRange("column segments", profile.column_segments, "2, 4, 8 or 16");
+  }
+  if (profile.segment_height_mm < 100 || profile.segment_height_mm > 4'000) {
+    return OutOfRange("segment height in metres", profile.segment_height_m(), "0.1 to 4");
+  }
+  if (profile.column_base_offset_mm > 2'000) {
+    return OutOfRange("column base offset in mm", profile.column_base_offset_mm, "0 to 2000");
+  }
+  return {};
+}
+
+Status ValidateFusion(const MapProfile& profile) {
+  if (profile.sigma_base_mm < 10 || profile.sigma_base_mm > 1'000) {
+    return OutOfRange("sigma base in mm", profile.sigma_base_mm, "10 to 1000");
+  }
+  if (profile.sigma_slope_ppm > 500'000) {
+    return OutOfRange("sigma slope in ppm", profile.sigma_slope_ppm, "0 to 500000");
+  }
+  if (profile.preset > FusionPreset::kBounded) {
+    return OutOfRange("preset", static_cast<int>(profile.preset), "0 to 2");
+  }
+  if (profile.overlap_permille < 100 || profile.overlap_permille > 950) {
+    return OutOfRange("overlap threshold in permille", profile.overlap_permille, "100 to 950");
+  }
+  if (profile.same_layer_mm >= profile.other_layer_mm) {
+    return OutOfRange("same-layer gate in mm", profile.same_layer_mm,
+                      "less than the other-layer gate");
+  }
+  if (profile.hit_units <= 0 || profile.hit_units > 127) {
+    return OutOfRange("hit evidence", profile.hit_units, "1 to 127");
+  }
+  if (profile.miss_units >= 0 || profile.miss_units < -127) {
+    return OutOfRange("miss evidence", profile.miss_units, "-127 to -1");
+  }
+  if (profile.session_clamp < 1 || profile.session_clamp > 127) {
+    return OutOfRange("session clamp", profile.session_clamp, "1 to 127");
+  }
+  if (profile.evidence_clamp < 1 || profile.evidence_clamp > 127) {
+    return OutOfRange("evidence clamp", profile.evidence_clamp, "1 to 127");
+  }
+  return {};
+}
+
+void EncodeOrigin(const std::optional<GeodeticOrigin>& origin, ByteWriter& out) {
+  out.U8(origin.has_value() ? 1 : 0);
+  if (origin) {
+    out.I64(origin->latitude_nanodeg);
+    out.I64(origin->longitude_nanodeg);
+    out.I64(origin->altitude_mm);
+  }
+}
+
+std::optional<GeodeticOrigin> DecodeOrigin(ByteReader& in) {
+  if (in.U8() == 0) {
+    return std::nullopt;
+  }
+  GeodeticOrigin origin;
+  origin.latitude_nanodeg = in.I64();
+  origin.longitude_nanodeg = in.I64();
+  origin.altitude_mm = in.I64();
+  return origin;
+}
+
+}  // namespace
+
+Status MapProfile::Validate() const {
+  ATLAS_RETURN_IF_ERROR(ValidateGrid(*this));
+  return ValidateFusion(*this);
+}
+
+Bytes MapProfile::Encode() const {
+  ByteWriter out;
+  out.U8(kProfileVersion);
+  out.U32(cell_size_um);
+  out.U16(tile_cells);
+  out.U8(levels);
+  out.U8(column_segments);
+  out.U16(segment_height_mm);
+  out.U16(column_base_offset_mm);
+  out.U16(vehicle_clearance_mm);
+  out.U32(sigma_slope_ppm);
+  out.U16(sigma_base_mm);
+  out.U16(sigma_interpolated_mm);
+  out.U16(sigma_extrapolated_mm);
+  out.U8(static_cast<std::uint8_t>(preset));
+  out.U16(overlap_permille);
+  out.U16(same_layer_mm);
+  out.U16(other_layer_mm);
+  out.U16(layer_span_mm);
+  out.U16(slab_margin_mm);
+  out.U16(sequence_gap);
+  out.I16(hit_units);
+  out.I16(miss_units);
+  out.I16(session_clamp);
+  out.I16(evidence_clamp);
+  EncodeOrigin(origin, out);
+  return out.Take();
+}
+
+Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
+  ByteReader in(bytes);
+  if (const std::uint8_t version = in.U8(); version != kProfileVersion) {
+    return Error(StatusCode::kUnsupported, StrCat("map profile: version ", int{version},
+                                                  ", this build reads ", int{kProfileVersion}));
+  }
+  MapProfile profile;
+  profile.cell_size_um = in.U32();
+  profile.tile_cells = in.U16();
+  profile.levels = in.U8();
+  profile.column_segments = in.U8();
+  profile.segment_height_mm = in.U16();
+  profile.column_base_offset_mm = in.U16();
+  profile.vehicle_clearance_mm = in.U16();
+  profile.sigma_slope_ppm = in.U32();
+  profile.sigma_base_mm = in.U16();
+  profile.sigma_interpolated_mm = in.U16();
+  profile.sigma_extrapolated_mm = in.U16();
+  profile.preset = static_cast<FusionPreset>(in.U8());
+  profile.overlap_permille = in.U16();
+  profile.same_layer_mm = in.U16();
+  profile.other_layer_mm = in.U16();
+  profile.layer_span_mm = in.U16();
+  profile.slab_margin_mm = in.U16();
+  profile.sequence_gap = in.U16();
+  profile.hit_units = in.I16();
+  profile.miss_units = in.I16();
+  profile.session_clamp = in.I16();
+  profile.evidence_clamp = in.I16();
+  profile.origin = DecodeOrigin(in);
+  if (!in.ok() || in.remaining() != 0) {
+    return Error(StatusCode::kInvalidData, "map profile: truncated or has trailing bytes");
+  }
+  if (Status status = profile.Validate(); !status.ok()) {
+    return Error(StatusCode::kInvalidData, status.message());
+  }
+  return profile;
+}
+
+std::uint64_t MapProfile::Hash() const {
+  return Hash64(Encode());
+}
+
+}  // namespace atlas

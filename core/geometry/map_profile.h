@@ -1,0 +1,81 @@
+// The numbers that one atlas agrees on: fixed when it is created, sent in the handshake, hashed
+// into every blob. All integers, so that two profiles are equal exactly when their bytes are.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+// Frozen numbers (docs/formats/profile.md).
+enum class FusionPreset : std::uint8_t {
+  kPaper = 0,    // the paper's rules to the letter
+  kStrict = 1,   // with gates on what is one layer; the default
+  kBounded = 2,  // strict over a bounded choice of observations
+};
+
+// WGS84 coordinates of the world frame's origin.
+struct GeodeticOrigin {
+  std::int64_t latitude_nanodeg = 0;
+  std::int64_t longitude_nanodeg = 0;
+  std::int64_t altitude_mm = 0;
+
+  friend bool operator==(const GeodeticOrigin&, const GeodeticOrigin&) = default;
+};
+
+struct MapProfile {
+  // Grid. Paper: 0.1 m cells.
+  std::uint32_t cell_size_um = 100'000;
+  std::uint16_t tile_cells = 128;  // cells along a tile's side, every level
+  std::uint8_t levels = 8;         // pyramid levels; level l has cells of cell_size << l
+
+  // Nibble columns (paper III-D): segments of 4 bits, on the lattice of multiples of their height.
+  std::uint8_t column_segments = 8;           // 2, 4, 8 or 16
+  std::uint16_t segment_height_mm = 1'000;    // paper: 8 segments over 8 m
+  std::uint16_t column_base_offset_mm = 300;  // returns lower than this above ground are not column
+
+  // A vehicle passes below what hangs higher than this above its ground.
+  std::uint16_t vehicle_clearance_mm = 2'500;
+
+  // sigma(d) = slope * d + base (paper III-B: tan 5 deg and 0.1 m); guessed altitudes get more.
+  std::uint32_t sigma_slope_ppm = 87'489;
+  std::uint16_t sigma_base_mm = 100;
+  std::uint16_t sigma_interpolated_mm = 50;
+  std::uint16_t sigma_extrapolated_mm = 300;
+
+  // Layers (paper III-C, eq. 1). Gates: preset strict and bounded only.
+  FusionPreset preset = FusionPreset::kStrict;
+  std::uint16_t overlap_permille = 600;  // epsilon of the overlap rate
+  std::uint16_t same_layer_mm = 500;     // closer than this: one layer
+  std::uint16_t other_layer_mm = 2'000;  // farther than this: two layers
+  std::uint16_t layer_span_mm = 1'500;   // no layer is thicker
+  std::uint16_t slab_margin_mm = 700;    // columns end this far below the next layer
+  std::uint16_t sequence_gap = 3;        // a segment bridges this difference in sequence number
+
+  // Evidence in units of ln(9)/64, so that +-64 is the probability 0.9 / 0.1 that a nibble ends at.
+  std::int16_t hit_units = 25;       // p = 0.7
+  std::int16_t miss_units = -12;     // p = 0.4
+  std::int16_t session_clamp = 64;   // one session's say in a cell
+  std::int16_t evidence_clamp = 64;  // all sessions together
+
+  std::optional<GeodeticOrigin> origin;
+
+  double cell_size_m() const { return cell_size_um * 1e-6; }
+  double segment_height_m() const { return segment_height_mm * 1e-3; }
+  double tile_size_m() const { return cell_size_m() * tile_cells; }
+
+  // kInvalidArgument naming the first field out of its range.
+  Status Validate() const;
+
+  // Canonical encoding (docs/formats/profile.md) and its Hash64.
+  Bytes Encode() const;
+  static Result<MapProfile> Decode(ByteSpan bytes);
+  std::uint64_t Hash() const;
+
+  friend bool operator==(const MapProfile&, const MapProfile&) = default;
+};
+
+}  // namespace atlas

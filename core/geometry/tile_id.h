@@ -1,0 +1,38 @@
+// A tile's place in the pyramid, and its 64-bit key whose order keeps neighbours together.
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <iosfwd>
+
+#include "core/base/status.h"
+
+namespace atlas {
+
+// Level 0 is the finest. A tile (l, x, y) covers [x, x+1) x [y, y+1) tile sides of level l in the
+// world frame; its parent is (l+1, floor(x/2), floor(y/2)).
+struct TileId {
+  // x and y fit in 29 bits, biased: +-268 million tiles.
+  static constexpr std::int32_t kMaxCoordinate = (1 << 28) - 1;
+  static constexpr std::int32_t kMinCoordinate = -(1 << 28);
+
+  std::uint8_t level = 0;
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+
+  // Frozen: level in bits 58..62, then the Morton code of (x + 2^28, y + 2^28), x in the even bits.
+  // Requires coordinates in range. Non-negative as a signed 64-bit integer.
+  std::uint64_t Key() const;
+  // kInvalidData on a key that no tile has.
+  static Result<TileId> FromKey(std::uint64_t key);
+
+  TileId Parent() const;
+  std::array<TileId, 4> Children() const;  // (0,0), (1,0), (0,1), (1,1); requires level > 0
+
+  friend auto operator<=>(const TileId&, const TileId&) = default;
+};
+
+std::ostream& operator<<(std::ostream& out, const TileId& id);  // "0/12/-3"
+
+}  // namespace atlas

@@ -1,0 +1,56 @@
+// One LiDAR scan as a gravity-levelled local grid (paper III-B, III-D): what a vehicle uploads and
+// fusion reads. It never holds the pose: that comes beside it and may be corrected later.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/grid_geometry.h"
+
+namespace atlas {
+
+// Frozen: 2 bits each in the blob.
+enum class Occupancy : std::uint8_t { kUnknown = 0, kFree = 1, kObstacle = 2 };
+enum class AltitudeSource : std::uint8_t {
+  kNone = 0,          // the cell was not seen
+  kMeasured = 1,      // ground returns fell into it
+  kInterpolated = 2,  // between ground returns along the ray
+  kExtrapolated = 3,  // the nearest ground on the ray
+};
+
+struct KeyframeCell {
+  std::int16_t altitude_mm = 0;  // ground, relative to the sensor, levelled frame
+  Occupancy occupancy = Occupancy::kUnknown;
+  AltitudeSource source = AltitudeSource::kNone;
+
+  friend bool operator==(const KeyframeCell&, const KeyframeCell&) = default;
+};
+
+struct Keyframe {
+  // Column anchors stand per block of this many cells a side, counted from the grid's corner.
+  static constexpr std::int32_t kBlockCells = 8;
+
+  std::uint64_t profile_hash = 0;
+  GridGeometry grid;
+  // R_level_sensor (pose.h, SplitYaw) as w x y z, x 2^30: as an IMU knows it when scanning.
+  std::array<std::int32_t, 4> level_quaternion{1 << 30, 0, 0, 0};
+  std::int32_t sensor_height_mm = 0;  // above the ground below the sensor
+
+  std::vector<KeyframeCell> cells;     // grid.size()
+  std::vector<std::uint64_t> columns;  // grid.size(): nibbles, lowest segment first; 0 = no data
+  // Per block, row-major: the lowest segment of its columns covers
+  // [anchor, anchor + 1) * segment_height relative to the sensor, levelled frame.
+  std::vector<std::int16_t> anchors;
+
+  std::int32_t blocks_per_side() const { return (grid.side() + kBlockCells - 1) / kBlockCells; }
+  std::size_t BlockIndex(std::int32_t ix, std::int32_t iy) const {
+    return static_cast<std::size_t>((iy + grid.radius_cells) / kBlockCells) *
+               static_cast<std::size_t>(blocks_per_side()) +
+           static_cast<std::size_t>((ix + grid.radius_cells) / kBlockCells);
+  }
+
+  friend bool operator==(const Keyframe&, const Keyframe&) = default;
+};
+
+}  // namespace atlas
