@@ -1,0 +1,52 @@
+// Framing as a state machine over bytes: no I/O, no Protobuf (docs/protocol.md, "Frames").
+//
+// A frame is the 4 bytes "RAF1", the payload's length as uint32 little-endian, the low 32 bits of
+// the payload's Hash64 as uint32 little-endian, then the payload (an Envelope).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+inline constexpr std::size_t kFrameHeaderBytes = 12;
+inline constexpr std::uint32_t kMaxFrameBytes = 48u << 20;  // payload
+inline constexpr std::uint32_t kProtocolMajor = 1;
+inline constexpr std::uint32_t kProtocolMinor = 0;
+
+// The 12 bytes that go before `payload`.
+Bytes EncodeFrameHeader(ByteSpan payload);
+
+struct FrameHeader {
+  std::uint32_t payload_bytes = 0;
+  std::uint32_t checksum = 0;
+};
+
+// Exactly kFrameHeaderBytes bytes in. kInvalidData when the magic is wrong (another protocol on
+// this port), kResourceExhausted when the length is above `max_payload_bytes`.
+Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload_bytes);
+
+// kInvalidData when the payload does not have the header's checksum.
+Status CheckFramePayload(const FrameHeader& header, ByteSpan payload);
+
+// Bytes in as they come, payloads out: for peers that read in arbitrary pieces. Holds at most one
+// partial frame; memory grows with what has arrived, never with what a header claims.
+class FrameDecoder {
+ public:
+  explicit FrameDecoder(std::uint32_t max_payload_bytes = kMaxFrameBytes);
+
+  void Push(ByteSpan bytes);
+  // The next whole payload, nullopt if more bytes are needed. An error is final.
+  Result<std::optional<Bytes>> Next();
+
+ private:
+  std::uint32_t max_payload_bytes_;
+  Bytes buffer_;
+  std::optional<Status> failure_;
+};
+
+}  // namespace atlas
