@@ -24,6 +24,10 @@ MapProfile ProfileOf(std::uint32_t seed) {
   return profile;
 }
 
+std::uint32_t Draw(std::mt19937& random, std::uint32_t count) {
+  return static_cast<std::uint32_t>(random() % count);
+}
+
 // Grounds of 40 mm noise on three decks, so that layers join, split and straddle the gates.
 void FlattenAltitudes(Keyframe& keyframe, std::mt19937& random) {
   for (KeyframeCell& cell : keyframe.cells) {
@@ -41,10 +45,10 @@ std::vector<PlacedKeyframe> RandomDrives(const MapProfile& profile, std::uint32_
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   std::vector<PlacedKeyframe> keyframes;
-  const std::uint32_t sessions = 1 + random() % 5;
+  const std::uint32_t sessions = 1 + Draw(random, 5);
   for (std::uint32_t s = 0; s < sessions; ++s) {
-    std::uint32_t sequence = random() % 10;
-    const std::uint32_t count = 1 + random() % 8;
+    std::uint32_t sequence = Draw(random, 10);
+    const std::uint32_t count = 1 + Draw(random, 8);
     for (std::uint32_t i = 0; i < count; ++i) {
       const auto radius = static_cast<std::int32_t>(6 + random() % 14);
       Keyframe keyframe = testing::RandomKeyframe(profile, radius, random() & 0xFFFFFFFF);
@@ -60,7 +64,7 @@ std::vector<PlacedKeyframe> RandomDrives(const MapProfile& profile, std::uint32_
       if (random() % 4 == 0) {
         keyframes.back().time_ms -= 500;
       }
-      sequence += 1 + random() % 5;
+      sequence += 1 + Draw(random, 5);
     }
   }
   std::shuffle(keyframes.begin(), keyframes.end(), random);
@@ -68,6 +72,8 @@ std::vector<PlacedKeyframe> RandomDrives(const MapProfile& profile, std::uint32_
 }
 
 TEST(TileFusionPropertyTest, EqualsTheReference) {
+  std::size_t upper_layers = 0;
+  std::size_t columns = 0;
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
     const MapProfile profile = ProfileOf(seed);
     const auto keyframes = RandomDrives(profile, seed);
@@ -81,8 +87,14 @@ TEST(TileFusionPropertyTest, EqualsTheReference) {
       ASSERT_EQ(tile.layers[i].occupancy, expected.layers[i].occupancy) << seed << ' ' << i;
       ASSERT_EQ(tile.layers[i].column, expected.layers[i].column) << seed << ' ' << i;
       ASSERT_EQ(tile.layers[i], expected.layers[i]) << seed << ' ' << i;
+      columns += tile.layers[i].column != 0 ? 1u : 0u;
+    }
+    for (std::size_t cell = 0; cell < 256; ++cell) {
+      upper_layers += std::max<std::size_t>(tile.Layers(cell).size(), 1) - 1;
     }
   }
+  EXPECT_GT(upper_layers, 5'000u);  // the worlds are as hard as they are meant to be
+  EXPECT_GT(columns, 5'000u);
 }
 
 TEST(TileFusionPropertyTest, TheOrderOfKeyframesDoesNotMatter) {
