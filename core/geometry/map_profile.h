@@ -43,7 +43,7 @@ struct MapProfile {
   // sigma(d) = slope * d + base (paper III-B: tan 5 deg and 0.1 m); guessed altitudes get more.
   std::uint32_t sigma_slope_ppm = 87'489;
   std::uint16_t sigma_base_mm = 100;
-  std::uint16_t sigma_interpolated_mm = 50;
+  std::uint16_t sigma_interpolated_mm = 200;
   std::uint16_t sigma_extrapolated_mm = 300;
 
   // Layers (paper III-C, eq. 1). Gates: preset strict and bounded only.
