@@ -28,7 +28,7 @@ ALLOWED = {
     "core/fusion": FLOOR_4,
     "core/localization": FLOOR_4,
     "core/planning": FLOOR_4,
-    "core/simulation": FLOOR_4,
+    "core/simulation": FLOOR_4 + ["core/simulation/worlds"],
     "core/simulation/worlds": FLOOR_4 + ["core/simulation"],
     "proto/wire": FLOOR_1 + ["proto/roadatlas/v1"],
     "server/store": FLOOR_1,
