@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/status.h"
 #include "core/geometry/grid_geometry.h"
 
 namespace atlas {
@@ -28,6 +29,7 @@ struct KeyframeCell {
 };
 
 struct Keyframe {
+  static constexpr std::int32_t kMaxRadiusCells = 1024;
   // Column anchors stand per block of this many cells a side, counted from the grid's corner.
   static constexpr std::int32_t kBlockCells = 8;
 
@@ -50,7 +52,24 @@ struct Keyframe {
            static_cast<std::size_t>((ix + grid.radius_cells) / kBlockCells);
   }
 
+  std::size_t block_count() const {
+    return static_cast<std::size_t>(blocks_per_side()) *
+           static_cast<std::size_t>(blocks_per_side());
+  }
+
   friend bool operator==(const Keyframe&, const Keyframe&) = default;
 };
+
+// The invariants of a keyframe; kInvalidData naming the first one broken:
+//  - 1 <= radius_cells <= kMaxRadiusCells, cell size within a map profile's limits;
+//  - the level quaternion has length 1 within 1e-6;
+//  - cells and columns have grid.size() elements, anchors block_count();
+//  - enumerators are in range;
+//  - a cell not seen (source kNone) has altitude 0, unknown occupancy and no column.
+Status ValidateKeyframe(const Keyframe& keyframe);
+
+// The part of it that holds for what the blob's header says.
+Status ValidateKeyframeFrame(const GridGeometry& grid,
+                             const std::array<std::int32_t, 4>& level_quaternion);
 
 }  // namespace atlas

@@ -2,6 +2,10 @@
 // is.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
 #include "core/base/bytes.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
@@ -19,7 +23,7 @@ struct KeyframeHeader {
 
 inline constexpr std::size_t kMaxKeyframeBytes = 16u << 20;
 
-// Requires vectors of the grid's sizes.
+// Requires a keyframe that ValidateKeyframe accepts; equal keyframes give equal bytes.
 Bytes EncodeKeyframe(const Keyframe& keyframe);
 
 // Checks magic, version, sizes and limits. kUnsupported on a newer version, kInvalidData otherwise.

@@ -31,6 +31,10 @@ struct TileLayer {
   friend bool operator==(const TileLayer&, const TileLayer&) = default;
 };
 
+// No cell holds more layers: a bound on what hostile vehicles can make of a tile. Where more are
+// found, those with the most observations stay, the lower one of two equals.
+inline constexpr std::size_t kMaxCellLayers = 16;
+
 // Columns stand on the world's lattice of multiples of the segment height; the lowest segment is
 // the one that holds altitude + base offset. A function of the altitude, so it is never stored.
 inline std::int32_t ColumnBaseIndex(std::int32_t altitude_mm, const MapProfile& profile) {

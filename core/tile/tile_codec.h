@@ -17,6 +17,10 @@ enum class TileSection : std::uint16_t { kContributors = 1, kSurface = 2, kColum
 
 inline constexpr std::size_t kMaxTileBytes = 32u << 20;  // blob and payload alike
 
+// Tiles handed to the encoders are as fusion and the pyramid make them: contributors sorted and
+// unique, at most kMaxCellLayers layers a cell with altitudes not falling, columns of
+// `column_segments` nibbles. Decoding refuses anything else.
+
 // The canonical uncompressed payload: what promise 1 (purity) and `atlas digest` speak of.
 Bytes EncodeTilePayload(const Tile& tile, const MapProfile& profile);
 
@@ -26,7 +30,8 @@ struct EncodedTile {
 };
 EncodedTile EncodeTile(const Tile& tile, const MapProfile& profile);
 
-// kInvalidData on damage or on a blob of another profile; kUnsupported on a newer version.
+// kInvalidData on damage or on a blob of another profile; kUnsupported on a newer version. Sections
+// with unknown numbers are skipped; a blob without columns decodes to empty ones.
 Result<Tile> DecodeTile(ByteSpan blob, const MapProfile& profile);
 
 // The canonical payload of a blob, checksums verified.

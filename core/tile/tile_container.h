@@ -1,0 +1,35 @@
+// The envelope of a tile blob: magic, key, profile and a table of numbered sections, each
+// compressed and checked by itself (docs/formats/tile.md). What the sections mean is none of its
+// business.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct TileContainer {
+  std::uint64_t key = 0;           // TileId::Key()
+  std::uint64_t profile_hash = 0;  // MapProfile::Hash()
+  struct Section {
+    std::uint16_t id = 0;
+    Bytes content;  // uncompressed
+  };
+  std::vector<Section> sections;  // ids rising
+
+  const Section* Find(std::uint16_t id) const;
+};
+
+// The canonical payload: key, profile hash, then for each section id, length and content.
+Bytes EncodeContainerPayload(const TileContainer& container);
+
+// The blob, each section compressed.
+Bytes EncodeContainer(const TileContainer& container);
+
+// Verifies every checksum and size. kUnsupported on a newer version, kInvalidData otherwise.
+Result<TileContainer> DecodeContainer(ByteSpan blob);
+
+}  // namespace atlas
