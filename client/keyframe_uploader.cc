@@ -63,7 +63,7 @@ Status KeyframeUploader::ReceiveOne() {
   } else {
     const wire::UploadReply& ack = reply->upload_reply();
     ++totals_.acked;
-    totals_.duplicates += ack.duplicate() ? 1 : 0;
+    totals_.duplicates += ack.duplicate() ? 1U : 0U;
     totals_.tiles_marked += ack.tiles_marked();
     totals_.revision = std::max(totals_.revision, ack.revision());
   }

@@ -64,9 +64,9 @@ CLI::App& SubcommandFor(CLI::App& root, const Command& command) {
   CLI::App* app = &root;
   std::string word;
   while (words >> word) {
-    CLI::App* next = app->get_subcommand_no_throw(word);
-    if (next == nullptr) next = app->add_subcommand(word)->require_subcommand(0);
-    app = next;
+    const auto found = app->get_subcommands(
+        [&word](const CLI::App* candidate) { return candidate->get_name() == word; });
+    app = found.empty() ? app->add_subcommand(word) : found.front();
   }
   for (CLI::App* group = app->get_parent(); group != nullptr && group != &root;
        group = group->get_parent()) {
