@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "client/cli/json_text.h"
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -97,6 +98,20 @@ Result<Endpoint> ServerEndpoint(const CommonFlags& common, const CommandLineIo& 
   return Endpoint{};
 }
 
+// The parser asks for a missing command before it minds an unknown one.
+Status CheckCommandName(const std::vector<std::string>& arguments, const CLI::App& root) {
+  const auto word =
+      std::find_if(arguments.begin(), arguments.end(),
+                   [](const std::string& argument) { return !argument.starts_with('-'); });
+  if (word == arguments.end() || (word != arguments.begin() && *(word - 1) == "--server"))
+    return {};
+  const auto found = root.get_subcommands(
+      [&word](const CLI::App* candidate) { return candidate->get_name() == *word; });
+  return found.empty() ? Status(StatusCode::kInvalidArgument,
+                                StrCat("unknown command '", word->substr(0, 80), "'"))
+                       : Status();
+}
+
 Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
   const Result<Endpoint> server = ServerEndpoint(common, io);
   if (!server) return server.error();
@@ -126,6 +141,9 @@ class Parser {
 
   // The command asked for; nullptr when help or the version was printed.
   Result<Command*> Parse(const std::vector<std::string>& arguments, std::ostream& out) {
+    if (Status status = CheckCommandName(arguments, root_); !status.ok()) {
+      return Error(std::move(status));
+    }
     try {
       root_.parse(Prepared(arguments));
     } catch (const CLI::ParseError& error) {

@@ -4,6 +4,7 @@ namespace atlas {
 
 std::vector<std::unique_ptr<Command>> MakeCommands() {
   std::vector<std::unique_ptr<Command>> commands;
+  commands.push_back(MakeIngestCommand());
   commands.push_back(MakeWaitCommand());
   commands.push_back(MakeStatusCommand());
   commands.push_back(MakePointCommand());
@@ -12,6 +13,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeSessionsCommand());
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
+  commands.push_back(MakeSegmentCommand());
   commands.push_back(MakeRenderCommand());
   commands.push_back(MakeSimulateCommand());
   return commands;

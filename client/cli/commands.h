@@ -8,10 +8,12 @@
 namespace atlas {
 
 std::unique_ptr<Command> MakeDigestCommand();
+std::unique_ptr<Command> MakeIngestCommand();
 std::unique_ptr<Command> MakePointCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
 std::unique_ptr<Command> MakeQueryCommand();
 std::unique_ptr<Command> MakeRenderCommand();
+std::unique_ptr<Command> MakeSegmentCommand();
 std::unique_ptr<Command> MakeSessionsCommand();
 std::unique_ptr<Command> MakeSimulateCommand();
 std::unique_ptr<Command> MakeStatusCommand();

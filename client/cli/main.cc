@@ -1,4 +1,5 @@
 // The program `atlas`.
+#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
@@ -18,7 +19,7 @@ int Run(int argc, char** argv) {
   const std::vector<std::unique_ptr<atlas::Command>> commands = atlas::MakeCommands();
   const atlas::CommandLineIo io{std::cout, std::cerr, isatty(STDERR_FILENO) == 1,
                                 FromEnvironment("ATLAS_SERVER")};
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  const std::vector<std::string> arguments(argv + std::min(1, argc), argv + argc);
   const atlas::ExitCode code = atlas::RunCommandLine(arguments, commands, io);
   if (!std::cout.flush()) {
     std::cerr << "atlas: cannot write to standard output\n";
