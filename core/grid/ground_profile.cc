@@ -23,16 +23,21 @@ float GroundAt(std::span<const GroundSample> ground, float range_m) {
 
 GroundProfiles::GroundProfiles(const LeveledScan& scan,
                                const RayTable& rays,
-                               float sensor_height_m,
+                               const VehicleContact& contact,
                                const ProfileOptions& options) {
   Sort(scan, rays);
   const auto count = static_cast<std::size_t>(rays.rays());
   ground_begin_.reserve(count + 1);
   ground_begin_.push_back(0);
   for (std::size_t ray = 0; ray < count; ++ray) {
+    const float azimuth_rad = (static_cast<float>(ray) + 0.5F) * rays.ray_width_rad();
+    const float rim_m = options.contact_radius_m;
+    ground_.push_back({0.0F, contact.HeightAt(0.0F, 0.0F)});
+    ground_.push_back(
+        {rim_m, contact.HeightAt(rim_m * std::cos(azimuth_rad), rim_m * std::sin(azimuth_rad))});
     BuildRay(std::span(returns_).subspan(return_begin_[ray],
                                          return_begin_[ray + 1] - return_begin_[ray]),
-             sensor_height_m, options);
+             options);
   }
 }
 
@@ -76,14 +81,11 @@ void GroundProfiles::Sort(const LeveledScan& scan, const RayTable& rays) {
   });
 }
 
-void GroundProfiles::BuildRay(std::span<Return> returns,
-                              float sensor_height_m,
-                              const ProfileOptions& options) {
+void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& options) {
   std::sort(returns.begin(), returns.end(), [](const Return& a, const Return& b) {
     return a.range_m != b.range_m ? a.range_m < b.range_m : a.z_m < b.z_m;
   });
-  const std::size_t begin = ground_.size();
-  ground_.push_back({0.0F, -sensor_height_m});
+  const std::size_t begin = ground_begin_.back();
   for (const Return& r : returns) {
     const GroundSample& last = ground_.back();
     const float reach_m =

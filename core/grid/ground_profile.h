@@ -5,12 +5,27 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/scan/leveled_scan.h"
 #include "core/scan/ray_table.h"
 
 namespace atlas {
 
+// The ground that the vehicle stands on: a plane parallel to the sensor's own x-y plane. Spinning
+// sensors do not see the ground next to the vehicle (a VLP-16 from 6.7 m on), but its wheels do.
+struct VehicleContact {
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // levelled frame, unit length
+  float sensor_height_m = 1.73F;                      // vertically: what the levelled ground shows
+
+  // Height of the plane at (x, y), levelled frame.
+  float HeightAt(float x_m, float y_m) const {
+    return -sensor_height_m - (normal.x() * x_m + normal.y() * y_m) / normal.z();
+  }
+};
+
 struct ProfileOptions {
+  float contact_radius_m = 1.5F;     // how far around the sensor the vehicle's plane is the ground
   float vehicle_clearance_m = 2.5F;  // higher above the ground a vehicle passes below
   // A ground return must be reachable from the one before it at this slope plus this step; the roof
   // of a car that was taken for ground is not.
@@ -23,7 +38,7 @@ struct GroundSample {
   float z_m = 0.0F;
 };
 
-// One ray: ground samples by growing range, the first below the sensor itself.
+// One ray: ground samples by growing range, the first two below the vehicle itself.
 struct RayProfile {
   std::span<const GroundSample> ground;
   float obstacle_range_m = -1.0F;  // nearest obstacle a vehicle would hit; negative: none
@@ -37,7 +52,7 @@ class GroundProfiles {
  public:
   GroundProfiles(const LeveledScan& scan,
                  const RayTable& rays,
-                 float sensor_height_m,
+                 const VehicleContact& contact,
                  const ProfileOptions& options);
 
   RayProfile Ray(int ray) const;
@@ -50,7 +65,8 @@ class GroundProfiles {
   };
 
   void Sort(const LeveledScan& scan, const RayTable& rays);
-  void BuildRay(std::span<Return> returns, float sensor_height_m, const ProfileOptions& options);
+  // Ends the ray that begins with the two `contact` samples.
+  void BuildRay(std::span<Return> returns, const ProfileOptions& options);
 
   std::vector<Return> returns_;  // by ray
   std::vector<std::uint32_t> return_begin_;

@@ -64,10 +64,19 @@ void AddMeasured(const LeveledScan& scan, const RayTable& rays, AltitudeGrid& al
   }
 }
 
+// Of an altitude between two ground samples: below the vehicle its wheels measure it.
+AltitudeSource SourceAt(float range_m, const RayProfile& profile, float contact_radius_m) {
+  if (range_m <= contact_radius_m) {
+    return AltitudeSource::kMeasured;
+  }
+  return range_m <= profile.End() ? AltitudeSource::kInterpolated : AltitudeSource::kExtrapolated;
+}
+
 // Altitudes below one ray, from the sensor's foot to its farthest return.
 void AddAlongRay(const RayProfile& profile,
                  const RayTable& rays,
                  int ray,
+                 float contact_radius_m,
                  AltitudeGrid& altitudes) {
   const std::uint32_t* cells = rays.Cells(ray);
   const float end_m = std::max(profile.End(), profile.farthest_m);
@@ -85,9 +94,8 @@ void AddAlongRay(const RayProfile& profile,
     }
     const GroundSample& after = profile.ground[next];
     const float t = (range_m - before.range_m) / (after.range_m - before.range_m);
-    altitudes.Add(
-        cells[step], before.z_m + t * (after.z_m - before.z_m),
-        range_m <= profile.End() ? AltitudeSource::kInterpolated : AltitudeSource::kExtrapolated);
+    altitudes.Add(cells[step], before.z_m + t * (after.z_m - before.z_m),
+                  SourceAt(range_m, profile, contact_radius_m));
   }
 }
 
@@ -95,16 +103,16 @@ void AddAlongRay(const RayProfile& profile,
 
 LocalGrid BuildLocalGrid(const LeveledScan& scan,
                          const RayTable& rays,
-                         float sensor_height_m,
+                         const VehicleContact& contact,
                          const ProfileOptions& options) {
-  const GroundProfiles profiles(scan, rays, sensor_height_m, options);
+  const GroundProfiles profiles(scan, rays, contact, options);
   LocalGrid grid;
   grid.cells.resize(rays.grid().size());
   AltitudeGrid altitudes(rays.grid().size());
   AddMeasured(scan, rays, altitudes);
   for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
     const RayProfile profile = profiles.Ray(ray);
-    AddAlongRay(profile, rays, ray, altitudes);
+    AddAlongRay(profile, rays, ray, options.contact_radius_m, altitudes);
     const int step = static_cast<int>(profile.obstacle_range_m / rays.step_m());
     if (profile.obstacle_range_m >= 0.0F && step < rays.steps()) {
       grid.cells[rays.Cells(ray)[step]].occupancy = Occupancy::kObstacle;

@@ -19,7 +19,7 @@ struct LocalGrid {
 // ray above reached stay unknown and get the altitude of the nearest ground on the ray.
 LocalGrid BuildLocalGrid(const LeveledScan& scan,
                          const RayTable& rays,
-                         float sensor_height_m,
+                         const VehicleContact& contact,
                          const ProfileOptions& options);
 
 }  // namespace atlas

@@ -58,8 +58,9 @@ Keyframe KeyframeBuilder::Build(const PointCloud& cloud,
                                 const Eigen::Quaterniond& R_level_sensor) const {
   const LeveledScan scan =
       SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor, options_.segmenter);
-  LocalGrid grid = BuildLocalGrid(scan, rays_, static_cast<float>(options_.sensor_height_m),
-                                  WithClearance(options_.profile, map_));
+  const VehicleContact contact{(R_level_sensor * Eigen::Vector3d::UnitZ()).cast<float>(),
+                               static_cast<float>(options_.sensor_height_m)};
+  LocalGrid grid = BuildLocalGrid(scan, rays_, contact, WithClearance(options_.profile, map_));
   LocalColumns columns = TraceColumns(scan, rays_, grid.cells,
                                       ColumnOptions::FromProfile(map_, Keyframe::kBlockCells));
   Pose attitude = Pose::Identity();

@@ -85,7 +85,7 @@ Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
   std::string poses;
   std::string times;
   for (std::size_t i = 0; i < drive.scans(); ++i) {
-    const std::array<double, 12> numbers = PoseToRowMajor(drive.T_world_sensor(i));
+    const std::array<double, 12> numbers = PoseToRowMajor(drive.sensor_pose(i));
     for (std::size_t n = 0; n < numbers.size(); ++n) {
       AppendNumber(numbers[n], n + 1 < numbers.size() ? " " : "\n", poses);
     }

@@ -209,10 +209,10 @@ MeshHit MeshBvh::Cast(const MeshRay& ray, float max_distance_m) const {
   const Eigen::Vector3f inverse(SafeInverse(ray.direction.x()), SafeInverse(ray.direction.y()),
                                 SafeInverse(ray.direction.z()));
   struct Entry {
-    std::uint32_t node;
-    float enter_m;
+    std::uint32_t node = 0;
+    float enter_m = 0.0F;
   };
-  std::array<Entry, kStackSize> stack;
+  std::array<Entry, kStackSize> stack{};
   std::size_t size = 0;
   stack[size++] = {0, 0.0F};
   while (size > 0) {

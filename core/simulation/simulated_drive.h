@@ -33,8 +33,8 @@ class SimulatedDrive {
 
   std::size_t scans() const { return stops_.size(); }
   double length_m() const { return length_m_; }  // sum over legs
-  // Requires i < scans().
-  const Pose& T_world_sensor(std::size_t i) const { return stops_[i].T_world_sensor; }
+  // T_world_sensor of scan i. Requires i < scans().
+  const Pose& sensor_pose(std::size_t i) const { return stops_[i].T_world_sensor; }
   double time_s(std::size_t i) const { return static_cast<double>(i) * options_.scan_interval_s; }
   SimulatedScan Scan(std::size_t i) const;
 

@@ -64,7 +64,10 @@ inline float IntersectTriangle(const MeshRay& ray, const TriangleEdges& triangle
     return kMiss;
   }
   const float distance_m = triangle.edge2.dot(q) * inverse;
-  return distance_m > 0.0F ? distance_m : kMiss;
+  if (!(distance_m > 0.0F)) {
+    return kMiss;
+  }
+  return distance_m;
 }
 
 }  // namespace atlas

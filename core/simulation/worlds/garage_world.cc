@@ -124,7 +124,7 @@ void AddPillars(const Deck& deck, MeshBuilder& out) {
   const auto pillar = [&](double x, double y) {
     AddWall(deck, {x - 0.2, x + 0.2, y - 0.2, y + 0.2}, deck.ceiling_m(), out);
   };
-  for (double x = -3.0 * kPillarStep_m; x <= 3.0 * kPillarStep_m; x += kPillarStep_m) {
+  for (const double x : EvenlySpaced(-3.0 * kPillarStep_m, kEast_m, kPillarStep_m)) {
     pillar(x, kNorthStalls_m + 1.0);
     pillar(x, kSouthStalls_m);
     if (std::abs(x) <= kPillarStep_m) {
@@ -135,7 +135,7 @@ void AddPillars(const Deck& deck, MeshBuilder& out) {
 
 void AddParkedCars(const Deck& deck, MeshBuilder& out) {
   HashRandom random(0x6A2A6E, deck.number);
-  for (double x = -22.0; x <= 22.0; x += 2.75) {
+  for (const double x : EvenlySpaced(-22.0, 22.5, 2.75)) {
     const bool is_at_pillar = std::abs(std::remainder(x, kPillarStep_m)) < 1.3;
     for (const double y : {kNorth_m - 2.5, kSouth_m + 2.5}) {
       const bool is_at_stairs = y < 0.0 && x > 19.0;
@@ -185,7 +185,7 @@ void AddYard(MeshBuilder& out) {
   out.Floor({{kEast_m, kSouth_m, 0.0}, {kYard_m, kNorth_m, 0.0}}, ground);
   HashRandom random(0x9A2D);
   for (const double side : {-1.0, 1.0}) {
-    for (double x = -60.0; x <= 60.0; x += 24.0) {
+    for (const double x : EvenlySpaced(-60.0, 61.0, 24.0)) {
       AddHouse(FrameAt({{x + random.Uniform(-4.0, 4.0), side * random.Uniform(38.0, 50.0), 0.0},
                         side > 0.0 ? 0.0 : std::numbers::pi}),
                {random.Uniform(9.0, 15.0), 10.0, random.Uniform(6.0, 18.0)}, out);

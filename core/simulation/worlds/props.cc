@@ -15,6 +15,16 @@ Eigen::Isometry3d FrameAt(const PathPoint& point) {
   return frame;
 }
 
+std::vector<double> EvenlySpaced(double first, double end, double step) {
+  std::vector<double> values;
+  double value = first;
+  while (value < end) {
+    values.push_back(value);
+    value = first + step * static_cast<double>(values.size());
+  }
+  return values;
+}
+
 TriangleMesh CarMesh(std::uint32_t label) {
   MeshBuilder car;
   car.Box({{-2.2, -0.9, 0.25}, {2.2, 0.9, 0.9}}, label);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -13,6 +14,9 @@ namespace atlas {
 
 // A frame on the ground at a path's point: x along it, y to the left.
 Eigen::Isometry3d FrameAt(const PathPoint& point);
+
+// first, first + step, ... below end. Requires a positive step.
+std::vector<double> EvenlySpaced(double first, double end, double step);
 
 // 4.4 m x 1.8 m x 1.5 m, x forward, origin on the ground under its middle, 0.25 m off it.
 TriangleMesh CarMesh(std::uint32_t label);

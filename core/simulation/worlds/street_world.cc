@@ -59,7 +59,7 @@ PathPoint Beside(const DrivePath& street, double along_m, double side, double aw
 }
 
 void AddPlots(const DrivePath& street, double side, HashRandom& random, MeshBuilder& out) {
-  for (double along_m = 8.0; along_m < street.length_m() - 8.0; along_m += 17.0) {
+  for (const double along_m : EvenlySpaced(8.0, street.length_m() - 8.0, 17.0)) {
     const double front_m = random.Uniform(11.5, 15.0);
     const HouseSize size{random.Uniform(8.0, 12.0), random.Uniform(7.0, 10.0),
                          random.Uniform(3.5, 7.5)};
@@ -74,16 +74,18 @@ void AddPlots(const DrivePath& street, double side, HashRandom& random, MeshBuil
 }
 
 void AddFurniture(const DrivePath& street, double side, HashRandom& random, MeshBuilder& out) {
-  for (double along_m = 5.0; along_m < street.length_m(); along_m += random.Uniform(11.0, 19.0)) {
-    AddTree(Beside(street, along_m, side, 7.4).position, random.Uniform(1.2, 2.0), out);
+  double tree_m = 5.0;
+  while (tree_m < street.length_m()) {
+    AddTree(Beside(street, tree_m, side, 7.4).position, random.Uniform(1.2, 2.0), out);
+    tree_m += random.Uniform(11.0, 19.0);
   }
-  for (double along_m = 12.0; along_m < street.length_m(); along_m += 26.0) {
+  for (const double along_m : EvenlySpaced(12.0, street.length_m(), 26.0)) {
     AddPole(Beside(street, along_m + 6.0 * side, side, 5.5).position, 7.0, 0, out);
   }
-  for (double along_m = 30.0; along_m < street.length_m(); along_m += 55.0) {
+  for (const double along_m : EvenlySpaced(30.0, street.length_m(), 55.0)) {
     AddSign(FrameAt(Beside(street, along_m + 9.0 * side, side, 5.6)), out);
   }
-  for (double along_m = 4.0; along_m < street.length_m(); along_m += 6.5) {
+  for (const double along_m : EvenlySpaced(4.0, street.length_m(), 6.5)) {
     if (random.Below(2) == 0) {
       PathPoint stall = Beside(street, along_m, side, 4.0);
       stall.position.z() = 0.0;

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/simulation/worlds/props.h"
+
 namespace atlas {
 namespace {
 
@@ -41,7 +43,7 @@ TEST(DrivePathTest, ReversedVisitsTheSamePointsBackwards) {
   const DrivePath path = Hook();
   const DrivePath back = path.Reversed();
   ASSERT_NEAR(back.length_m(), path.length_m(), 1e-9);
-  for (double along_m = 0.0; along_m < path.length_m(); along_m += 0.7) {
+  for (const double along_m : EvenlySpaced(0.0, path.length_m(), 0.7)) {
     const PathPoint there = path.At(along_m, 1.0);
     const PathPoint here = back.At(path.length_m() - along_m, -1.0);
     EXPECT_TRUE(there.position.isApprox(here.position, 1e-9)) << along_m;

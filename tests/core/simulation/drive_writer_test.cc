@@ -67,7 +67,7 @@ TEST_F(DriveWriterTest, PosesReadBackExactly) {
     }
     const auto pose = PoseFromRowMajor(numbers);
     ASSERT_TRUE(pose.has_value());
-    EXPECT_LT((pose->matrix() - drive.T_world_sensor(i).matrix()).norm(), 1e-9);
+    EXPECT_LT((pose->matrix() - drive.sensor_pose(i).matrix()).norm(), 1e-9);
     double time_s = -1.0;
     times >> time_s;
     EXPECT_DOUBLE_EQ(time_s, drive.time_s(i));

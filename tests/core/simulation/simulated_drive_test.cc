@@ -46,8 +46,7 @@ TEST(SimulatedDriveTest, ScansKeepToTheSpacingAndTheModestCount) {
     std::size_t jumps = 0;
     for (std::size_t i = 1; i < drive.scans(); ++i) {
       const double step_m =
-          (drive.T_world_sensor(i).translation() - drive.T_world_sensor(i - 1).translation())
-              .norm();
+          (drive.sensor_pose(i).translation() - drive.sensor_pose(i - 1).translation()).norm();
       jumps += step_m > 10.0 ? 1 : 0;
       EXPECT_TRUE(step_m > 10.0 || (step_m > 0.9 && step_m < 1.5)) << i << ": " << step_m;
     }
@@ -60,7 +59,7 @@ TEST(SimulatedDriveTest, SensorStands180CentimetresAboveTheSurface) {
     const SimulatedDrive drive = Drive(kind, 1);
     const MeshBvh world(drive.world_mesh());
     for (std::size_t i = 0; i < drive.scans(); ++i) {
-      const MeshRay down{drive.T_world_sensor(i).translation().cast<float>(),
+      const MeshRay down{drive.sensor_pose(i).translation().cast<float>(),
                          -Eigen::Vector3f::UnitZ()};
       const MeshHit hit = world.Cast(down, 10.0F);
       ASSERT_TRUE(hit.is_hit());
@@ -74,7 +73,7 @@ TEST(SimulatedDriveTest, PosesAreRotationsTiltedAsTheRampsAre) {
   const SimulatedDrive drive = Drive(WorldKind::kGarage);
   double steepest = 0.0;
   for (std::size_t i = 0; i < drive.scans(); ++i) {
-    const Eigen::Matrix3d rotation = drive.T_world_sensor(i).linear();
+    const Eigen::Matrix3d rotation = drive.sensor_pose(i).linear();
     ASSERT_NEAR((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 0.0, 1e-9);
     ASSERT_NEAR(rotation.determinant(), 1.0, 1e-9);
     steepest = std::max(steepest, rotation(2, 0) / std::hypot(rotation(0, 0), rotation(1, 0)));
@@ -86,10 +85,10 @@ TEST(SimulatedDriveTest, PosesAreRotationsTiltedAsTheRampsAre) {
 TEST(SimulatedDriveTest, OddSeedsDriveTheOtherWayInTheOtherLane) {
   const SimulatedDrive forward = Drive(WorldKind::kStreet, 0);
   const SimulatedDrive backward = Drive(WorldKind::kStreet, 1);
-  EXPECT_GT(forward.T_world_sensor(3).linear()(0, 0), 0.9);
-  const Pose& last = backward.T_world_sensor(backward.scans() - 3);
+  EXPECT_GT(forward.sensor_pose(3).linear()(0, 0), 0.9);
+  const Pose& last = backward.sensor_pose(backward.scans() - 3);
   EXPECT_LT(last.linear()(0, 0), -0.9);
-  const double apart_m = last.translation().y() - forward.T_world_sensor(3).translation().y();
+  const double apart_m = last.translation().y() - forward.sensor_pose(3).translation().y();
   EXPECT_NEAR(apart_m, 3.2, 0.35);
 }
 
@@ -103,7 +102,7 @@ TEST(SimulatedDriveTest, MovingCarsMoveWithTheScans) {
       const SimulatedPoint& p = scan.points[k];
       if (ClassOfLabel(scan.labels[k]) == TruthClass::kMovingCar && std::abs(p.y) < 1.5F &&
           p.x > 0.0F && p.x < 25.0F) {
-        sum += drive.T_world_sensor(i) * Eigen::Vector3d(p.x, p.y, p.z);
+        sum += drive.sensor_pose(i) * Eigen::Vector3d(p.x, p.y, p.z);
         ++count;
       }
     }

@@ -7,6 +7,7 @@
 #include "core/simulation/mesh_bvh.h"
 #include "core/simulation/simulated_drive.h"
 #include "core/simulation/truth_label.h"
+#include "core/simulation/worlds/props.h"
 #include "core/simulation/worlds/simulated_world.h"
 
 namespace atlas {
@@ -101,7 +102,7 @@ TEST(GarageWorldTest, RampsJoinDecksWithoutAStep) {
   const MeshBvh bvh(world->mesh);
   const DrivePath& path = world->legs.front();
   double last_z_m = 0.0;
-  for (double along_m = 0.0; along_m < path.length_m(); along_m += 0.1) {
+  for (const double along_m : EvenlySpaced(0.0, path.length_m(), 0.1)) {
     const Eigen::Vector3d p = path.At(along_m).position;
     const Eigen::Vector3d above = p + Eigen::Vector3d::UnitZ();
     const MeshHit hit = bvh.Cast({above.cast<float>(), -Eigen::Vector3f::UnitZ()}, 3.0F);
@@ -122,7 +123,7 @@ TEST(GarageWorldTest, ScansKnowTheDecksTheySee) {
   std::size_t roof = 0;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const SimulatedPoint& p = scan.points[i];
-    const Eigen::Vector3d p_world = drive->T_world_sensor(last) * Eigen::Vector3d(p.x, p.y, p.z);
+    const Eigen::Vector3d p_world = drive->sensor_pose(last) * Eigen::Vector3d(p.x, p.y, p.z);
     const TruthClass truth = ClassOfLabel(scan.labels[i]);
     if (truth == TruthClass::kRoad && DeckOfLabel(scan.labels[i]) == 3) {
       ++roof;
