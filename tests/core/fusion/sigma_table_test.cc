@@ -15,8 +15,8 @@ TEST(SigmaTableTest, FollowsThePapersFormula) {
     const std::uint16_t step = table.Step(d2);
     const double sigma_m = 0.087489 * d_m + 0.1;
     EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kMeasured, step) * 1e-4, sigma_m, 7e-4);
-    EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kInterpolated, step) * 1e-4, sigma_m + 0.05,
-                7e-4);
+    EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kInterpolated, step) * 1e-4,
+                sigma_m + 1e-3 * profile.sigma_interpolated_mm, 7e-4);
     EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kExtrapolated, step) * 1e-4, sigma_m + 0.3, 7e-4);
     const double weight = kUnitWeight * 0.01 / (sigma_m * sigma_m);
     EXPECT_NEAR(table.Weight(AltitudeSource::kMeasured, step), weight, 0.015 * weight + 1);
