@@ -3,26 +3,10 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "core/simulation/hash_random.h"
 
 namespace atlas {
 namespace {
-
-// SplitMix64 (Steele, Lea, Flood 2014): one state, well mixed, the same on every machine.
-class SplitMix {
- public:
-  explicit SplitMix(std::uint64_t seed) : state_(seed) {}
-
-  std::uint64_t Next() {
-    state_ += 0x9E3779B97F4A7C15ULL;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-    return z ^ (z >> 31);
-  }
-
- private:
-  std::uint64_t state_;
-};
 
 double Distance(const DriveScan& a, const DriveScan& b) {
   return (a.T_world_sensor.translation() - b.T_world_sensor.translation()).norm();
@@ -80,7 +64,7 @@ double SelectedMetres(const DriveFolder& drive, const std::vector<SelectedScan>&
 }
 
 void ShuffleScans(std::vector<SelectedScan>& selected, std::uint64_t seed) {
-  SplitMix random(seed);
+  HashRandom random(seed);
   for (std::size_t i = selected.size(); i > 1; --i) {
     std::swap(selected[i - 1], selected[random.Next() % i]);
   }

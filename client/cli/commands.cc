@@ -14,6 +14,8 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
   commands.push_back(MakeSegmentCommand());
+  commands.push_back(MakeLocalizeCommand());
+  commands.push_back(MakePlanCommand());
   commands.push_back(MakeRenderCommand());
   commands.push_back(MakeSimulateCommand());
   return commands;

@@ -9,6 +9,8 @@ namespace atlas {
 
 std::unique_ptr<Command> MakeDigestCommand();
 std::unique_ptr<Command> MakeIngestCommand();
+std::unique_ptr<Command> MakeLocalizeCommand();
+std::unique_ptr<Command> MakePlanCommand();
 std::unique_ptr<Command> MakePointCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
 std::unique_ptr<Command> MakeQueryCommand();
