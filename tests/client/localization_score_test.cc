@@ -87,7 +87,7 @@ TEST(LocalizationTrialTest, StartsAreWithinTheirBoundsAndSpread) {
 TEST(LocalizationTrialTest, DrawsFollowTheirSeedAlone) {
   const Pose truth = At(0, 0, 0, 0, 0);
   const Eigen::Quaterniond level = Eigen::Quaterniond::Identity();
-  const auto draw = [&](const TrialSeed& seed) {
+  const auto draw = [&](const TrialSeed& seed) -> Eigen::Vector3d {
     return PerturbedStart(truth, level, 1.0, 0.1, seed).translation();
   };
   EXPECT_EQ(draw({1, 2, 3}), draw({1, 2, 3}));
