@@ -70,7 +70,8 @@ TEST(TileCodecTest, ThePayloadMovesWithEveryField) {
   EXPECT_TRUE(moved([](Tile& t) { t.id.x += 1; }));
   EXPECT_TRUE(moved([](Tile& t) { t.contributors[0].session = "other"; }));
   EXPECT_TRUE(moved([](Tile& t) { t.layers[9].altitude_mm += 1; }));
-  EXPECT_TRUE(moved([](Tile& t) { t.layers[9].sigma_100um ^= 1; }));
+  EXPECT_TRUE(
+      moved([](Tile& t) { t.layers[9].sigma_100um = t.layers[9].sigma_100um == 1 ? 2 : 1; }));
   EXPECT_TRUE(moved([](Tile& t) { t.layers[9].occupancy ^= 1; }));
   EXPECT_TRUE(moved([](Tile& t) { t.layers[9].flags ^= 1; }));
   EXPECT_TRUE(moved([](Tile& t) { t.layers[9].observations ^= 1; }));
