@@ -43,12 +43,12 @@ struct MapProfile {
   // sigma(d) = slope * d + base (paper III-B: tan 5 deg and 0.1 m); guessed altitudes get more.
   std::uint32_t sigma_slope_ppm = 87'489;
   std::uint16_t sigma_base_mm = 100;
-  std::uint16_t sigma_interpolated_mm = 50;
+  std::uint16_t sigma_interpolated_mm = 200;
   std::uint16_t sigma_extrapolated_mm = 300;
 
   // Layers (paper III-C, eq. 1). Gates: preset strict and bounded only.
   FusionPreset preset = FusionPreset::kStrict;
-  std::uint16_t overlap_permille = 600;  // epsilon of the overlap rate
+  std::uint16_t overlap_permille = 600;  // epsilon of the overlap rate; no other yet
   std::uint16_t same_layer_mm = 500;     // closer than this: one layer
   std::uint16_t other_layer_mm = 2'000;  // farther than this: two layers
   std::uint16_t layer_span_mm = 1'500;   // no layer is thicker

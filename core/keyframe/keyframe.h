@@ -8,25 +8,9 @@
 
 #include "core/base/status.h"
 #include "core/geometry/grid_geometry.h"
+#include "core/geometry/keyframe_cell.h"
 
 namespace atlas {
-
-// Frozen: 2 bits each in the blob.
-enum class Occupancy : std::uint8_t { kUnknown = 0, kFree = 1, kObstacle = 2 };
-enum class AltitudeSource : std::uint8_t {
-  kNone = 0,          // the cell was not seen
-  kMeasured = 1,      // ground returns fell into it
-  kInterpolated = 2,  // between ground returns along the ray
-  kExtrapolated = 3,  // the nearest ground on the ray
-};
-
-struct KeyframeCell {
-  std::int16_t altitude_mm = 0;  // ground, relative to the sensor, levelled frame
-  Occupancy occupancy = Occupancy::kUnknown;
-  AltitudeSource source = AltitudeSource::kNone;
-
-  friend bool operator==(const KeyframeCell&, const KeyframeCell&) = default;
-};
 
 struct Keyframe {
   static constexpr std::int32_t kMaxRadiusCells = 1024;

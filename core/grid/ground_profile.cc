@@ -1,0 +1,110 @@
+#include "core/grid/ground_profile.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace atlas {
+namespace {
+
+// Ground below an obstacle at `range_m`: between its neighbours, else that of the last sample.
+float GroundAt(std::span<const GroundSample> ground, float range_m) {
+  const auto after = std::upper_bound(
+      ground.begin(), ground.end(), range_m,
+      [](float range, const GroundSample& sample) { return range < sample.range_m; });
+  if (after == ground.end()) {
+    return ground.back().z_m;
+  }
+  const GroundSample& before = *std::prev(after);  // the first sample is at range 0
+  const float t = (range_m - before.range_m) / (after->range_m - before.range_m);
+  return before.z_m + t * (after->z_m - before.z_m);
+}
+
+}  // namespace
+
+GroundProfiles::GroundProfiles(const LeveledScan& scan,
+                               const RayTable& rays,
+                               const VehicleContact& contact,
+                               const ProfileOptions& options) {
+  Sort(scan, rays);
+  const auto count = static_cast<std::size_t>(rays.rays());
+  ground_begin_.reserve(count + 1);
+  ground_begin_.push_back(0);
+  for (std::size_t ray = 0; ray < count; ++ray) {
+    const float azimuth_rad = (static_cast<float>(ray) + 0.5F) * rays.ray_width_rad();
+    const float rim_m = options.contact_radius_m;
+    ground_.push_back({0.0F, contact.HeightAt(0.0F, 0.0F)});
+    ground_.push_back(
+        {rim_m, contact.HeightAt(rim_m * std::cos(azimuth_rad), rim_m * std::sin(azimuth_rad))});
+    BuildRay(std::span(returns_).subspan(return_begin_[ray],
+                                         return_begin_[ray + 1] - return_begin_[ray]),
+             options);
+  }
+}
+
+RayProfile GroundProfiles::Ray(int ray) const {
+  const auto r = static_cast<std::size_t>(ray);
+  return {std::span(ground_).subspan(ground_begin_[r], ground_begin_[r + 1] - ground_begin_[r]),
+          obstacle_range_m_[r], farthest_m_[r]};
+}
+
+// A return stands for every ray between it and its neighbours on the channel.
+void GroundProfiles::Sort(const LeveledScan& scan, const RayTable& rays) {
+  const int count = rays.rays();
+  const float half = 0.5F * std::max(0.0F, scan.column_spacing_rad);
+  return_begin_.assign(static_cast<std::size_t>(count) + 1, 0);
+  const auto for_each = [&](auto&& visit) {
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      if (scan.range_m[i] >= rays.radius_m()) {
+        continue;
+      }
+      const int first =
+          static_cast<int>(std::floor((scan.azimuth_rad[i] - half) / rays.ray_width_rad()));
+      const int last =
+          static_cast<int>(std::floor((scan.azimuth_rad[i] + half) / rays.ray_width_rad()));
+      for (int ray = first; ray <= last; ++ray) {
+        visit(static_cast<std::size_t>((ray + count) % count), i);
+      }
+    }
+  };
+  std::size_t size = 0;
+  for_each([&](std::size_t ray, std::size_t) {
+    ++return_begin_[ray + 1];
+    ++size;
+  });
+  for (std::size_t ray = 1; ray < return_begin_.size(); ++ray) {
+    return_begin_[ray] += return_begin_[ray - 1];
+  }
+  returns_.resize(size);
+  std::vector<std::uint32_t> next(return_begin_.begin(), return_begin_.end() - 1);
+  for_each([&](std::size_t ray, std::size_t i) {
+    returns_[next[ray]++] = {scan.range_m[i], scan.z[i], scan.is_ground[i] != 0};
+  });
+}
+
+void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& options) {
+  std::sort(returns.begin(), returns.end(), [](const Return& a, const Return& b) {
+    return a.range_m != b.range_m ? a.range_m < b.range_m : a.z_m < b.z_m;
+  });
+  const std::size_t begin = ground_begin_.back();
+  for (const Return& r : returns) {
+    const GroundSample& last = ground_.back();
+    const float reach_m =
+        options.max_ground_slope * (r.range_m - last.range_m) + options.max_ground_step_m;
+    if (r.is_ground && std::abs(r.z_m - last.z_m) <= reach_m && r.range_m > last.range_m) {
+      ground_.push_back({r.range_m, r.z_m});
+    }
+  }
+  const std::span<const GroundSample> ground(ground_.data() + begin, ground_.size() - begin);
+  float obstacle_range_m = -1.0F;
+  for (const Return& r : returns) {
+    if (!r.is_ground && r.z_m - GroundAt(ground, r.range_m) <= options.vehicle_clearance_m) {
+      obstacle_range_m = r.range_m;
+      break;
+    }
+  }
+  obstacle_range_m_.push_back(obstacle_range_m);
+  farthest_m_.push_back(returns.empty() ? 0.0F : returns.back().range_m);
+  ground_begin_.push_back(static_cast<std::uint32_t>(ground_.size()));
+}
+
+}  // namespace atlas

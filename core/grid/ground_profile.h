@@ -1,0 +1,79 @@
+// The ground along each ray of a virtual scan, and the nearest obstacle that ends it (paper III-B).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/scan/leveled_scan.h"
+#include "core/scan/ray_table.h"
+
+namespace atlas {
+
+// The ground that the vehicle stands on: a plane parallel to the sensor's own x-y plane. Spinning
+// sensors do not see the ground next to the vehicle (a VLP-16 from 6.7 m on), but its wheels do.
+struct VehicleContact {
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // levelled frame, unit length
+  float sensor_height_m = 1.73F;                      // vertically: what the levelled ground shows
+
+  // Height of the plane at (x, y), levelled frame.
+  float HeightAt(float x_m, float y_m) const {
+    return -sensor_height_m - (normal.x() * x_m + normal.y() * y_m) / normal.z();
+  }
+};
+
+struct ProfileOptions {
+  float contact_radius_m = 1.5F;     // how far around the sensor the vehicle's plane is the ground
+  float vehicle_clearance_m = 2.5F;  // higher above the ground a vehicle passes below
+  // A ground return must be reachable from the one before it at this slope plus this step; the roof
+  // of a car that was taken for ground is not.
+  float max_ground_slope = 0.42F;  // tan 0.4 rad: what segmentation calls ground
+  float max_ground_step_m = 0.25F;
+};
+
+struct GroundSample {
+  float range_m = 0.0F;
+  float z_m = 0.0F;
+};
+
+// One ray: ground samples by growing range, the first two below the vehicle itself.
+struct RayProfile {
+  std::span<const GroundSample> ground;
+  float obstacle_range_m = -1.0F;  // nearest obstacle a vehicle would hit; negative: none
+  float farthest_m = 0.0F;         // farthest return of any kind
+
+  // Where the virtual scan ends: the nearest obstacle, else the farthest ground.
+  float End() const { return obstacle_range_m >= 0.0F ? obstacle_range_m : ground.back().range_m; }
+};
+
+class GroundProfiles {
+ public:
+  GroundProfiles(const LeveledScan& scan,
+                 const RayTable& rays,
+                 const VehicleContact& contact,
+                 const ProfileOptions& options);
+
+  RayProfile Ray(int ray) const;
+
+ private:
+  struct Return {
+    float range_m;
+    float z_m;
+    bool is_ground;
+  };
+
+  void Sort(const LeveledScan& scan, const RayTable& rays);
+  // Ends the ray that begins with the two `contact` samples.
+  void BuildRay(std::span<Return> returns, const ProfileOptions& options);
+
+  std::vector<Return> returns_;  // by ray
+  std::vector<std::uint32_t> return_begin_;
+  std::vector<GroundSample> ground_;  // by ray
+  std::vector<std::uint32_t> ground_begin_;
+  std::vector<float> obstacle_range_m_;
+  std::vector<float> farthest_m_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,139 @@
+#include "core/grid/local_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace atlas {
+namespace {
+
+constexpr float kMaxAltitude_m = 32.0F;  // int16 millimetres
+
+struct AltitudeSum {
+  float sum_m = 0.0F;
+  std::uint16_t count = 0;
+  AltitudeSource source = AltitudeSource::kNone;
+};
+
+// Collects altitudes; a better source replaces worse ones, equals are averaged.
+class AltitudeGrid {
+ public:
+  explicit AltitudeGrid(std::size_t size) : cells_(size) {}
+
+  void Add(std::uint32_t cell, float z_m, AltitudeSource source) {
+    AltitudeSum& sum = cells_[cell];
+    if (sum.source == AltitudeSource::kNone || source < sum.source) {
+      sum = {z_m, 1, source};
+    } else if (source == sum.source) {
+      sum.sum_m += z_m;
+      ++sum.count;
+    }
+  }
+
+  void Store(std::vector<KeyframeCell>& cells) const {
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const AltitudeSum& sum = cells_[i];
+      if (sum.source == AltitudeSource::kNone) {
+        continue;
+      }
+      const float mean_m = sum.sum_m / static_cast<float>(sum.count);
+      if (std::abs(mean_m) < kMaxAltitude_m) {
+        cells[i].altitude_mm = static_cast<std::int16_t>(std::lround(mean_m * 1000.0F));
+        cells[i].source = sum.source;
+      }
+    }
+  }
+
+ private:
+  std::vector<AltitudeSum> cells_;
+};
+
+void AddMeasured(const LeveledScan& scan, const RayTable& rays, AltitudeGrid& altitudes) {
+  const GridGeometry& grid = rays.grid();
+  const float cells_per_m = 1.0F / static_cast<float>(grid.cell_size_m());
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (scan.is_ground[i] == 0 || scan.range_m[i] >= rays.radius_m()) {
+      continue;
+    }
+    const auto ix = static_cast<std::int32_t>(std::floor(scan.x[i] * cells_per_m));
+    const auto iy = static_cast<std::int32_t>(std::floor(scan.y[i] * cells_per_m));
+    if (grid.Contains(ix, iy)) {
+      altitudes.Add(static_cast<std::uint32_t>(grid.Index(ix, iy)), scan.z[i],
+                    AltitudeSource::kMeasured);
+    }
+  }
+}
+
+// Of an altitude between two ground samples: below the vehicle its wheels measure it.
+AltitudeSource SourceAt(float range_m, const RayProfile& profile, float contact_radius_m) {
+  if (range_m <= contact_radius_m) {
+    return AltitudeSource::kMeasured;
+  }
+  return range_m <= profile.End() ? AltitudeSource::kInterpolated : AltitudeSource::kExtrapolated;
+}
+
+// Altitudes below one ray, from the sensor's foot to its farthest return.
+void AddAlongRay(const RayProfile& profile,
+                 const RayTable& rays,
+                 int ray,
+                 float contact_radius_m,
+                 AltitudeGrid& altitudes) {
+  const std::uint32_t* cells = rays.Cells(ray);
+  const float end_m = std::max(profile.End(), profile.farthest_m);
+  const int last = std::min(rays.steps() - 1, static_cast<int>(end_m / rays.step_m()));
+  std::size_t next = 1;
+  for (int step = 0; step <= last; ++step) {
+    const float range_m = rays.StepRange(step);
+    while (next < profile.ground.size() && profile.ground[next].range_m < range_m) {
+      ++next;
+    }
+    const GroundSample& before = profile.ground[next - 1];
+    if (next == profile.ground.size()) {
+      altitudes.Add(cells[step], before.z_m, AltitudeSource::kExtrapolated);
+      continue;
+    }
+    const GroundSample& after = profile.ground[next];
+    const float t = (range_m - before.range_m) / (after.range_m - before.range_m);
+    altitudes.Add(cells[step], before.z_m + t * (after.z_m - before.z_m),
+                  SourceAt(range_m, profile, contact_radius_m));
+  }
+}
+
+}  // namespace
+
+LocalGrid BuildLocalGrid(const LeveledScan& scan,
+                         const RayTable& rays,
+                         const VehicleContact& contact,
+                         const ProfileOptions& options) {
+  const GroundProfiles profiles(scan, rays, contact, options);
+  LocalGrid grid;
+  grid.cells.resize(rays.grid().size());
+  AltitudeGrid altitudes(rays.grid().size());
+  AddMeasured(scan, rays, altitudes);
+  for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
+    const RayProfile profile = profiles.Ray(ray);
+    AddAlongRay(profile, rays, ray, options.contact_radius_m, altitudes);
+    const int step = static_cast<int>(profile.obstacle_range_m / rays.step_m());
+    if (profile.obstacle_range_m >= 0.0F && step < rays.steps()) {
+      grid.cells[rays.Cells(ray)[step]].occupancy = Occupancy::kObstacle;
+    }
+  }
+  for (int ray = 0; ray < rays.rays(); ++ray) {
+    const int end =
+        std::min(rays.steps(), static_cast<int>(profiles.Ray(ray).End() / rays.step_m()));
+    const std::uint32_t* cells = rays.Cells(ray);
+    for (int step = 0; step < end; ++step) {
+      KeyframeCell& cell = grid.cells[cells[step]];
+      cell.occupancy = cell.occupancy == Occupancy::kUnknown ? Occupancy::kFree : cell.occupancy;
+    }
+  }
+  altitudes.Store(grid.cells);
+  for (KeyframeCell& cell : grid.cells) {
+    if (cell.source == AltitudeSource::kNone) {
+      cell.occupancy = Occupancy::kUnknown;  // too high or too low for the grid
+    }
+  }
+  return grid;
+}
+
+}  // namespace atlas

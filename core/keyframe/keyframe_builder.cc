@@ -1,0 +1,100 @@
+#include "core/keyframe/keyframe_builder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+GridGeometry GridFor(const MapProfile& map, double max_range_m) {
+  return {map.cell_size_um, static_cast<std::int32_t>(std::ceil(max_range_m / map.cell_size_m()))};
+}
+
+ProfileOptions WithClearance(ProfileOptions options, const MapProfile& map) {
+  options.vehicle_clearance_m = static_cast<float>(map.vehicle_clearance_mm) * 1e-3F;
+  return options;
+}
+
+}  // namespace
+
+Status KeyframeBuilderOptions::Validate(const MapProfile& map) const {
+  const double radius_cells = max_range_m / map.cell_size_m();
+  if (!(max_range_m >= 1.0 && max_range_m <= 100.0 && radius_cells <= 1024.0)) {
+    return Status(
+        StatusCode::kInvalidArgument,
+        StrCat("maximum range is ", max_range_m,
+               " m, expected 1 to 100 m and at most 1024 cells of ", map.cell_size_m(), " m"));
+  }
+  if (!(sensor_height_m >= 0.1 && sensor_height_m <= 10.0)) {
+    return Status(StatusCode::kInvalidArgument,
+                  StrCat("sensor height is ", sensor_height_m, " m, expected 0.1 to 10"));
+  }
+  return {};
+}
+
+LeveledScan SegmentScan(const PointCloud& cloud,
+                        const SensorLayout& layout,
+                        int ring_step,
+                        const Eigen::Quaterniond& R_level_sensor,
+                        const SegmenterOptions& options) {
+  const RangeImage image = MakeRangeImage(cloud, layout, ring_step);
+  const Eigen::Vector3f up_sensor =
+      (R_level_sensor.conjugate() * Eigen::Vector3d::UnitZ()).cast<float>();
+  return LevelScan(image, Segmenter(options).Segment(image, up_sensor),
+                   R_level_sensor.cast<float>());
+}
+
+KeyframeBuilder::KeyframeBuilder(const MapProfile& map,
+                                 SensorLayout layout,
+                                 const KeyframeBuilderOptions& options)
+    : map_(map),
+      layout_(std::move(layout)),
+      options_(options),
+      rays_(GridFor(map, options.max_range_m)) {}
+
+Keyframe KeyframeBuilder::Build(const PointCloud& cloud,
+                                const Eigen::Quaterniond& R_level_sensor) const {
+  const LeveledScan scan =
+      SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor, options_.segmenter);
+  const VehicleContact contact{(R_level_sensor * Eigen::Vector3d::UnitZ()).cast<float>(),
+                               static_cast<float>(options_.sensor_height_m)};
+  LocalGrid grid = BuildLocalGrid(scan, rays_, contact, WithClearance(options_.profile, map_));
+  LocalColumns columns = TraceColumns(scan, rays_, grid.cells,
+                                      ColumnOptions::FromProfile(map_, Keyframe::kBlockCells));
+  Pose attitude = Pose::Identity();
+  attitude.linear() = R_level_sensor.toRotationMatrix();
+
+  Keyframe keyframe;
+  keyframe.profile_hash = map_.Hash();
+  keyframe.grid = rays_.grid();
+  keyframe.level_quaternion = QuantizedPose::FromPose(attitude).quaternion;
+  keyframe.sensor_height_mm =
+      static_cast<std::int32_t>(std::lround(options_.sensor_height_m * 1e3));
+  keyframe.cells = std::move(grid.cells);
+  keyframe.columns = std::move(columns.columns);
+  keyframe.anchors = std::move(columns.anchors);
+  return keyframe;
+}
+
+Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans) {
+  constexpr float kNear_m = 12.0F;
+  std::vector<float> heights_m;
+  for (const LeveledScan& scan : scans) {
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      if (scan.is_ground[i] != 0 && scan.range_m[i] < kNear_m) {
+        heights_m.push_back(-scan.z[i]);
+      }
+    }
+  }
+  if (heights_m.empty()) {
+    return Error(StatusCode::kInvalidData,
+                 "no ground within 12 m in any scan: give the sensor's height");
+  }
+  const auto median = heights_m.begin() + static_cast<std::ptrdiff_t>(heights_m.size() / 2);
+  std::nth_element(heights_m.begin(), median, heights_m.end());
+  return static_cast<double>(*median);
+}
+
+}  // namespace atlas

@@ -1,0 +1,57 @@
+// The front end of a vehicle: scan and attitude in, keyframe out (paper III-A, III-B, III-D).
+#pragma once
+
+#include "core/base/status.h"
+#include "core/column/column_tracer.h"
+#include "core/geometry/map_profile.h"
+#include "core/geometry/pose.h"
+#include "core/grid/local_grid.h"
+#include "core/keyframe/keyframe.h"
+#include "core/scan/range_image.h"
+#include "core/scan/ray_table.h"
+#include "core/scan/sensor_layout.h"
+#include "core/traversability/segmenter.h"
+
+namespace atlas {
+
+struct KeyframeBuilderOptions {
+  double max_range_m = 20.0;      // paper: 20 or 30
+  double sensor_height_m = 1.73;  // above the ground below it
+  int ring_step = 1;              // use every ring_step-th channel from the lowest
+  SegmenterOptions segmenter;
+  ProfileOptions profile;
+
+  // kInvalidArgument naming the first option out of range.
+  Status Validate(const MapProfile& map) const;
+};
+
+// A segmented, levelled scan: what keyframes are built from and what the localizer matches.
+LeveledScan SegmentScan(const PointCloud& cloud,
+                        const SensorLayout& layout,
+                        int ring_step,
+                        const Eigen::Quaterniond& R_level_sensor,
+                        const SegmenterOptions& options);
+
+class KeyframeBuilder {
+ public:
+  // Requires options.Validate(map).ok().
+  KeyframeBuilder(const MapProfile& map,
+                  SensorLayout layout,
+                  const KeyframeBuilderOptions& options);
+
+  // `R_level_sensor`: the attitude without yaw (SplitYaw), never a fit to the ground. A scan
+  // without a usable return makes a keyframe that has seen nothing.
+  Keyframe Build(const PointCloud& cloud, const Eigen::Quaterniond& R_level_sensor) const;
+
+ private:
+  MapProfile map_;
+  SensorLayout layout_;
+  KeyframeBuilderOptions options_;
+  RayTable rays_;
+};
+
+// The height of the sensor above the ground around it, from segmented scans: the median of the
+// ground within 12 m in the levelled frame. kInvalidData when no ground was seen.
+Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans);
+
+}  // namespace atlas

@@ -1,0 +1,17 @@
+// One LiDAR revolution: returns in the sensor frame (x forward, z up), metres.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace atlas {
+
+// In the order of the file or the driver: ring after ring. Returns only, no empty slots.
+struct PointCloud {
+  std::vector<Eigen::Vector3f> points;
+
+  std::size_t size() const { return points.size(); }
+};
+
+}  // namespace atlas

@@ -1,0 +1,152 @@
+#include "core/scan/sensor_layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+constexpr float kDeg = std::numbers::pi_v<float> / 180.0F;
+// Mean spacings: VLP-16 2.0 and every fourth ring of an HDL-64 1.7; HDL-32 1.33 and every second
+// ring of an HDL-64 0.85; HDL-64 0.43 degrees.
+constexpr float kSpacing16_rad = 1.5F * kDeg;
+constexpr float kSpacing32_rad = 0.6F * kDeg;
+constexpr std::uint32_t kMinRunReturns = 8;  // fewer do not tell where a ring points
+constexpr float kNewRow = 0.6F;  // of the spacing: farther from every row is another row
+
+// Bottom-first copies of the runs that are long enough.
+std::vector<float> RunElevations(const RingSplit& split) {
+  std::vector<float> elevations;
+  for (const RingRun& run : split.runs) {
+    if (run.size() >= kMinRunReturns) {
+      elevations.push_back(run.elevation_rad);
+    }
+  }
+  if (!split.is_bottom_first) {
+    std::reverse(elevations.begin(), elevations.end());
+  }
+  return elevations;
+}
+
+float MedianSpacing(std::span<const float> sorted) {
+  std::vector<float> gaps;
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    gaps.push_back(sorted[i] - sorted[i - 1]);
+  }
+  const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
+  std::nth_element(gaps.begin(), middle, gaps.end());
+  return *middle;
+}
+
+int SnapChannels(float spacing_rad, std::size_t rows) {
+  const int by_spacing =
+      spacing_rad > kSpacing16_rad ? 16 : (spacing_rad > kSpacing32_rad ? 32 : 64);
+  // A few rows too many are halves of rings that were cut.
+  const int by_count = rows > 38 ? 64 : (rows > 19 ? 32 : 16);
+  return std::max(by_spacing, by_count);
+}
+
+// Rows that no scan ever showed: where two neighbours are two spacings apart, then on top.
+std::vector<float> FillEmptyRows(std::vector<float> rows, int channels, float spacing_rad) {
+  for (std::size_t i = 1; i < rows.size() && static_cast<int>(rows.size()) < channels; ++i) {
+    if (rows[i] - rows[i - 1] > 1.7F * spacing_rad) {
+      rows.insert(rows.begin() + static_cast<std::ptrdiff_t>(i), rows[i - 1] + spacing_rad);
+    }
+  }
+  while (static_cast<int>(rows.size()) < channels) {
+    rows.push_back(rows.back() + spacing_rad);
+  }
+  return rows;
+}
+
+}  // namespace
+
+void SensorLayoutEstimator::Add(const PointCloud& cloud) {
+  std::vector<float> seen = RunElevations(SplitRings(cloud, ego_));
+  std::sort(seen.begin(), seen.end());
+  if (seen.size() > elevation_rad_.size()) {
+    std::swap(seen, elevation_rad_);  // the richest scan is the template
+  }
+  if (elevation_rad_.size() < 2) {
+    return;
+  }
+  const float new_row = kNewRow * MedianSpacing(elevation_rad_);
+  for (const float elevation : seen) {
+    const auto above = std::lower_bound(elevation_rad_.begin(), elevation_rad_.end(), elevation);
+    const bool is_near_above = above != elevation_rad_.end() && *above - elevation < new_row;
+    const bool is_near_below =
+        above != elevation_rad_.begin() && elevation - *std::prev(above) < new_row;
+    if (!is_near_above && !is_near_below) {
+      elevation_rad_.insert(above, elevation);
+    }
+  }
+}
+
+Result<SensorLayout> SensorLayoutEstimator::Estimate() const {
+  if (elevation_rad_.size() < 2) {
+    return Error(StatusCode::kInvalidData,
+                 "no scan shows two rings: expected returns stored ring after ring");
+  }
+  std::vector<float> rows = elevation_rad_;
+  const float mean_spacing = (rows.back() - rows.front()) / static_cast<float>(rows.size() - 1);
+  const float spacing = std::min(mean_spacing, 1.2F * MedianSpacing(rows));
+  const int channels = SnapChannels(spacing, rows.size());
+  while (static_cast<int>(rows.size()) > channels) {  // halves of a ring that was cut
+    std::size_t closest = 1;
+    for (std::size_t i = 2; i < rows.size(); ++i) {
+      if (rows[i] - rows[i - 1] < rows[closest] - rows[closest - 1]) {
+        closest = i;
+      }
+    }
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(closest));
+  }
+  return SensorLayout{ego_, FillEmptyRows(std::move(rows), channels, spacing)};
+}
+
+std::vector<int> AssignRows(const RingSplit& split, std::span<const float> elevation_rad) {
+  const std::size_t runs = split.runs.size();
+  const std::size_t rows = elevation_rad.size();
+  // cost[k][r]: runs 0..k with run k in row r, rows never falling; staying in a row costs a little,
+  // so that as many rings as there are rows keep one each.
+  constexpr float kShare = 0.004F;
+  std::vector<std::vector<float>> cost(runs, std::vector<float>(rows));
+  std::vector<std::vector<int>> from(runs, std::vector<int>(rows, 0));
+  const auto run_at = [&](std::size_t k) -> const RingRun& {
+    return split.runs[split.is_bottom_first ? k : runs - 1 - k];
+  };
+  for (std::size_t k = 0; k < runs; ++k) {
+    float best = std::numeric_limits<float>::max();
+    int best_row = 0;
+    for (std::size_t r = 0; r < rows; ++r) {
+      const float own = std::abs(run_at(k).elevation_rad - elevation_rad[r]);
+      if (k == 0) {
+        cost[k][r] = own;
+        continue;
+      }
+      const bool shares = cost[k - 1][r] + kShare < best;
+      cost[k][r] = own + (shares ? cost[k - 1][r] + kShare : best);
+      from[k][r] = shares ? static_cast<int>(r) : best_row;
+      if (cost[k - 1][r] < best) {
+        best = cost[k - 1][r];
+        best_row = static_cast<int>(r);
+      }
+    }
+  }
+  std::vector<int> assigned(runs);
+  if (runs == 0 || rows == 0) {
+    return assigned;
+  }
+  int row = static_cast<int>(std::min_element(cost[runs - 1].begin(), cost[runs - 1].end()) -
+                             cost[runs - 1].begin());
+  for (std::size_t k = runs; k-- > 0;) {
+    assigned[split.is_bottom_first ? k : runs - 1 - k] = row;
+    row = from[k][static_cast<std::size_t>(row)];
+  }
+  return assigned;
+}
+
+}  // namespace atlas

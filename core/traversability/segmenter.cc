@@ -1,0 +1,127 @@
+#include "core/traversability/segmenter.h"
+
+#include <cmath>
+#include <optional>
+
+#include "core/traversability/window_plane.h"
+
+namespace atlas {
+namespace {
+
+constexpr float kPadding_m = 1e6F;
+
+// What the windows over a return said about it.
+struct Votes {
+  std::uint8_t windows = 0;
+  std::uint8_t ground = 0;
+};
+
+// One scan's windows: gathers each, fits its plane, lets the returns vote.
+class WindowPass {
+ public:
+  WindowPass(const RangeImage& image, const SegmenterOptions& options, const Eigen::Vector3f& up)
+      : image_(image), options_(options), up_(up), votes_(image.size()) {}
+
+  void Visit(int row, int row_stride, int sector) {
+    Gather(row, row_stride, sector);
+    if (window_.size() < options_.min_returns || window_.FilledRings() < 2) {
+      return;
+    }
+    const std::optional<PlaneFit> fit = FitPlane(window_, options_.threshold_m);
+    Vote(fit && IsGround(*fit) ? &fit->plane : nullptr);
+  }
+
+  const std::vector<Votes>& votes() const { return votes_; }
+
+ private:
+  void Gather(int row, int row_stride, int sector) {
+    members_.clear();
+    for (std::size_t ring = 0; ring < 3; ++ring) {
+      const int r = row + static_cast<int>(ring) * row_stride;
+      window_.ring_begin[ring] = static_cast<std::uint32_t>(members_.size());
+      if (r < image_.rows) {
+        Append(image_.Begin(r, sector), image_.End(r, sector));
+        const int next = (sector + 1) % RangeImage::kSectors;
+        Append(image_.Begin(r, next), image_.End(r, next));
+      }
+    }
+    const std::size_t size = members_.size();
+    window_.ring_begin[3] = static_cast<std::uint32_t>(size);
+    Fill(window_.x, image_.x);
+    Fill(window_.y, image_.y);
+    Fill(window_.z, image_.z);
+  }
+
+  void Append(std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) {
+      members_.push_back(i);
+    }
+  }
+
+  void Fill(std::vector<float>& plane, const std::vector<float>& from) const {
+    plane.resize(members_.size() + RangeImage::kPadding);
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      plane[i] = from[members_[i]];
+    }
+    for (std::size_t i = members_.size(); i < plane.size(); ++i) {
+      plane[i] = kPadding_m;
+    }
+  }
+
+  bool IsGround(const PlaneFit& fit) const {
+    const float along_up = fit.plane.normal.dot(up_);
+    if (static_cast<float>(fit.inliers) <
+            options_.min_inlier_ratio * static_cast<float>(window_.size()) ||
+        std::abs(along_up) < std::cos(options_.max_slope_rad)) {
+      return false;
+    }
+    // Floors are seen from above, ceilings from below: where the plane meets the sensor's vertical.
+    const float height_of_sensor_m = fit.plane.offset_m / along_up;
+    return options_.mode == SegmentMode::kPaper || height_of_sensor_m > 0.0F;
+  }
+
+  // `plane` is null when the window found no ground.
+  void Vote(const Plane* plane) {
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      Votes& votes = votes_[members_[i]];
+      ++votes.windows;
+      if (plane != nullptr) {
+        const float distance = plane->normal.x() * window_.x[i] + plane->normal.y() * window_.y[i] +
+                               plane->normal.z() * window_.z[i] + plane->offset_m;
+        votes.ground += static_cast<std::uint8_t>(std::abs(distance) < options_.threshold_m);
+      }
+    }
+  }
+
+  const RangeImage& image_;
+  const SegmenterOptions& options_;
+  Eigen::Vector3f up_;
+  std::vector<Votes> votes_;
+  std::vector<std::uint32_t> members_;  // of the window at hand
+  WindowReturns window_;
+};
+
+}  // namespace
+
+std::vector<std::uint8_t> Segmenter::Segment(const RangeImage& image,
+                                             const Eigen::Vector3f& up_sensor) const {
+  const bool is_paper = options_.mode == SegmentMode::kPaper;
+  // The three rings of a window span a fixed angle, whatever the sensor.
+  const int row_stride =
+      is_paper ? 1 : std::max(1, static_cast<int>(std::lround(image.rows / 16.0)));
+  WindowPass pass(image, options_, up_sensor);
+  for (int row = 0; row + 2 * row_stride < image.rows; ++row) {
+    for (int sector = 0; sector < RangeImage::kSectors; ++sector) {
+      pass.Visit(row, row_stride, sector);
+    }
+  }
+  std::vector<std::uint8_t> is_ground(image.size());
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const Votes& votes = pass.votes()[i];
+    is_ground[i] = static_cast<std::uint8_t>(votes.ground > 0 &&
+                                             (is_paper || 2 * votes.ground >= votes.windows));
+  }
+  return is_ground;
+}
+
+}  // namespace atlas
