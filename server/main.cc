@@ -1,11 +1,14 @@
 // atlasd: opens the store, starts fusion, serves until it is told to stop.
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <exception>
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -14,7 +17,6 @@
 #include "server/config/daemon_config.h"
 #include "server/net/tcp_server.h"
 #include "server/service/atlas_service.h"
-#include "server/service/fusion_scheduler.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace atlas {
@@ -80,11 +82,25 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
   return store;
 }
 
-FusionOptions FusionFrom(const DaemonConfig& config) {
-  FusionOptions options;
-  options.workers = config.workers;
-  options.cache_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
+ServiceOptions ServiceFrom(const DaemonConfig& config) {
+  ServiceOptions options;
+  options.fusion.workers = config.workers > 0 ? static_cast<unsigned>(config.workers)
+                                              : std::max(1U, std::thread::hardware_concurrency());
+  options.fusion.cache_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
   return options;
+}
+
+void Log(LogLevel level, const std::string& message) {
+  switch (level) {
+    case LogLevel::kDebug:
+      return spdlog::debug(message);
+    case LogLevel::kInfo:
+      return spdlog::info(message);
+    case LogLevel::kWarning:
+      return spdlog::warn(message);
+    case LogLevel::kError:
+      return spdlog::error(message);
+  }
 }
 
 int Serve(const DaemonConfig& config) {
@@ -92,19 +108,17 @@ int Serve(const DaemonConfig& config) {
   if (!store) {
     return Fail(store.error());
   }
-  FusionScheduler fusion(**store, FusionFrom(config), &NowMs);
-  AtlasService service(**store, &NowMs, [&fusion] { fusion.Wake(); });
+  AtlasService service(**store, &NowMs, &Log, ServiceFrom(config));
   TcpServer server(service, NetOptions());
   const Result<std::string> address = server.Listen(config.host, config.port);
   if (!address) {
     return Fail(address.error());
   }
-  fusion.Start();
   std::printf("listening %s\n", address->c_str());
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());
   server.Run();
-  fusion.Stop();
+  service.Stop();
   spdlog::info("stopped");
   return 0;
 }

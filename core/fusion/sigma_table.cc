@@ -1,9 +1,9 @@
 #include "core/fusion/sigma_table.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "core/base/integer_math.h"
+#include "core/tile/sigma_code.h"
 
 namespace atlas {
 namespace {
@@ -52,9 +52,7 @@ SigmaTable::SigmaTable(const MapProfile& profile, std::int32_t max_radius_cells)
 std::uint16_t SigmaTable::SigmaOfWeight_100um(std::int64_t weight) const {
   const std::uint64_t half_units =
       Isqrt(static_cast<std::uint64_t>(RoundDiv(4 * weight_scale_, weight)));
-  const std::uint64_t sigma = (half_units + 1) / 2;  // to nearest
-  return static_cast<std::uint16_t>(
-      std::clamp<std::uint64_t>(sigma, 1, std::numeric_limits<std::uint16_t>::max()));
+  return RoundSigma_100um((half_units + 1) / 2);
 }
 
 }  // namespace atlas

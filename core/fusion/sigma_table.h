@@ -32,7 +32,7 @@ class SigmaTable {
   std::uint32_t Weight(AltitudeSource source, std::uint16_t step) const {
     return Of(source)[step].weight;
   }
-  // sigma of a sum of weights, saturating at 6.5535 m; at least 1.
+  // sigma of a sum of weights, rounded for publication.
   std::uint16_t SigmaOfWeight_100um(std::int64_t weight) const;
 
  private:

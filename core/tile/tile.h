@@ -19,9 +19,10 @@ struct TileLayer {
   static constexpr std::uint8_t kTraversableAny = 2;  // at least one level-0 cell below is free
   static constexpr std::uint8_t kMeasured = 4;        // ground was measured or interpolated here
 
-  std::int32_t altitude_mm = 0;   // world frame
-  std::uint16_t sigma_100um = 0;  // standard deviation of the altitude, units of 0.1 mm
-  std::int8_t occupancy = 0;      // evidence of an obstacle, units of ln(9)/64 (nibble.h)
+  std::int32_t altitude_mm = 0;  // world frame
+  // Standard deviation of the altitude, units of 0.1 mm, rounded as sigma_code.h says.
+  std::uint16_t sigma_100um = 0;
+  std::int8_t occupancy = 0;  // evidence of an obstacle, units of ln(9)/64 (nibble.h)
   std::uint8_t flags = 0;
   std::uint16_t observations = 0;  // keyframes that saw it, saturating
   std::uint64_t column = 0;        // nibbles, lowest segment first; 0 = no data

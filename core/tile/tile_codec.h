@@ -19,7 +19,7 @@ inline constexpr std::size_t kMaxTileBytes = 32u << 20;  // blob and payload ali
 
 // Tiles handed to the encoders are as fusion and the pyramid make them: contributors sorted and
 // unique, at most kMaxCellLayers layers a cell with altitudes not falling, columns of
-// `column_segments` nibbles. Decoding refuses anything else.
+// `column_segments` nibbles, rounded sigmas. Decoding refuses anything else.
 
 // The canonical uncompressed payload: what promise 1 (purity) and `atlas digest` speak of.
 Bytes EncodeTilePayload(const Tile& tile, const MapProfile& profile);

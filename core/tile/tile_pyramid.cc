@@ -1,12 +1,12 @@
 #include "core/tile/tile_pyramid.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 
 #include "core/base/integer_math.h"
 #include "core/tile/column_lattice.h"
 #include "core/tile/layer_association.h"
+#include "core/tile/sigma_code.h"
 
 namespace atlas {
 namespace {
@@ -47,8 +47,7 @@ void CombineAltitudes(std::span<const ChildLayer> group, TileLayer& parent) {
   parent.altitude_mm = static_cast<std::int32_t>(reference_mm + RoundDiv128(moment, information));
   const std::uint64_t half_units =
       Isqrt(static_cast<std::uint64_t>(RoundDiv(4 * kInformationScale, information)));
-  parent.sigma_100um = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(
-      (half_units + 1) / 2, 1, std::numeric_limits<std::uint16_t>::max()));
+  parent.sigma_100um = RoundSigma_100um((half_units + 1) / 2);
 }
 
 // Occupancy, flags and observations.

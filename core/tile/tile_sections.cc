@@ -6,6 +6,7 @@
 
 #include "core/base/planes.h"
 #include "core/base/str_cat.h"
+#include "core/tile/sigma_code.h"
 
 namespace atlas {
 namespace {
@@ -43,7 +44,7 @@ void VisitWithPredictor(const std::vector<std::uint32_t>& cell_begin,
   }
 }
 
-// Differences wrap at 32 and 16 bits.
+// Differences wrap at 32, 16 and 8 bits.
 std::uint32_t Difference32(std::int32_t value, std::int32_t previous) {
   return Zigzag(static_cast<std::int32_t>(static_cast<std::uint32_t>(value) -
                                           static_cast<std::uint32_t>(previous)));
@@ -51,6 +52,14 @@ std::uint32_t Difference32(std::int32_t value, std::int32_t previous) {
 std::int32_t Add32(std::int32_t previous, std::uint32_t zigzag) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(previous) +
                                    static_cast<std::uint32_t>(Unzigzag(zigzag)));
+}
+std::uint32_t Difference8(std::uint8_t value, std::uint8_t previous) {
+  return Zigzag(static_cast<std::int8_t>(value - previous));
+}
+// A code that no sigma has gives 0, which no layer may have.
+std::uint16_t AddSigma(std::uint16_t previous, std::uint32_t zigzag) {
+  const auto code = static_cast<std::uint8_t>(CodeOfSigma(previous) + Unzigzag(zigzag));
+  return code <= kMaxSigmaCode ? SigmaOfCode(code) : std::uint16_t{0};
 }
 std::uint32_t Difference16(std::uint16_t value, std::uint16_t previous) {
   return Zigzag(static_cast<std::int16_t>(value - previous));
@@ -80,7 +89,8 @@ LayerPlanes SplitLayers(const Tile& tile, std::size_t side) {
       tile.cell_begin, side, std::span(tile.layers),
       [&](const TileLayer& layer, const TileLayer& previous) {
         planes.altitudes.push_back(Difference32(layer.altitude_mm, previous.altitude_mm));
-        planes.sigmas.push_back(Difference16(layer.sigma_100um, previous.sigma_100um));
+        planes.sigmas.push_back(
+            Difference8(CodeOfSigma(layer.sigma_100um), CodeOfSigma(previous.sigma_100um)));
         planes.observations.push_back(Difference16(layer.observations, previous.observations));
         planes.occupancies.push_back(static_cast<std::uint8_t>(layer.occupancy));
         planes.flags.push_back(layer.flags);
@@ -93,7 +103,7 @@ void JoinLayers(const LayerPlanes& planes, std::size_t side, Tile& tile) {
   VisitWithPredictor(tile.cell_begin, side, std::span(tile.layers),
                      [&](TileLayer& layer, const TileLayer& previous) {
                        layer.altitude_mm = Add32(previous.altitude_mm, planes.altitudes[next]);
-                       layer.sigma_100um = Add16(previous.sigma_100um, planes.sigmas[next]);
+                       layer.sigma_100um = AddSigma(previous.sigma_100um, planes.sigmas[next]);
                        layer.observations = Add16(previous.observations, planes.observations[next]);
                        layer.occupancy = static_cast<std::int8_t>(planes.occupancies[next]);
                        layer.flags = static_cast<std::uint8_t>(planes.flags[next]);
@@ -128,9 +138,10 @@ Status CheckLayers(const Tile& tile) {
                     StrCat("tile: layers of cell ", cell, " are not lowest first"));
     }
   }
-  const bool flags_known = std::all_of(tile.layers.begin(), tile.layers.end(),
-                                       [](const auto& l) { return (l.flags & ~kKnownFlags) == 0; });
-  return flags_known ? Status() : Damaged("a layer has unknown flags");
+  const bool is_valid = std::all_of(tile.layers.begin(), tile.layers.end(), [](const auto& l) {
+    return (l.flags & ~kKnownFlags) == 0 && l.sigma_100um != 0;
+  });
+  return is_valid ? Status() : Damaged("a layer has unknown flags or no sigma");
 }
 
 }  // namespace
@@ -152,7 +163,7 @@ Bytes EncodeSurface(const Tile& tile, const MapProfile& profile) {
   }
   const LayerPlanes planes = SplitLayers(tile, profile.tile_cells);
   WritePlanes(planes.altitudes, 4, out);
-  WritePlanes(planes.sigmas, 2, out);
+  WritePlanes(planes.sigmas, 1, out);
   WritePlanes(planes.observations, 2, out);
   WritePlanes(planes.occupancies, 1, out);
   WritePlanes(planes.flags, 1, out);
@@ -197,7 +208,7 @@ Status DecodeContributors(ByteSpan section, Tile& tile) {
 }
 
 Status DecodeSurface(ByteSpan section, const MapProfile& profile, Tile& tile) {
-  constexpr std::size_t kLayerBytes = 4 + 2 + 2 + 1 + 1;
+  constexpr std::size_t kLayerBytes = 4 + 1 + 2 + 1 + 1;
   const std::size_t side = profile.tile_cells;
   ByteReader in(section);
   ATLAS_RETURN_IF_ERROR(ReadLayerCounts(in, side * side, tile));
@@ -208,7 +219,7 @@ Status DecodeSurface(ByteSpan section, const MapProfile& profile, Tile& tile) {
   }
   LayerPlanes planes;
   planes.altitudes = ReadPlanes(in, count, 4);
-  planes.sigmas = ReadPlanes(in, count, 2);
+  planes.sigmas = ReadPlanes(in, count, 1);
   planes.observations = ReadPlanes(in, count, 2);
   planes.occupancies = ReadPlanes(in, count, 1);
   planes.flags = ReadPlanes(in, count, 1);

@@ -10,9 +10,8 @@
 
 namespace atlas {
 
-// kInvalidArgument on levels the atlas does not have, sections this version cannot leave out, or a
-// budget too small for the end of the reply.
-Result<RegionRequest> RegionFromWire(const wire::QueryRegion& query, const MapProfile& profile);
+// kUnsupported on a choice of sections, which this version cannot make.
+Result<RegionRequest> RegionFromWire(const wire::QueryRegion& query);
 
 // Sends every frame of the reply, QueryEnd last. The budget counts whole frames; the first tile
 // that does not fit ends the reply.

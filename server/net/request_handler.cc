@@ -23,13 +23,26 @@ std::chrono::milliseconds Timeout(std::uint32_t timeout_ms) {
   return timeout_ms == 0 ? kDefaultTimeout : std::min(asked, kLongestTimeout);
 }
 
-bool IsClean(const DirtyState& state, std::uint64_t) {
-  return state.dirty_tiles == 0;
-}
+// Pauses between two looks at what is still dirty.
+class Pauses {
+ public:
+  Pauses(asio::any_io_executor executor, std::chrono::milliseconds timeout)
+      : timer_(std::move(executor)), deadline_(std::chrono::steady_clock::now() + timeout) {}
 
-bool Reflects(const DirtyState& state, std::uint64_t revision) {
-  return state.revision >= revision && (state.dirty_tiles == 0 || state.oldest_since > revision);
-}
+  bool is_over() const { return std::chrono::steady_clock::now() >= deadline_; }
+  asio::awaitable<void> Next() {
+    timer_.expires_after(pause_);
+    pause_ = std::min(2 * pause_, kLongest);
+    co_await timer_.async_wait(asio::use_awaitable);
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kLongest{100};
+
+  asio::steady_timer timer_;
+  std::chrono::steady_clock::time_point deadline_;
+  std::chrono::milliseconds pause_{2};
+};
 
 wire::Envelope ReplyTo(const wire::Envelope& request) {
   wire::Envelope reply;
@@ -59,8 +72,8 @@ Result<UploadRequest> UploadFromWire(const wire::UploadKeyframe& upload) {
                        Bytes(blob.begin(), blob.end())};
 }
 
-Result<PoseUpdateRequest> PosesFromWire(const wire::UpdatePoses& message) {
-  PoseUpdateRequest request;
+Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message) {
+  PoseBatchRequest request;
   request.author = message.author();
   request.if_revision = message.if_revision();
   request.updates.reserve(static_cast<std::size_t>(message.updates_size()));
@@ -133,12 +146,12 @@ asio::awaitable<bool> RequestHandler::Greet(Envelope request, ReplyWriter& out) 
     co_await out.SendError(request.request_id(), std::move(status));
     co_return false;
   }
-  const Blocking<DirtyState> read = [this] {
-    return service_.ReadDirtyState();
+  const Blocking<std::uint64_t> read = [this] {
+    return service_.ReadRevision();
   };
-  const Result<DirtyState> state = co_await OnPool(pool_, read);
-  if (!state) {
-    co_await out.SendError(request.request_id(), state.error());
+  const Result<std::uint64_t> revision = co_await OnPool(pool_, read);
+  if (!revision) {
+    co_await out.SendError(request.request_id(), revision.error());
     co_return false;
   }
   Envelope reply = ReplyTo(request);
@@ -148,7 +161,7 @@ asio::awaitable<bool> RequestHandler::Greet(Envelope request, ReplyWriter& out) 
   hello.set_profile(ProfileToWire(identity.profile));
   hello.set_atlas_id(BytesToWire(identity.atlas_id));
   hello.set_epoch(identity.epoch);
-  hello.set_revision(state->revision);
+  hello.set_revision(*revision);
   hello.set_max_frame_bytes(options_.max_frame_bytes);
   co_return co_await out.Send(std::move(reply));
 }
@@ -214,7 +227,7 @@ asio::awaitable<Status> RequestHandler::Upload(const Envelope& request, ReplyWri
 }
 
 asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, ReplyWriter& out) {
-  Result<PoseUpdateRequest> update = PosesFromWire(request.update_poses());
+  Result<PoseBatchRequest> update = PosesFromWire(request.update_poses());
   if (!update) {
     co_return update.error();
   }
@@ -239,15 +252,14 @@ asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, Rep
 
 asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWriter& out) {
   const wire::QueryRegion& query = request.query_region();
-  Result<RegionRequest> region = RegionFromWire(query, service_.identity().profile);
+  Result<RegionRequest> region = RegionFromWire(query);
   if (!region) {
     co_return region.error();
   }
   if (query.wait_revision() != 0) {
-    const Result<DirtyState> state =
-        co_await WaitFor(&Reflects, query.wait_revision(), Timeout(query.timeout_ms()));
-    if (!state) {
-      co_return state.error();
+    Status status = co_await WaitForRevision(query.wait_revision(), Timeout(query.timeout_ms()));
+    if (!status.ok()) {
+      co_return status;
     }
   }
   co_return co_await SendRegion(service_, pool_, request, std::move(*region), out);
@@ -279,42 +291,61 @@ asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, Repl
   co_return Status();
 }
 
-asio::awaitable<Result<DirtyState>> RequestHandler::WaitFor(DirtyPredicate is_done,
-                                                            std::uint64_t revision,
-                                                            std::chrono::milliseconds timeout) {
-  constexpr std::chrono::milliseconds kFirstPause{5};
-  constexpr std::chrono::milliseconds kLongestPause{200};
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
-  asio::steady_timer timer(co_await asio::this_coro::executor);
-  std::chrono::milliseconds pause = kFirstPause;
-  const Blocking<DirtyState> read = [this] {
-    return service_.ReadDirtyState();
+asio::awaitable<Result<WaitOutcome>> RequestHandler::WaitUntilClean(
+    std::chrono::milliseconds timeout) {
+  Pauses pauses(co_await asio::this_coro::executor, timeout);
+  const Blocking<WaitOutcome> look = [this] {
+    return service_.WaitUntilClean(Patience());
   };
   while (true) {
-    Result<DirtyState> state = co_await OnPool(pool_, read);
-    if (!state || is_done(*state, revision)) {
-      co_return state;
+    Result<WaitOutcome> outcome = co_await OnPool(pool_, look);
+    if (!outcome || !outcome->is_timed_out) {
+      co_return outcome;
     }
-    if (std::chrono::steady_clock::now() >= deadline) {
+    if (pauses.is_over()) {
       co_return Error(StatusCode::kTimeout,
-                      StrCat(state->dirty_tiles, " tiles are still to be fused after ",
+                      StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
                              timeout.count(), " ms"));
     }
-    timer.expires_after(pause);
-    co_await timer.async_wait(asio::use_awaitable);
-    pause = std::min(2 * pause, kLongestPause);
+    co_await pauses.Next();
+  }
+}
+
+asio::awaitable<Status> RequestHandler::WaitForRevision(std::uint64_t revision,
+                                                        std::chrono::milliseconds timeout) {
+  Pauses pauses(co_await asio::this_coro::executor, timeout);
+  const Blocking<bool> look = [this, revision]() -> Result<bool> {
+    const Status status = service_.WaitForRevision(revision, Patience());
+    if (status.ok() || status.code() == StatusCode::kTimeout) {
+      return status.ok();
+    }
+    return Error(status);
+  };
+  while (true) {
+    const Result<bool> is_reached = co_await OnPool(pool_, look);
+    if (!is_reached) {
+      co_return is_reached.error();
+    }
+    if (*is_reached) {
+      co_return Status();
+    }
+    if (pauses.is_over()) {
+      co_return Status(StatusCode::kTimeout, StrCat("the tiles do not reflect revision ", revision,
+                                                    " after ", timeout.count(), " ms"));
+    }
+    co_await pauses.Next();
   }
 }
 
 asio::awaitable<Status> RequestHandler::Wait(const Envelope& request, ReplyWriter& out) {
-  const Result<DirtyState> state =
-      co_await WaitFor(&IsClean, 0, Timeout(request.wait_request().timeout_ms()));
-  if (!state) {
-    co_return state.error();
+  const Result<WaitOutcome> outcome =
+      co_await WaitUntilClean(Timeout(request.wait_request().timeout_ms()));
+  if (!outcome) {
+    co_return outcome.error();
   }
   Envelope reply = ReplyTo(request);
-  reply.mutable_wait_reply()->set_revision(state->revision);
-  reply.mutable_wait_reply()->set_dirty_tiles(state->dirty_tiles);
+  reply.mutable_wait_reply()->set_revision(outcome->revision);
+  reply.mutable_wait_reply()->set_dirty_tiles(outcome->dirty_tiles);
   co_await out.Send(std::move(reply));
   co_return Status();
 }
@@ -337,44 +368,39 @@ asio::awaitable<Status> RequestHandler::ListSessions(const Envelope& request, Re
 }
 
 asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWriter& out) {
-  const Blocking<DigestResult> compute = [this] {
-    return service_.Digest();
-  };
-  const auto timeout = Timeout(request.digest_request().timeout_ms());
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
-  while (true) {
-    const Result<DirtyState> state = co_await WaitFor(&IsClean, 0, timeout);
-    if (!state) {
-      co_return state.error();
-    }
-    const Result<DigestResult> digest = co_await OnPool(pool_, compute);
-    if (!digest) {
-      const bool changed_meanwhile = digest.error().code() == StatusCode::kConflict;
-      if (changed_meanwhile && std::chrono::steady_clock::now() < deadline) {
-        continue;
-      }
-      co_return digest.error();
-    }
-    Envelope reply = ReplyTo(request);
-    reply.mutable_digest_reply()->set_sha256(BytesToWire(digest->sha256));
-    reply.mutable_digest_reply()->set_tiles(digest->tiles);
-    reply.mutable_digest_reply()->set_revision(digest->revision);
-    co_await out.Send(std::move(reply));
-    co_return Status();
+  const std::chrono::milliseconds timeout = Timeout(request.digest_request().timeout_ms());
+  const Result<WaitOutcome> clean = co_await WaitUntilClean(timeout);
+  if (!clean) {
+    co_return clean.error();
   }
+  const Blocking<AtlasDigest> compute = [this, timeout] {
+    return service_.Digest(Patience{timeout, {}});
+  };
+  const Result<AtlasDigest> digest = co_await OnPool(pool_, compute);
+  if (!digest) {
+    co_return digest.error();
+  }
+  Envelope reply = ReplyTo(request);
+  reply.mutable_digest_reply()->set_sha256(BytesToWire(digest->sha256));
+  reply.mutable_digest_reply()->set_tiles(digest->tiles);
+  reply.mutable_digest_reply()->set_revision(digest->revision);
+  co_await out.Send(std::move(reply));
+  co_return Status();
 }
 
 asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWriter& out) {
-  const wire::VerifyRequest& verify = request.verify_request();
-  const Result<DirtyState> state = co_await WaitFor(&IsClean, 0, Timeout(verify.timeout_ms()));
-  if (!state) {
-    co_return state.error();
+  const bool is_rebuild = request.verify_request().rebuild();
+  const std::chrono::milliseconds timeout = Timeout(request.verify_request().timeout_ms());
+  if (is_rebuild) {
+    const Result<WaitOutcome> clean = co_await WaitUntilClean(timeout);
+    if (!clean) {
+      co_return clean.error();
+    }
   }
-  const bool is_rebuild = verify.rebuild();
-  const Blocking<VerifyResult> check = [this, is_rebuild] {
-    return service_.Verify(is_rebuild);
+  const Blocking<VerifyReport> check = [this, is_rebuild, timeout] {
+    return service_.Verify(is_rebuild, Patience{timeout, {}});
   };
-  const Result<VerifyResult> result = co_await OnPool(pool_, check);
+  const Result<VerifyReport> result = co_await OnPool(pool_, check);
   if (!result) {
     co_return result.error();
   }

@@ -39,11 +39,11 @@ class RequestHandler {
   boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
 
-  // Until `is_done` holds for the store's dirty state; kTimeout carries how many tiles are dirty.
-  using DirtyPredicate = bool (*)(const DirtyState& state, std::uint64_t revision);
-  boost::asio::awaitable<Result<DirtyState>> WaitFor(DirtyPredicate is_done,
-                                                     std::uint64_t revision,
-                                                     std::chrono::milliseconds timeout);
+  // Asks again and again, so that no thread waits with the client. kTimeout says how many tiles are
+  // still dirty.
+  boost::asio::awaitable<Result<WaitOutcome>> WaitUntilClean(std::chrono::milliseconds timeout);
+  boost::asio::awaitable<Status> WaitForRevision(std::uint64_t revision,
+                                                 std::chrono::milliseconds timeout);
 
   AtlasService& service_;
   boost::asio::thread_pool& pool_;

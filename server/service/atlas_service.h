@@ -1,48 +1,41 @@
-// What the daemon does, one function a use case: checks what came in, asks the store, never sees the
-// wire. May be called from any thread. Functions that return a Result may block on the disk; run them
-// on a worker thread. `Done` callbacks come on the store's thread and must not block.
+// The use cases of the daemon over one store: what a request may do, independent of how it came.
+// Thread-safe. Calls that wait take a deadline and a stop token, and end early with kUnavailable
+// when the service stops.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
-#include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "core/base/status.h"
+#include "server/service/atlas_digest.h"
+#include "server/service/atlas_verify.h"
+#include "server/service/change_signal.h"
+#include "server/service/fusion_scheduler.h"
+#include "server/service/log_sink.h"
+#include "server/service/region_query.h"
+#include "server/service/upload_check.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {
 
-struct UploadRequest {
-  KeyframeKey key;
-  std::int64_t time_ms = 0;
-  QuantizedPose pose;
-  std::optional<PositionPrior> prior;
-  Bytes blob;
-};
-
-struct PoseUpdate {
-  KeyframeKey key;
-  QuantizedPose pose;
-};
-
-struct PoseUpdateRequest {
-  std::vector<PoseUpdate> updates;
+struct PoseBatchRequest {
+  struct Update {
+    KeyframeKey key;
+    QuantizedPose pose;
+  };
+  std::vector<Update> updates;
   std::string author;
   std::uint64_t if_revision = 0;
 };
 
-struct RegionRequest {
-  struct Disc {
-    std::int64_t x_um = 0;
-    std::int64_t y_um = 0;
-    std::uint64_t radius_um = 0;
-  };
-  std::optional<Disc> disc;  // none: the whole atlas
-  std::uint8_t finest_level = 0;
-  std::optional<std::uint8_t> coarsest_level;  // none: the profile's coarsest
-  bool is_only_finest = false;
+struct WaitOutcome {
+  std::uint64_t revision = 0;
+  std::uint64_t dirty_tiles = 0;
+  bool is_timed_out = false;
 };
 
 struct ServiceStatus {
@@ -50,54 +43,70 @@ struct ServiceStatus {
   std::uint64_t rss_bytes = 0;
 };
 
-struct DigestResult {
-  std::array<std::uint8_t, 32> sha256{};
-  std::uint64_t tiles = 0;
-  std::uint64_t revision = 0;
+struct ServiceOptions {
+  FusionOptions fusion;
+  std::size_t verify_cache_bytes = 128u << 20;
 };
 
-struct VerifyResult {
-  std::uint64_t checked = 0;
-  std::uint64_t damaged = 0;
-  std::uint64_t mismatched = 0;
-  std::vector<std::string> findings;  // the first few
-  std::uint64_t revision = 0;
+// How long a call may wait, and what ends it earlier.
+struct Patience {
+  std::chrono::milliseconds timeout{0};
+  std::stop_token stop;
 };
 
 class AtlasService {
  public:
-  template <typename T>
-  using Done = AtlasStore::Done<T>;
-  using Clock = std::function<std::int64_t()>;  // milliseconds since 1970
+  AtlasService(AtlasStore& store, WallClock clock, LogSink log, const ServiceOptions& options);
+  AtlasService(const AtlasService&) = delete;
+  AtlasService& operator=(const AtlasService&) = delete;
+  ~AtlasService();
 
-  // `on_dirty` is called after each commit that marked tiles: it wakes the fusion workers.
-  AtlasService(AtlasStore& store, Clock now_ms, std::function<void()> on_dirty);
+  const AtlasIdentity& identity() const { return store_.identity(); }
 
-  const AtlasIdentity& identity() const;
+  // Checked on the calling thread; `done` is called once it is on disk, or refused.
+  void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
+  void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
 
-  // Errors: kInvalidArgument (names), kInvalidData (blob, profile, pose, tilt above 2 degrees:
-  // "upload again", time not in 0 .. now + 60 s), kConflict, and the store's.
-  void Upload(UploadRequest request, Done<PutKeyframeResult> done);
-  void UpdatePoses(PoseUpdateRequest request, Done<PoseBatchResult> done);
+  // Until nothing is dirty.
+  Result<WaitOutcome> WaitUntilClean(const Patience& patience);
+  // Until the tiles reflect every change up to `revision`. kTimeout if they do not in time,
+  // kInvalidArgument when the atlas has no such revision yet.
+  Status WaitForRevision(std::uint64_t revision, const Patience& patience);
 
-  // The tiles of a region in the order in which they are worth sending: coarse levels first, within a
-  // level the nearest to the disc's centre first. kResourceExhausted above 1 million tiles.
-  Result<std::vector<TileSummary>> PlanRegion(const RegionRequest& request);
-  // In the order of `ids`; nullopt where a tile is gone since.
-  Result<std::vector<std::optional<StoredTile>>> ReadTiles(const std::vector<TileId>& ids);
+  Result<RegionQuery> Query(const RegionRequest& request, RegionQuery::Options options);
+  // The query's next tile; one that turns out damaged is marked to be built again.
+  Result<std::optional<StoredTile>> NextTile(RegionQuery& query);
 
-  Result<DirtyState> ReadDirtyState();
   Result<ServiceStatus> ReadStatus();
-  Result<std::vector<SessionRecord>> ListSessions();
-  // Of what is there now: the caller waits until nothing is dirty, and kConflict asks it to wait again
-  // when something became dirty meanwhile.
-  Result<DigestResult> Digest();
-  Result<VerifyResult> Verify(bool is_rebuild);
+  Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
+  Result<std::uint64_t> ReadRevision();
+
+  // Of a clean atlas that did not change meanwhile; kTimeout if there is none in time.
+  Result<AtlasDigest> Digest(const Patience& patience);
+  // `rebuild` waits until clean like Digest; a plain check does not wait.
+  Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
+
+  // Ends every wait and the workers, which finish the tiles at hand. Calls after it fail.
+  void Stop();
 
  private:
+  using TimePoint = std::chrono::steady_clock::time_point;
+  enum class WaitEnd { kDone, kTimedOut };
+
+  Result<WaitEnd> WaitFor(const std::function<bool(const DirtyState&)>& is_done,
+                          TimePoint deadline,
+                          const std::stop_token& stop,
+                          DirtyState& state);
+  Status CheckRunning(const std::stop_token& stop) const;
+  Status RequireClean(TimePoint deadline, const std::stop_token& stop, DirtyState& state);
+  Result<PoseBatch> PlacePoses(PoseBatchRequest request);
+
   AtlasStore& store_;
-  Clock now_ms_;
-  std::function<void()> on_dirty_;
+  WallClock clock_;
+  LogSink log_;
+  ServiceOptions options_;
+  ChangeSignal changes_;
+  FusionScheduler fusion_;
 };
 
 }  // namespace atlas

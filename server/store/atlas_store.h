@@ -47,6 +47,8 @@ class AtlasStore {
   virtual void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) = 0;
   // Marks tiles to be built again, e.g. one that was found damaged. The value: marks set.
   virtual void MarkDirty(std::vector<TileId> ids, Done<std::uint32_t> done) = 0;
+  // Returns when every write queued before it is done and has been reported.
+  virtual void Flush() = 0;
 
   // In the order of `keys`; kNotFound names the first unknown one.
   virtual Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) = 0;

@@ -1,4 +1,4 @@
-// Turns an asynchronous store write into a blocking call, for threads that may wait.
+// Turns an asynchronous store write into a blocking call or a future, for threads that may wait.
 #pragma once
 
 #include <future>
@@ -10,14 +10,19 @@
 namespace atlas {
 
 // `start` is called with the callback to pass as `done`:
-//   Await<FinishResult>([&](auto done) { store.FinishTile(tile, std::move(done)); })
+//   Begin<FinishResult>([&](auto done) { store.FinishTile(tile, std::move(done)); })
 template <typename T, typename Start>
-Result<T> Await(Start&& start) {
+std::future<Result<T>> Begin(Start&& start) {
   auto promise = std::make_shared<std::promise<Result<T>>>();
   std::future<Result<T>> future = promise->get_future();
   std::forward<Start>(start)(
       [promise](Result<T> result) { promise->set_value(std::move(result)); });
-  return future.get();
+  return future;
+}
+
+template <typename T, typename Start>
+Result<T> Await(Start&& start) {
+  return Begin<T>(std::forward<Start>(start)).get();
 }
 
 }  // namespace atlas

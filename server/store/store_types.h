@@ -113,6 +113,7 @@ struct TileClaim {
   std::string owner;
   std::uint64_t generation = 0;  // the revision that marked it last
   std::uint64_t since = 0;       // the first revision that the tile does not reflect
+  std::uint32_t attempts = 0;    // that failed since it was marked
 };
 
 struct ClaimRequest {

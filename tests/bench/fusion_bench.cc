@@ -5,6 +5,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "core/base/str_cat.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/keyframe/keyframe_codec.h"
 #include "core/tile/tile_codec.h"
@@ -24,7 +25,7 @@ std::vector<PlacedKeyframe> Drive(const MapProfile& profile, int count, bool wit
     if (!with_columns) {
       keyframe.columns.assign(keyframe.columns.size(), 0);
     }
-    const FrameName name{"car", "drive" + std::to_string(i / 32), static_cast<std::uint32_t>(i)};
+    const FrameName name{"car", StrCat("drive", i / 32), static_cast<std::uint32_t>(i)};
     const MapPose pose{1.0 * (i % 32) - 9.3, 6.1 + 0.05 * (i % 7), 0.01 * i, 3.0 * (i % 11)};
     keyframes.push_back(PlacedFrame(name, pose, std::move(keyframe)));
   }

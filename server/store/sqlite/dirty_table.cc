@@ -1,6 +1,7 @@
 #include "server/store/sqlite/dirty_table.h"
 
 #include <optional>
+#include <utility>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/counters.h"
@@ -24,7 +25,8 @@ std::vector<TileClaim> FreeMarks(Connection& connection,
                                  const ClaimRequest& request,
                                  std::uint8_t level) {
   Query row = connection.Prepare(
-      "SELECT key, generation, since FROM dirty_tiles WHERE key BETWEEN ? AND ? AND since <= ? "
+      "SELECT key, generation, since, attempts FROM dirty_tiles WHERE key BETWEEN ? AND ? AND "
+      "since <= ? "
       "AND retry_at_ms <= ? AND lease_until_ms <= ? ORDER BY key LIMIT ?");
   const KeyRange keys = LevelRange(level);
   row.Bind(keys.first).Bind(keys.last).Bind(request.wave);
@@ -33,8 +35,11 @@ std::vector<TileClaim> FreeMarks(Connection& connection,
   while (row.Step()) {
     row.Rewind();
     if (const auto id = TileId::FromKey(row.Unsigned())) {
-      const std::uint64_t generation = row.Unsigned();
-      claims.push_back({*id, request.owner, generation, row.Unsigned()});
+      TileClaim claim{*id, request.owner};
+      claim.generation = row.Unsigned();
+      claim.since = row.Unsigned();
+      claim.attempts = row.Unsigned32();
+      claims.push_back(std::move(claim));
     }
   }
   return claims;

@@ -74,6 +74,8 @@ class SqliteStore final : public AtlasStore {
     });
   }
 
+  void Flush() override { writes_.Flush(); }
+
   Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) override;
   Result<TileSources> GatherTile(const TileId& id) override;
   Result<Bytes> ReadKeyframeBlob(std::int64_t id) override {

@@ -1,6 +1,8 @@
 #include "server/store/sqlite/write_queue.h"
 
 #include <algorithm>
+#include <future>
+#include <limits>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -21,17 +23,33 @@ WriteQueue::~WriteQueue() {
 }
 
 void WriteQueue::Submit(Operation operation) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!is_stopping_ && queue_.size() < options_.max_queued) {
-      queue_.push_back(std::move(operation));
-      has_work_.notify_one();
-      return;
-    }
+  if (!Enqueue(operation, options_.max_queued)) {
+    operation.finish(Status(StatusCode::kUnavailable,
+                            StrCat("store: ", options_.max_queued,
+                                   " writes are waiting or it is closing; try again later")));
   }
-  operation.finish(Status(
-      StatusCode::kUnavailable,
-      StrCat("store: more than ", options_.max_queued, " writes are waiting; try again later")));
+}
+
+void WriteQueue::Flush() {
+  std::promise<void> finished;
+  Operation barrier{[](Connection&) { return Status(); },
+                    [&finished](const Status&) {
+                      finished.set_value();
+                    }};
+  if (Enqueue(barrier, std::numeric_limits<std::size_t>::max())) {
+    finished.get_future().wait();
+  }
+}
+
+// False, and nothing taken, with a full queue or a stopped one.
+bool WriteQueue::Enqueue(Operation& operation, std::size_t max_queued) {
+  const std::lock_guard lock(mutex_);
+  if (is_stopping_ || queue_.size() >= max_queued) {
+    return false;
+  }
+  queue_.push_back(std::move(operation));
+  has_work_.notify_one();
+  return true;
 }
 
 void WriteQueue::Loop() {

@@ -35,8 +35,11 @@ class WriteQueue {
 
   // Never blocks. With a full queue, `finish` is called at once with kUnavailable.
   void Submit(Operation operation);
+  // Waits until everything queued so far is finished.
+  void Flush();
 
  private:
+  bool Enqueue(Operation& operation, std::size_t max_queued);
   void Loop();
   std::vector<Operation> TakeGroup();
   void RunGroup(std::vector<Operation>& group);

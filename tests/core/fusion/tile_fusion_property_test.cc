@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/str_cat.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/tile/tile_codec.h"
 #include "tests/core/fusion/reference_fusion.h"
@@ -56,8 +57,7 @@ std::vector<PlacedKeyframe> RandomDrives(const MapProfile& profile, std::uint32_
       const double deck_m = 1.3 * static_cast<double>(random() % 4);
       const testing::MapPose pose{0.8 + unit(random), 0.8 + unit(random), deck_m,
                                   180.0 * unit(random)};
-      const testing::FrameName name{"car" + std::to_string(s % 2), "s" + std::to_string(s),
-                                    sequence};
+      const testing::FrameName name{StrCat("car", s % 2), StrCat("s", s), sequence};
       keyframes.push_back(testing::PlacedFrame(name, pose, std::move(keyframe)));
       keyframes.back().placement.slope_x = static_cast<std::int32_t>(3e7 * unit(random));
       keyframes.back().placement.slope_y = static_cast<std::int32_t>(3e7 * unit(random));

@@ -6,42 +6,36 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/support/golden.h"
+#include "tests/core/support/golden_profile.h"
 
 namespace atlas {
 namespace {
 
-MapProfile UnusualProfile() {
-  MapProfile profile;
-  profile.cell_size_um = 200'000;
-  profile.tile_cells = 64;
-  profile.column_segments = 16;
-  profile.hit_units = 30;
-  profile.origin = GeodeticOrigin{49'013'000'000, -8'400'000'000, 115'000};
-  return profile;
-}
+using testing::GoldenProfile;
 
 TEST(MapProfileTest, ReadsBack) {
-  for (const MapProfile& profile : {MapProfile(), UnusualProfile()}) {
+  for (const MapProfile& profile : {MapProfile(), GoldenProfile()}) {
     EXPECT_TRUE(profile.Validate().ok());
     EXPECT_EQ(MapProfile::Decode(profile.Encode()).value(), profile);
   }
 }
 
 TEST(MapProfileTest, GoldenFile) {
-  EXPECT_EQ(testing::GoldenFile("profile_v1.bin", UnusualProfile().Encode()),
-            UnusualProfile().Encode());
+  const Bytes golden = testing::GoldenFile("profile_v1.bin", GoldenProfile().Encode());
+  EXPECT_EQ(MapProfile::Decode(golden).value(), GoldenProfile());
+  EXPECT_EQ(GoldenProfile().Encode(), golden);
 }
 
 TEST(MapProfileTest, HashMovesWithEveryByte) {
   const std::uint64_t hash = MapProfile().Hash();
-  EXPECT_NE(UnusualProfile().Hash(), hash);
+  EXPECT_NE(GoldenProfile().Hash(), hash);
   MapProfile profile;
   profile.slab_margin_mm += 1;
   EXPECT_NE(profile.Hash(), hash);
 }
 
 TEST(MapProfileTest, RefusesTruncationTrailingBytesAndNewerVersions) {
-  Bytes bytes = UnusualProfile().Encode();
+  Bytes bytes = GoldenProfile().Encode();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     EXPECT_FALSE(MapProfile::Decode(ByteSpan(bytes).first(size)).has_value()) << size;
   }

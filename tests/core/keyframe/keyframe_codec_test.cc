@@ -7,6 +7,7 @@
 
 #include "core/base/hash.h"
 #include "tests/core/support/golden.h"
+#include "tests/core/support/golden_profile.h"
 #include "tests/core/support/keyframe_worlds.h"
 
 namespace atlas {
@@ -150,7 +151,7 @@ TEST(KeyframeCodecTest, ValidateNamesWhatIsWrong) {
 }
 
 TEST(KeyframeCodecTest, GoldenFileReadsAndEncodesEqual) {
-  const Keyframe keyframe = RandomKeyframe(MapProfile(), 6, 42);
+  const Keyframe keyframe = RandomKeyframe(testing::GoldenProfile(), 6, 42);
   const Bytes golden = testing::GoldenFile("keyframe_v1.bin", EncodeKeyframe(keyframe));
   const auto decoded = DecodeKeyframe(golden);
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message();

@@ -6,6 +6,8 @@
 #include <random>
 #include <string>
 
+#include "core/base/str_cat.h"
+#include "core/tile/sigma_code.h"
 #include "core/tile/tile.h"
 
 namespace atlas::testing {
@@ -13,7 +15,7 @@ namespace atlas::testing {
 inline TileLayer RandomLayer(const MapProfile& profile, std::mt19937& random) {
   TileLayer layer;
   layer.altitude_mm = static_cast<std::int32_t>(random() % 40'000) - 20'000;
-  layer.sigma_100um = static_cast<std::uint16_t>(1 + random() % 65'535);
+  layer.sigma_100um = SigmaOfCode(static_cast<std::uint8_t>(1 + random() % kMaxSigmaCode));
   layer.occupancy = static_cast<std::int8_t>(static_cast<int>(random() % 129) - 64);
   layer.flags = random() & 7;
   layer.observations = static_cast<std::uint16_t>(random());
@@ -36,7 +38,7 @@ inline Tile RandomTile(const TileId& id, const MapProfile& profile, std::uint32_
     tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
   }
   for (std::uint32_t i = 0; i < 1 + seed % 3; ++i) {
-    tile.contributors.push_back({"car", "drive" + std::to_string(i)});
+    tile.contributors.push_back({"car", StrCat("drive", i)});
   }
   return tile;
 }

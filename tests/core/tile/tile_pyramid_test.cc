@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
 #include "tests/core/support/tile_worlds.h"
 
@@ -64,7 +65,7 @@ TEST(TilePyramidTest, AltitudesCombineByInformation) {
   const auto layers = ParentCell({{{sure}, {unsure}, {}, {}}});
   ASSERT_EQ(layers.size(), 1u);
   EXPECT_EQ(layers[0].altitude_mm, 110);  // weights 9 : 1
-  EXPECT_EQ(layers[0].sigma_100um, 95u);  // 100 / sqrt(1 + 1/9)
+  EXPECT_EQ(layers[0].sigma_100um, 96u);  // 100 / sqrt(1 + 1/9), rounded
 }
 
 TEST(TilePyramidTest, TraversableNeedsAllFourChildrenAnyNeedsOne) {
@@ -132,7 +133,7 @@ TEST(TilePyramidTest, EachQuadrantComesFromItsChild) {
   for (std::size_t i = 0; i < 4; ++i) {
     std::vector<TileLayer> cell{Layer(static_cast<std::int32_t>(1'000 * i))};
     tiles[i] = FourCells({cell, cell, cell, cell});
-    tiles[i].contributors = {{"car", "drive" + std::to_string(i % 2)}};
+    tiles[i].contributors = {{"car", StrCat("drive", i % 2)}};
     children[i] = &tiles[i];
   }
   const Tile parent = BuildParentTile({1, 0, 0}, children, profile);

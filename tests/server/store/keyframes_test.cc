@@ -14,6 +14,16 @@ const TileId kA{0, 0, 0};
 const TileId kB{0, 1, 0};
 const TileId kC{0, 0, 1};
 
+NewPose Moved(std::uint32_t sequence, std::int64_t x_um, std::vector<TileId> footprint) {
+  NewPose pose;
+  pose.key.session.vehicle = "bus";
+  pose.key.session.session = "day";
+  pose.key.sequence = sequence;
+  pose.pose.x_um = x_um;
+  pose.footprint = std::move(footprint);
+  return pose;
+}
+
 std::set<TileId> Ids(const ClaimResult& result) {
   std::set<TileId> ids;
   for (const TileClaim& claim : result.claims) {
@@ -40,7 +50,7 @@ TEST_F(KeyframeStoreTest, UploadIsStoredAndMarksItsFootprint) {
 TEST_F(KeyframeStoreTest, ResendIsADuplicateEvenAfterItsPoseWasCorrected) {
   Open();
   ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
-  ASSERT_TRUE(Update({{{{"bus", "day"}, 1}, PoseAt(5), {kB}}}).has_value());
+  ASSERT_TRUE(Update({Moved(1, 5, {kB})}).has_value());
   const auto again = Put(MakeKeyframe(1, {kA}));
   ASSERT_TRUE(again.has_value());
   EXPECT_TRUE(again->is_duplicate);
@@ -68,7 +78,7 @@ TEST_F(KeyframeStoreTest, PoseUpdateMarksOldAndNewFootprints) {
     ASSERT_TRUE(Finish(claim, std::nullopt).has_value());
   }
   ASSERT_EQ(Dirty().dirty_tiles, 0u);
-  const auto moved = Update({{{{"bus", "day"}, 1}, PoseAt(5), {kB, kC}}});
+  const auto moved = Update({Moved(1, 5, {kB, kC})});
   ASSERT_TRUE(moved.has_value()) << moved.error().message();
   EXPECT_EQ(moved->updated, 1u);
   EXPECT_EQ(moved->tiles_marked, 3u);
@@ -84,7 +94,7 @@ TEST_F(KeyframeStoreTest, PoseUpdateMarksOldAndNewFootprints) {
 TEST_F(KeyframeStoreTest, AnEqualPoseChangesNothing) {
   Open();
   ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
-  const auto same = Update({{{{"bus", "day"}, 1}, PoseAt(0), {kA}}});
+  const auto same = Update({Moved(1, 0, {kA})});
   ASSERT_TRUE(same.has_value());
   EXPECT_EQ(same->updated, 0u);
   EXPECT_EQ(same->tiles_marked, 0u);
@@ -94,8 +104,7 @@ TEST_F(KeyframeStoreTest, AnEqualPoseChangesNothing) {
 TEST_F(KeyframeStoreTest, PoseBatchIsAllOrNothing) {
   Open();
   ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
-  const auto refused =
-      Update({{{{"bus", "day"}, 1}, PoseAt(5), {kB}}, {{{"bus", "day"}, 99}, PoseAt(5), {kB}}});
+  const auto refused = Update({Moved(1, 5, {kB}), Moved(99, 5, {kB})});
   EXPECT_EQ(refused.error().code(), StatusCode::kNotFound);
   EXPECT_NE(refused.error().message().find("bus/day/99"), std::string::npos);
   EXPECT_EQ(store_->GatherTile(kA)->keyframes[0].pose, PoseAt(0));
@@ -106,7 +115,7 @@ TEST_F(KeyframeStoreTest, PoseBatchIsAllOrNothing) {
 TEST_F(KeyframeStoreTest, TheSameKeyframeTwiceInABatchIsRefused) {
   Open();
   ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
-  const NewPose pose{{{"bus", "day"}, 1}, PoseAt(5), {kB}};
+  const NewPose pose = Moved(1, 5, {kB});
   EXPECT_EQ(Update({pose, pose}).error().code(), StatusCode::kInvalidData);
 }
 

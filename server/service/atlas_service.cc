@@ -1,0 +1,270 @@
+#include "server/service/atlas_service.h"
+
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/service/process_memory.h"
+#include "server/store/await.h"
+
+namespace atlas {
+namespace {
+
+std::chrono::steady_clock::time_point DeadlineOf(const Patience& patience) {
+  return std::chrono::steady_clock::now() + patience.timeout;
+}
+
+// Calls `done` with the result after waking whoever waits for changes.
+template <typename T>
+AtlasStore::Done<T> Notifying(ChangeSignal& changes, AtlasStore::Done<T> done) {
+  return [&changes, done = std::move(done)](Result<T> result) {
+    changes.Notify();
+    done(std::move(result));
+  };
+}
+
+}  // namespace
+
+AtlasService::AtlasService(AtlasStore& store,
+                           WallClock clock,
+                           LogSink log,
+                           const ServiceOptions& options)
+    : store_(store),
+      clock_(std::move(clock)),
+      log_(std::move(log)),
+      options_(options),
+      fusion_(store, changes_, clock_, log_, options.fusion) {}
+
+AtlasService::~AtlasService() {
+  Stop();
+  store_.Flush();  // queued writes report to this
+}
+
+void AtlasService::Stop() {
+  changes_.Close();
+  fusion_.Stop();
+}
+
+void AtlasService::Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done) {
+  auto keyframe = CheckUpload(std::move(request), identity().profile, clock_());
+  if (!keyframe) {
+    done(Error(keyframe.error()));
+    return;
+  }
+  store_.PutKeyframe(std::move(*keyframe), Notifying(changes_, std::move(done)));
+}
+
+void AtlasService::UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done) {
+  auto batch = PlacePoses(std::move(request));
+  if (!batch) {
+    done(Error(batch.error()));
+    return;
+  }
+  store_.UpdatePoses(std::move(*batch), Notifying(changes_, std::move(done)));
+}
+
+Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
+  if (!request.author.empty()) {
+    if (Status status = ValidateName("author", request.author); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  std::vector<KeyframeKey> keys;
+  keys.reserve(request.updates.size());
+  for (const PoseBatchRequest::Update& update : request.updates) {
+    keys.push_back(update.key);
+  }
+  const auto keyframes = store_.FindKeyframes(keys);
+  if (!keyframes) {
+    return Error(keyframes.error());
+  }
+  PoseBatch batch{{}, std::move(request.author), request.if_revision};
+  batch.poses.reserve(keys.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    auto pose = CheckPose((*keyframes)[i], request.updates[i].pose, identity().profile);
+    if (!pose) {
+      return Error(pose.error());
+    }
+    batch.poses.push_back(std::move(*pose));
+  }
+  return batch;
+}
+
+Status AtlasService::CheckRunning(const std::stop_token& stop) const {
+  if (changes_.is_closed()) {
+    return Status(StatusCode::kUnavailable, "the daemon is shutting down");
+  }
+  if (stop.stop_requested()) {
+    return Status(StatusCode::kUnavailable, "the peer is gone");
+  }
+  return {};
+}
+
+Result<AtlasService::WaitEnd> AtlasService::WaitFor(
+    const std::function<bool(const DirtyState&)>& is_done,
+    TimePoint deadline,
+    const std::stop_token& stop,
+    DirtyState& state) {
+  while (true) {
+    const std::uint64_t seen = changes_.version();
+    const auto read = store_.ReadDirtyState();
+    if (!read) {
+      return Error(read.error());
+    }
+    state = *read;
+    if (is_done(state)) {
+      return WaitEnd::kDone;
+    }
+    if (!changes_.WaitPast(seen, deadline, stop)) {
+      if (Status status = CheckRunning(stop); !status.ok()) {
+        return Error(std::move(status));
+      }
+      return WaitEnd::kTimedOut;
+    }
+  }
+}
+
+Result<WaitOutcome> AtlasService::WaitUntilClean(const Patience& patience) {
+  DirtyState state;
+  const auto end = WaitFor([](const DirtyState& s) { return s.dirty_tiles == 0; },
+                           DeadlineOf(patience), patience.stop, state);
+  if (!end) {
+    return Error(end.error());
+  }
+  return WaitOutcome{state.revision, state.dirty_tiles, *end == WaitEnd::kTimedOut};
+}
+
+Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& patience) {
+  const auto current = ReadRevision();
+  if (!current) {
+    return current.error();
+  }
+  if (revision > *current) {
+    return Status(StatusCode::kInvalidArgument,
+                  StrCat("cannot wait for revision ", revision, ", the atlas is at ", *current));
+  }
+  DirtyState state;
+  const auto end = WaitFor(
+      [revision](const DirtyState& s) { return s.dirty_tiles == 0 || s.oldest_since > revision; },
+      DeadlineOf(patience), patience.stop, state);
+  if (!end) {
+    return end.error();
+  }
+  if (*end == WaitEnd::kTimedOut) {
+    return Status(StatusCode::kTimeout, StrCat("tiles do not reflect revision ", revision,
+                                               " yet: ", state.dirty_tiles, " are to be fused"));
+  }
+  return {};
+}
+
+Result<RegionQuery> AtlasService::Query(const RegionRequest& request,
+                                        RegionQuery::Options options) {
+  return RegionQuery::Create(store_, request, std::move(options));
+}
+
+Result<std::optional<StoredTile>> AtlasService::NextTile(RegionQuery& query) {
+  auto tile = query.Next();
+  if (!tile && tile.error().code() == StatusCode::kInvalidData && query.last_tried()) {
+    const TileId id = *query.last_tried();
+    log_(LogLevel::kError, StrCat("tile ", id, " is damaged and will be built again"));
+    const auto marked =
+        Await<std::uint32_t>([&](auto done) { store_.MarkDirty({id}, std::move(done)); });
+    if (!marked) {
+      log_(LogLevel::kError, marked.error().message());
+    }
+    changes_.Notify();
+  }
+  return tile;
+}
+
+Result<ServiceStatus> AtlasService::ReadStatus() {
+  auto counts = store_.ReadCounts();
+  if (!counts) {
+    return Error(counts.error());
+  }
+  return ServiceStatus{*counts, ResidentBytes()};
+}
+
+Result<std::uint64_t> AtlasService::ReadRevision() {
+  const auto state = store_.ReadDirtyState();
+  if (!state) {
+    return Error(state.error());
+  }
+  return state->revision;
+}
+
+// kTimeout when marks are left at the deadline.
+Status AtlasService::RequireClean(TimePoint deadline,
+                                  const std::stop_token& stop,
+                                  DirtyState& state) {
+  const auto end =
+      WaitFor([](const DirtyState& s) { return s.dirty_tiles == 0; }, deadline, stop, state);
+  if (!end) {
+    return end.error();
+  }
+  if (*end == WaitEnd::kTimedOut) {
+    return Status(StatusCode::kTimeout,
+                  StrCat("the atlas is not clean: ", state.dirty_tiles, " tiles are to be fused"));
+  }
+  return {};
+}
+
+Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
+  const TimePoint deadline = DeadlineOf(patience);
+  while (true) {
+    DirtyState before;
+    if (Status status = RequireClean(deadline, patience.stop, before); !status.ok()) {
+      return Error(std::move(status));
+    }
+    auto digest = ComputeDigest(store_);
+    if (!digest) {
+      return Error(digest.error());
+    }
+    const auto after = ReadRevision();
+    if (!after) {
+      return Error(after.error());
+    }
+    if (*after == before.revision) {
+      digest->revision = before.revision;
+      return digest;
+    }
+    if (std::chrono::steady_clock::now() >= deadline) {
+      return Error(StatusCode::kTimeout, "the atlas changes while its digest is computed");
+    }
+  }
+}
+
+Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience) {
+  const TimePoint deadline = DeadlineOf(patience);
+  while (true) {
+    DirtyState before;
+    if (rebuild) {
+      if (Status status = RequireClean(deadline, patience.stop, before); !status.ok()) {
+        return Error(std::move(status));
+      }
+    }
+    AtlasVerifier::Options options;
+    options.rebuild = rebuild;
+    options.cache_bytes = options_.verify_cache_bytes;
+    options.check_stop = [&] {
+      return CheckRunning(patience.stop);
+    };
+    auto report = AtlasVerifier(store_, options).Run();
+    if (!report) {
+      return Error(report.error());
+    }
+    const auto after = ReadRevision();
+    if (!after) {
+      return Error(after.error());
+    }
+    report->revision = *after;
+    // A tile that changed between being read and being rebuilt is no mismatch: look again.
+    if (!rebuild || report->mismatched == 0 || *after == before.revision) {
+      return report;
+    }
+    if (std::chrono::steady_clock::now() >= deadline) {
+      return Error(StatusCode::kTimeout, "the atlas changes while it is verified");
+    }
+  }
+}
+
+}  // namespace atlas

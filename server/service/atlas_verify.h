@@ -1,0 +1,57 @@
+// Reads everything back: every checksum, every blob, and if asked every tile against one rebuilt
+// from the keyframes. Changes nothing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/service/tile_builder.h"
+#include "server/store/atlas_store.h"
+
+namespace atlas {
+
+struct VerifyReport {
+  std::uint64_t checked = 0;  // keyframes and tiles
+  std::uint64_t damaged = 0;
+  std::uint64_t mismatched = 0;       // stored tile is not what its keyframes make
+  std::vector<std::string> findings;  // the first few
+  std::uint64_t revision = 0;
+};
+
+class AtlasVerifier {
+ public:
+  struct Options {
+    bool rebuild = false;
+    std::size_t cache_bytes = 128u << 20;
+    std::size_t max_findings = 20;
+    // Asked between tiles; a failed status ends the verification with it.
+    std::function<Status()> check_stop;
+  };
+
+  AtlasVerifier(AtlasStore& store, Options options);
+
+  Result<VerifyReport> Run();
+
+ private:
+  Status VerifySessions();
+  Status VerifyKeyframes();
+  Status VerifyTiles();
+  Status VerifyMissingTiles();
+  Status CheckKeyframe(std::int64_t id);
+  Status CheckTile(const TileId& id);
+  Status CompareTile(const TileId& id, const std::optional<StoredTile>& stored);
+  Status CheckParentExists(const TileId& id);
+  Status Note(Status problem);
+  void Mismatch(const TileId& id, const std::string& what);
+
+  AtlasStore& store_;
+  Options options_;
+  TileBuilder builder_;
+  VerifyReport report_;
+};
+
+}  // namespace atlas

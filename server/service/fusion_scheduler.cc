@@ -1,0 +1,167 @@
+#include "server/service/fusion_scheduler.h"
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/await.h"
+
+namespace atlas {
+namespace {
+
+// How often a worker without work looks again: for leases and back-offs that ran out.
+constexpr std::chrono::seconds kLookAgain{1};
+
+struct Unfinished {
+  TileClaim claim;
+  std::future<Result<FinishResult>> result;
+};
+
+}  // namespace
+
+FusionScheduler::FusionScheduler(AtlasStore& store,
+                                 ChangeSignal& changes,
+                                 WallClock clock,
+                                 LogSink log,
+                                 const FusionOptions& options)
+    : store_(store),
+      changes_(changes),
+      clock_(std::move(clock)),
+      log_(std::move(log)),
+      options_(options),
+      builder_(store, options.cache_bytes) {
+  for (unsigned i = 0; i < options_.workers; ++i) {
+    threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
+      RunWorker(stop, owner);
+    });
+  }
+}
+
+FusionScheduler::~FusionScheduler() {
+  Stop();
+}
+
+void FusionScheduler::Stop() {
+  for (std::jthread& thread : threads_) {
+    thread.request_stop();
+  }
+  threads_.clear();  // joins
+}
+
+void FusionScheduler::RunWorker(const std::stop_token& stop, const std::string& owner) {
+  while (!stop.stop_requested()) {
+    const std::uint64_t seen = changes_.version();
+    const std::vector<TileClaim> claims = NextClaims(owner);
+    if (!claims.empty()) {
+      BuildClaims(claims, stop);
+    } else if (!changes_.is_closed()) {
+      changes_.WaitPast(seen, std::chrono::steady_clock::now() + kLookAgain, stop);
+    } else {
+      return;
+    }
+  }
+}
+
+std::vector<TileClaim> FusionScheduler::NextClaims(const std::string& owner) {
+  while (true) {
+    const std::uint64_t wave = wave_;
+    const ClaimRequest request{owner, clock_(), options_.lease_ms, options_.tiles_per_claim, wave};
+    auto result =
+        Await<ClaimResult>([&](auto done) { store_.ClaimDirty(request, std::move(done)); });
+    if (!result) {
+      log_(LogLevel::kError, "fusion: cannot claim tiles: " + result.error().message());
+      return {};
+    }
+    if (!result->claims.empty() || !result->is_wave_done || !StartNextWave(wave)) {
+      return std::move(result->claims);
+    }
+  }
+}
+
+// False when there is nothing to do beyond the wave `done`.
+bool FusionScheduler::StartNextWave(std::uint64_t done) {
+  const auto state = store_.ReadDirtyState();
+  if (!state) {
+    log_(LogLevel::kError, "fusion: cannot read the dirty marks: " + state.error().message());
+    return false;
+  }
+  if (state->dirty_tiles == 0 || state->revision <= done) {
+    return wave_ > done;  // another worker started one
+  }
+  std::uint64_t expected = done;
+  wave_.compare_exchange_strong(expected, state->revision);
+  return true;
+}
+
+// Builds one after the other while the store writes those before.
+void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
+                                  const std::stop_token& stop) {
+  std::vector<Unfinished> unfinished;
+  for (const TileClaim& claim : claims) {
+    if (stop.stop_requested()) {
+      GiveBack(claim, 0);
+      continue;
+    }
+    auto built = builder_.Build(claim.id);
+    if (!built) {
+      PostponeFailed(claim, built.error());
+      continue;
+    }
+    ++tiles_built_;
+    FinishedTile tile{claim, built->revision, std::move(built->content)};
+    unfinished.push_back({claim, Begin<FinishResult>([&](auto done) {
+                            store_.FinishTile(std::move(tile), std::move(done));
+                          })});
+  }
+  for (Unfinished& tile : unfinished) {
+    const auto result = tile.result.get();
+    if (!result && result.error().code() == StatusCode::kConflict) {
+      log_(LogLevel::kWarning, "fusion: " + result.error().message());
+    } else if (!result) {
+      PostponeFailed(tile.claim, result.error());
+    }
+  }
+  changes_.Notify();
+}
+
+void FusionScheduler::GiveBack(const TileClaim& claim, std::int64_t retry_at_ms) {
+  const auto released =
+      Await<bool>([&](auto done) { store_.ReleaseClaim(claim, retry_at_ms, std::move(done)); });
+  if (!released) {  // the lease runs out by itself
+    log_(LogLevel::kWarning,
+         StrCat("fusion: cannot release tile ", claim.id, ": ", released.error().message()));
+  }
+}
+
+void FusionScheduler::PostponeFailed(const TileClaim& claim, const Status& why) {
+  const std::int64_t backoff =
+      std::min(options_.max_backoff_ms, options_.min_backoff_ms << std::min(claim.attempts, 20u));
+  log_(LogLevel::kError, StrCat("fusion: tile ", claim.id, " stays dirty, next attempt in ",
+                                backoff, " ms: ", why.message()));
+  if (claim.id.level > 0 && why.code() == StatusCode::kInvalidData) {
+    MarkDamagedChildren(claim.id);
+  }
+  GiveBack(claim, clock_() + backoff);
+}
+
+void FusionScheduler::MarkDamagedChildren(const TileId& parent) {
+  std::vector<TileId> damaged;
+  for (const TileId& child : parent.Children()) {
+    const auto tile = store_.ReadTile(child);
+    if (!tile && tile.error().code() == StatusCode::kInvalidData) {
+      damaged.push_back(child);
+    }
+  }
+  if (damaged.empty()) {
+    return;
+  }
+  const auto marked =
+      Await<std::uint32_t>([&](auto done) { store_.MarkDirty(damaged, std::move(done)); });
+  if (!marked) {
+    log_(LogLevel::kError, "fusion: cannot mark damaged tiles: " + marked.error().message());
+  }
+}
+
+}  // namespace atlas

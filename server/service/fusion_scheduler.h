@@ -1,0 +1,70 @@
+// The fusion workers: threads that lease dirty tiles, build them and store them, level by level.
+//
+// Work goes in waves. A wave is every mark owed for a change up to one revision; level 0 first,
+// then the parents that it marked, so that each parent is built once a wave and no stream of
+// uploads can keep the coarse levels waiting. Marks are rows of the store: a restart goes on where
+// it stopped.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/service/change_signal.h"
+#include "server/service/log_sink.h"
+#include "server/service/tile_builder.h"
+#include "server/store/atlas_store.h"
+
+namespace atlas {
+
+using WallClock = std::function<std::int64_t()>;  // ms since 1970
+
+struct FusionOptions {
+  unsigned workers = 1;
+  std::size_t cache_bytes = 256u << 20;  // decoded keyframes, all workers together
+  std::uint32_t tiles_per_claim = 4;     // finished in one group commit
+  std::int64_t lease_ms = 120'000;
+  std::int64_t min_backoff_ms = 1'000;  // doubled with each failure of a tile
+  std::int64_t max_backoff_ms = 60'000;
+};
+
+class FusionScheduler {
+ public:
+  FusionScheduler(AtlasStore& store,
+                  ChangeSignal& changes,
+                  WallClock clock,
+                  LogSink log,
+                  const FusionOptions& options);
+  FusionScheduler(const FusionScheduler&) = delete;
+  FusionScheduler& operator=(const FusionScheduler&) = delete;
+  ~FusionScheduler();
+
+  // Finishes the tiles at hand, gives the other leases back and joins the threads.
+  void Stop();
+  std::uint64_t tiles_built() const { return tiles_built_; }
+
+ private:
+  void RunWorker(const std::stop_token& stop, const std::string& owner);
+  std::vector<TileClaim> NextClaims(const std::string& owner);
+  bool StartNextWave(std::uint64_t done);
+  void BuildClaims(const std::vector<TileClaim>& claims, const std::stop_token& stop);
+  void GiveBack(const TileClaim& claim, std::int64_t retry_at_ms);
+  void PostponeFailed(const TileClaim& claim, const Status& why);
+  void MarkDamagedChildren(const TileId& parent);
+
+  AtlasStore& store_;
+  ChangeSignal& changes_;
+  WallClock clock_;
+  LogSink log_;
+  FusionOptions options_;
+  TileBuilder builder_;
+  std::atomic<std::uint64_t> wave_ = 0;
+  std::atomic<std::uint64_t> tiles_built_ = 0;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace atlas

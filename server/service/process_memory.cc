@@ -1,0 +1,17 @@
+#include "server/service/process_memory.h"
+
+#include <fstream>
+
+#include <unistd.h>
+
+namespace atlas {
+
+std::uint64_t ResidentBytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::uint64_t total_pages = 0;
+  std::uint64_t resident_pages = 0;
+  statm >> total_pages >> resident_pages;
+  return statm ? resident_pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
+}
+
+}  // namespace atlas

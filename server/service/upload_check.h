@@ -1,0 +1,36 @@
+// What must hold before a keyframe or a pose is accepted: nothing behind this meets bad data.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+struct UploadRequest {
+  KeyframeKey key;
+  std::int64_t time_ms = 0;
+  QuantizedPose pose;
+  std::optional<PositionPrior> prior;
+  Bytes blob;
+};
+
+// Keyframes may be this far ahead of the daemon's clock.
+inline constexpr std::int64_t kMaxTimeAhead_ms = 60'000;
+
+// The whole blob is decoded. kInvalidArgument on names, kInvalidData on everything else.
+Result<NewKeyframe> CheckUpload(UploadRequest request,
+                                const MapProfile& profile,
+                                std::int64_t now_ms);
+
+// Placed with what is stored of its keyframe. kInvalidData names the keyframe whose pose is not one
+// or is tilted against its levelling.
+Result<NewPose> CheckPose(const KeyframeRecord& keyframe,
+                          const QuantizedPose& pose,
+                          const MapProfile& profile);
+
+}  // namespace atlas

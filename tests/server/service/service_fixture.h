@@ -1,0 +1,116 @@
+// A service over a store of its own, and a small made-up drive to feed it.
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/keyframe/keyframe_codec.h"
+#include "server/service/atlas_service.h"
+#include "server/store/await.h"
+#include "server/store/sqlite/sqlite_store.h"
+#include "tests/core/support/keyframe_worlds.h"
+
+namespace atlas {
+
+inline constexpr std::int64_t kTestNow_ms = 1'700'000'000'000;
+
+inline MapProfile TestProfile() {
+  MapProfile profile;
+  profile.cell_size_um = 200'000;
+  profile.tile_cells = 16;  // 3.2 m
+  profile.levels = 4;
+  return profile;
+}
+
+inline QuantizedPose PoseOf(const testing::MapPose& map_pose) {
+  Pose pose = Pose::Identity();
+  pose.rotate(Eigen::AngleAxisd(map_pose.yaw_deg * 0.017453292519943295, Eigen::Vector3d::UnitZ()));
+  pose.translation() = Eigen::Vector3d(map_pose.x_m, map_pose.y_m, map_pose.z_m);
+  return QuantizedPose::FromPose(pose);
+}
+
+// Keyframe `i` of a drive along a bent road.
+inline testing::MapPose PoseAlong(std::uint32_t i) {
+  return {1.5 * i - 6.0, 0.02 * i * i, 1.8, 3.0 * i};
+}
+
+inline UploadRequest DriveUpload(std::uint32_t i, const std::string& session = "day") {
+  UploadRequest request;
+  request.key = {{"bus", session}, i};
+  request.time_ms = 1'000 + 100 * std::int64_t{i};
+  request.pose = PoseOf(PoseAlong(i));
+  request.blob = EncodeKeyframe(testing::StreetKeyframe(TestProfile(), 24, 100 + i));
+  return request;
+}
+
+class ServiceTest : public ::testing::Test {
+ protected:
+  ServiceTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "atlas_service_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::runtime_error("cannot make " + name);
+    }
+    directory_ = name;
+  }
+  ~ServiceTest() override {
+    Close();
+    std::error_code ignored;
+    std::filesystem::remove_all(directory_, ignored);
+  }
+
+  void Open(unsigned workers = 2, const std::string& name = "data") {
+    Close();
+    SqliteStoreOptions options;
+    options.directory = directory_ / name;
+    options.new_profile = TestProfile();
+    auto store = OpenSqliteStore(options);
+    ASSERT_TRUE(store.has_value()) << store.error().message();
+    store_ = std::move(*store);
+    ServiceOptions service;
+    service.fusion.workers = workers;
+    service.fusion.cache_bytes = 1u << 20;  // less than the drive: the cache must not matter
+    service_ = std::make_unique<AtlasService>(
+        *store_, [] { return kTestNow_ms; }, [](LogLevel, const std::string&) {}, service);
+  }
+  void Close() {
+    service_.reset();
+    store_.reset();
+  }
+
+  Result<PutKeyframeResult> Upload(UploadRequest request) {
+    return Await<PutKeyframeResult>(
+        [&](auto done) { service_->Upload(std::move(request), std::move(done)); });
+  }
+  Result<PoseBatchResult> Move(std::vector<PoseBatchRequest::Update> updates) {
+    return Await<PoseBatchResult>([&](auto done) {
+      service_->UpdatePoses({std::move(updates), "tester", 0}, std::move(done));
+    });
+  }
+  static Patience Long() { return {std::chrono::seconds(60), {}}; }
+  AtlasDigest Digest() {
+    auto digest = service_->Digest(Long());
+    EXPECT_TRUE(digest.has_value()) << digest.error().message();
+    return digest.value_or(AtlasDigest());
+  }
+  void UploadDrive(std::uint32_t count) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto put = Upload(DriveUpload(i));
+      ASSERT_TRUE(put.has_value()) << put.error().message();
+    }
+  }
+
+  std::filesystem::path directory_;
+  std::unique_ptr<AtlasStore> store_;
+  std::unique_ptr<AtlasService> service_;
+};
+
+}  // namespace atlas
