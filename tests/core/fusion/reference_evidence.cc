@@ -87,7 +87,7 @@ TileLayer CellReference::Publish(std::size_t index) const {
   }
   TileLayer layer;
   layer.altitude_mm = static_cast<std::int32_t>(layers_[index].altitude_mm);
-  layer.sigma_100um = sigmas_.SigmaOfWeight_100um(layers_[index].weight);
+  layer.sigma_100um = sigmas_.SigmaOfWeight100um(layers_[index].weight);
   layer.occupancy = static_cast<std::int8_t>(FoldSessions(index, occupancy));
   layer.observations = static_cast<std::uint16_t>(std::min(observations, 65'535));
   layer.flags = static_cast<std::uint8_t>(

@@ -91,7 +91,7 @@ void CellReference::BuildLayers(const std::vector<Word*>& makers) {
                    [](const Word* a, const Word* b) { return a->altitude_mm < b->altitude_mm; });
   for (Word* word : sorted) {
     const AltitudeEstimate next{static_cast<std::int32_t>(word->altitude_mm),
-                                sigmas_.Sigma_100um(word->cell.source, word->distance_step)};
+                                sigmas_.Sigma100um(word->cell.source, word->distance_step)};
     bool is_same = false;
     if (!layers_.empty()) {
       const auto& of_layer = layers_.back().representatives;

@@ -16,16 +16,16 @@ TEST(SigmaTableTest, FollowsThePapersFormula) {
     const double d_m = 0.1 * std::sqrt(static_cast<double>(d2) + 0.5);
     const std::uint16_t step = table.Step(d2);
     const double sigma_m = 0.087489 * d_m + 0.1;
-    EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kMeasured, step) * 1e-4, sigma_m, 7e-4);
-    EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kInterpolated, step) * 1e-4, sigma_m + 0.05,
+    EXPECT_NEAR(table.Sigma100um(AltitudeSource::kMeasured, step) * 1e-4, sigma_m, 7e-4);
+    EXPECT_NEAR(table.Sigma100um(AltitudeSource::kInterpolated, step) * 1e-4, sigma_m + 0.05,
                 7e-4);
-    EXPECT_NEAR(table.Sigma_100um(AltitudeSource::kExtrapolated, step) * 1e-4, sigma_m + 0.3, 7e-4);
+    EXPECT_NEAR(table.Sigma100um(AltitudeSource::kExtrapolated, step) * 1e-4, sigma_m + 0.3, 7e-4);
     const double weight = kUnitWeight * 0.01 / (sigma_m * sigma_m);
     EXPECT_NEAR(table.Weight(AltitudeSource::kMeasured, step), weight, 0.015 * weight + 1);
   }
-  EXPECT_EQ(table.SigmaOfWeight_100um(kUnitWeight), 992);  // 1000, rounded
-  EXPECT_EQ(table.SigmaOfWeight_100um(4 * kUnitWeight), 496);
-  EXPECT_EQ(table.SigmaOfWeight_100um(1), 63'488);
+  EXPECT_EQ(table.SigmaOfWeight100um(kUnitWeight), 992);  // 1000, rounded
+  EXPECT_EQ(table.SigmaOfWeight100um(4 * kUnitWeight), 496);
+  EXPECT_EQ(table.SigmaOfWeight100um(1), 63'488);
 }
 
 }  // namespace
