@@ -18,9 +18,10 @@ constexpr std::size_t kLanes = 8;
 constexpr std::array<std::uint32_t, 256> MakePairs() {
   std::array<std::uint32_t, 256> pairs{};
   for (std::size_t byte = 0; byte < pairs.size(); ++byte) {
-    const auto low = static_cast<std::uint16_t>(kNibbleEvidence[byte & 15]);
-    const auto high = static_cast<std::uint16_t>(kNibbleEvidence[byte >> 4]);
-    pairs[byte] = low | (static_cast<std::uint32_t>(high) << 16);
+    const int low = kNibbleEvidence[byte & 15];
+    const int high = kNibbleEvidence[byte >> 4];
+    pairs[byte] =
+        (static_cast<std::uint32_t>(low) & 0xFFFF) | (static_cast<std::uint32_t>(high) << 16);
   }
   return pairs;
 }

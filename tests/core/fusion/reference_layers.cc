@@ -74,6 +74,7 @@ std::vector<Word*> CellReference::Representatives(const std::vector<Word*>& make
     segments.back().push_back(word);
   }
   std::vector<Word*> representatives;
+  representatives.reserve(segments.size());
   for (const auto& segment : segments) {
     representatives.push_back(
         *std::min_element(segment.begin(), segment.end(), [](const Word* a, const Word* b) {
@@ -202,6 +203,7 @@ void CellReference::DropUnsupported() {
     return std::pair(layers_[a].altitude_mm, a) < std::pair(layers_[b].altitude_mm, b);
   });
   std::vector<Layer> kept;
+  kept.reserve(order.size());
   for (const std::size_t i : order) {
     kept.push_back(layers_[i]);
   }
