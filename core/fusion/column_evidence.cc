@@ -18,10 +18,10 @@ constexpr std::size_t kLanes = 8;
 constexpr std::array<std::uint32_t, 256> MakePairs() {
   std::array<std::uint32_t, 256> pairs{};
   for (std::size_t byte = 0; byte < pairs.size(); ++byte) {
-    const int low = kNibbleEvidence[byte & 15];
-    const int high = kNibbleEvidence[byte >> 4];
-    pairs[byte] =
-        (static_cast<std::uint32_t>(low) & 0xFFFF) | (static_cast<std::uint32_t>(high) << 16);
+    const std::int16_t low = kNibbleEvidence[byte & 15];
+    const std::int16_t high = kNibbleEvidence[byte >> 4];
+    pairs[byte] = static_cast<std::uint16_t>(low) |
+                  (static_cast<std::uint32_t>(static_cast<std::uint16_t>(high)) << 16);
   }
   return pairs;
 }

@@ -61,7 +61,7 @@ std::uint64_t CellReference::FoldColumn(std::size_t layer) const {
     for (const Word& word : words_) {
       const int state = word.layer == layer ? ColumnState(word, layer, segment) : 0;
       if (state != 0) {
-        const int units = kNibbleEvidence[static_cast<std::size_t>(state)];
+        const std::int16_t units = kNibbleEvidence[static_cast<std::size_t>(state)];
         evidence.emplace(&word, units);
       }
     }
