@@ -14,12 +14,16 @@ static_assert(std::endian::native == std::endian::little, "lanes below are packe
 using Lanes = std::int16_t __attribute__((vector_size(16)));
 constexpr std::size_t kLanes = 8;
 
+constexpr std::int16_t EvidenceOfState(std::size_t state) {
+  return kNibbleEvidence[state];
+}
+
 // The evidence of two nibbles, low one in the low half.
 constexpr std::array<std::uint32_t, 256> MakePairs() {
   std::array<std::uint32_t, 256> pairs{};
   for (std::size_t byte = 0; byte < pairs.size(); ++byte) {
-    const std::int16_t low = kNibbleEvidence[byte & 15];
-    const std::int16_t high = kNibbleEvidence[byte >> 4];
+    const std::int16_t low = EvidenceOfState(byte & 15);
+    const std::int16_t high = EvidenceOfState(byte >> 4);
     pairs[byte] = static_cast<std::uint16_t>(low) |
                   (static_cast<std::uint32_t>(static_cast<std::uint16_t>(high)) << 16);
   }

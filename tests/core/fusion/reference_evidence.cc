@@ -7,6 +7,13 @@
 #include "tests/core/fusion/reference_cell.h"
 
 namespace atlas::testing {
+namespace {
+
+int EvidenceOfState(int state) {
+  return kNibbleEvidence[static_cast<std::size_t>(state)];
+}
+
+}  // namespace
 
 // Saturating folds: each session's words in time order, sessions in order of their last word.
 std::int64_t CellReference::FoldSessions(std::size_t layer,
@@ -61,8 +68,7 @@ std::uint64_t CellReference::FoldColumn(std::size_t layer) const {
     for (const Word& word : words_) {
       const int state = word.layer == layer ? ColumnState(word, layer, segment) : 0;
       if (state != 0) {
-        const std::int16_t units = kNibbleEvidence[static_cast<std::size_t>(state)];
-        evidence.emplace(&word, units);
+        evidence.emplace(&word, EvidenceOfState(state));
       }
     }
     if (!evidence.empty()) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/hash.h"
+#include "core/keyframe/keyframe_body.h"
 #include "tests/core/support/golden.h"
 #include "tests/core/support/golden_profile.h"
 #include "tests/core/support/keyframe_worlds.h"
@@ -108,6 +109,26 @@ TEST(KeyframeCodecTest, RefusesTrailingBytes) {
   blob.push_back(0);
   EXPECT_EQ(DecodeError(blob), StatusCode::kInvalidData);
   EXPECT_EQ(DecodeError(WithChecksum(blob)), StatusCode::kInvalidData);
+}
+
+// The body alone, behind all checksums.
+TEST(KeyframeCodecTest, RefusesBodiesThatLie) {
+  const Keyframe keyframe = RandomKeyframe(MapProfile(), 8, 5);
+  const Bytes body = EncodeKeyframeBody(keyframe);
+  const auto refused = [&](auto change) {
+    Bytes bad = body;
+    change(bad);
+    Keyframe decoded = BlankKeyframe(MapProfile(), 8);
+    decoded.columns.clear();
+    decoded.anchors.clear();
+    return !DecodeKeyframeBody(bad, decoded).ok();
+  };
+  EXPECT_FALSE(refused([](Bytes&) {}));
+  EXPECT_TRUE(refused([](Bytes& b) { b.push_back(0); }));
+  EXPECT_TRUE(refused([](Bytes& b) { b.pop_back(); }));
+  EXPECT_TRUE(refused([](Bytes& b) { b.clear(); }));
+  EXPECT_TRUE(refused([](Bytes& b) { b[0] = 0x0C; }));  // occupancy 3
+  EXPECT_TRUE(refused([](Bytes& b) { b[0] = 0x04; }));  // free, but not seen
 }
 
 TEST(KeyframeCodecTest, SaysThatANewerVersionIsUnsupported) {
