@@ -1,0 +1,104 @@
+// Which layers are open, and which are obstacles, by what the tile itself knows.
+#include "core/planning/surface_tile.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "core/geometry/nibble.h"
+
+namespace atlas {
+namespace {
+
+// What the rules need of profile and options, in the tile's units.
+struct Limits {
+  std::int32_t headroom_mm;
+  std::int32_t headroom_to_next_mm;  // to the surface above
+  std::uint8_t occupied_state;       // the lowest that counts
+  const MapProfile& profile;
+};
+
+Limits LimitsOf(const MapProfile& profile, const PlanOptions& options) {
+  const auto to_mm = [](double m) {
+    return static_cast<std::int32_t>(std::lround(m * 1e3));
+  };
+  std::uint8_t state = kNibbleUnknown + 1;
+  while (state < 15 && NibbleProbability(state) < options.occupied_probability) {
+    ++state;
+  }
+  return {to_mm(options.headroom_m), to_mm(options.headroom_m + options.slab_thickness_m), state,
+          profile};
+}
+
+// Segments are as high as a person: one counts when its middle lies below the headroom, so that the
+// ceiling of a garage does not close it.
+bool IsColumnInTheWay(const TileLayer& layer, const Limits& limits) {
+  const std::int32_t height_mm = limits.profile.segment_height_mm;
+  std::int32_t middle_mm =
+      ColumnBaseIndex(layer.altitude_mm, limits.profile) * height_mm + height_mm / 2;
+  for (std::uint64_t column = layer.column; column != 0; column >>= 4) {
+    if (middle_mm - layer.altitude_mm >= limits.headroom_mm) {
+      return false;
+    }
+    if ((column & 0xF) >= limits.occupied_state) {
+      return true;
+    }
+    middle_mm += height_mm;
+  }
+  return false;
+}
+
+SurfaceNode MakeNode(const TileLayer& layer, const TileLayer* above, const Limits& limits) {
+  SurfaceNode node;
+  node.altitude_mm = layer.altitude_mm;
+  const bool is_low = above != nullptr && std::int64_t{above->altitude_mm} - layer.altitude_mm <
+                                              limits.headroom_to_next_mm;
+  const bool is_obstacle = layer.occupancy > 0 || is_low || IsColumnInTheWay(layer, limits);
+  if (is_obstacle) {
+    node.flags |= SurfaceNode::kObstacle;
+  } else if (layer.is_traversable()) {
+    node.flags |= SurfaceNode::kOpen;
+  }
+  if ((layer.flags & TileLayer::kMeasured) != 0) {
+    node.flags |= SurfaceNode::kMeasured;
+  }
+  return node;
+}
+
+Status CheckTile(const Tile& tile, const TileId& id, const MapProfile& profile) {
+  const auto cells = std::size_t{profile.tile_cells} * profile.tile_cells;
+  const bool is_whole = tile.id == id && tile.cell_begin.size() == cells + 1 &&
+                        tile.cell_begin.back() == tile.layers.size();
+  return is_whole ? Status()
+                  : Status(StatusCode::kInvalidData,
+                           StrCat("plan: asked for tile ", id, " of ", cells, " cells, got ",
+                                  tile.id, " of ", tile.cell_begin.size(), " offsets and ",
+                                  tile.layers.size(), " layers"));
+}
+
+}  // namespace
+
+Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
+                                    const TileId& id,
+                                    const MapProfile& profile,
+                                    const PlanOptions& options) {
+  if (Status status = CheckTile(tile, id, profile); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const Limits limits = LimitsOf(profile, options);
+  SurfaceTile surface;
+  surface.id = id;
+  surface.cell_begin = tile.cell_begin;
+  surface.nodes.reserve(tile.layers.size());
+  for (std::size_t cell = 0; cell + 1 < tile.cell_begin.size(); ++cell) {
+    const auto layers = tile.Layers(cell);
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      const TileLayer* above = i + 1 < layers.size() ? &layers[i + 1] : nullptr;
+      surface.nodes.push_back(MakeNode(layers[i], above, limits));
+      surface.nodes.back().cell = static_cast<std::uint16_t>(cell);
+    }
+  }
+  return surface;
+}
+
+}  // namespace atlas

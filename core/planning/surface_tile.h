@@ -1,0 +1,73 @@
+// A tile as a planner sees it: for each (cell, layer) one node of eight bytes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/base/status.h"
+#include "core/geometry/map_profile.h"
+#include "core/planning/plan_options.h"
+#include "core/tile/tile.h"
+
+namespace atlas {
+
+struct SurfaceNode {
+  static constexpr std::uint8_t kOpen = 1;       // traversable, with headroom
+  static constexpr std::uint8_t kObstacle = 2;   // inflates what lies around it
+  static constexpr std::uint8_t kMeasured = 4;   // its altitude can be fitted to
+  static constexpr std::uint8_t kAnalysed = 8;   // kDrivable is known
+  static constexpr std::uint8_t kDrivable = 16;  // a vehicle's middle may be here
+  static constexpr std::uint8_t kClosed = 32;    // the search is done with it
+
+  static constexpr std::uint8_t kFar = 255;  // no obstacle within reach
+
+  std::int32_t altitude_mm = 0;
+  std::uint16_t cell = 0;
+  std::uint8_t flags = 0;
+  std::uint8_t clearance = kFar;  // to the nearest obstacle, in 1/250 of the reach
+
+  bool Has(std::uint8_t flag) const { return (flags & flag) != 0; }
+};
+
+// One node of the whole map.
+struct NodeRef {
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+  std::uint32_t slot = kNone;  // of the tile, in loading order
+  std::uint32_t node = kNone;
+
+  bool is_none() const { return slot == kNone; }
+  friend bool operator==(const NodeRef&, const NodeRef&) = default;
+};
+
+struct SearchNode {
+  float cost = std::numeric_limits<float>::infinity();
+  NodeRef parent;
+};
+
+struct SurfaceTile {
+  static constexpr std::int32_t kNotThere = -1;
+
+  TileId id;
+  std::vector<std::uint32_t> cell_begin;  // as in Tile
+  std::vector<SurfaceNode> nodes;         // as Tile::layers
+  std::vector<SearchNode> search;         // one a node, once the search came here
+  // Slots of the 3 x 3 tiles around, row-major, this one in the middle; only once `is_ready`.
+  std::array<std::int32_t, 9> around{};
+  bool is_ready = false;
+
+  std::size_t memory_bytes() const {
+    return cell_begin.capacity() * sizeof(std::uint32_t) + nodes.capacity() * sizeof(SurfaceNode) +
+           search.capacity() * sizeof(SearchNode);
+  }
+};
+
+// kInvalidData when `tile` is not tile `id` of this profile.
+Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
+                                    const TileId& id,
+                                    const MapProfile& profile,
+                                    const PlanOptions& options);
+
+}  // namespace atlas

@@ -1,0 +1,162 @@
+// Files with every error looked at, the closing one included.
+#include "core/simulation/drive_writer.h"
+
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+namespace fs = std::filesystem;
+
+static_assert(std::endian::native == std::endian::little, "scans are little-endian float32");
+static_assert(sizeof(SimulatedPoint) == 16, "a point in velodyne/*.bin is four float32");
+
+StatusCode CodeOfErrno(int error) {
+  switch (error) {
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return StatusCode::kPermissionDenied;
+    case ENOSPC:
+    case EDQUOT:
+    case EFBIG:
+      return StatusCode::kResourceExhausted;
+    case ENOENT:
+    case ENOTDIR:
+      return StatusCode::kNotFound;
+    default:
+      return StatusCode::kUnavailable;
+  }
+}
+
+Status SystemError(const char* what, const fs::path& path, int error) {
+  return Status(CodeOfErrno(error),
+                StrCat(what, " ", path.string(), ": ", std::generic_category().message(error)));
+}
+
+struct FileCloser {
+  void operator()(std::FILE* file) const { static_cast<void>(std::fclose(file)); }
+};
+
+Status WriteFile(const fs::path& path, const void* bytes, std::size_t size) {
+  std::unique_ptr<std::FILE, FileCloser> file(std::fopen(path.c_str(), "wb"));
+  if (!file) {
+    return SystemError("cannot create", path, errno);
+  }
+  if (size > 0 && std::fwrite(bytes, 1, size, file.get()) != size) {
+    return SystemError("cannot write", path, errno);
+  }
+  if (std::fclose(file.release()) != 0) {
+    return SystemError("cannot write", path, errno);
+  }
+  return {};
+}
+
+std::string Numbered(std::size_t i, const char* extension) {
+  std::string digits = std::to_string(i);
+  digits.insert(0, digits.size() < 6 ? 6 - digits.size() : 0, '0');
+  return digits + extension;
+}
+
+Status WriteScan(const SimulatedScan& scan, std::size_t i, const fs::path& folder) {
+  ATLAS_RETURN_IF_ERROR(WriteFile(folder / "velodyne" / Numbered(i, ".bin"), scan.points.data(),
+                                  scan.points.size() * sizeof(SimulatedPoint)));
+  return WriteFile(folder / "labels" / Numbered(i, ".label"), scan.labels.data(),
+                   scan.labels.size() * sizeof(std::uint32_t));
+}
+
+void AppendNumber(double value, std::string_view end, std::string& text) {
+  std::array<char, 32> digits{};
+  const int size = std::snprintf(digits.data(), digits.size(), "%.12g", value);
+  text.append(digits.data(), static_cast<std::size_t>(size)).append(end);
+}
+
+Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
+  std::string poses;
+  std::string times;
+  for (std::size_t i = 0; i < drive.scans(); ++i) {
+    const std::array<double, 12> numbers = PoseToRowMajor(drive.sensor_pose(i));
+    for (std::size_t n = 0; n < numbers.size(); ++n) {
+      AppendNumber(numbers[n], n + 1 < numbers.size() ? " " : "\n", poses);
+    }
+    AppendNumber(drive.time_s(i), "\n", times);
+  }
+  ATLAS_RETURN_IF_ERROR(WriteFile(folder / "times.txt", times.data(), times.size()));
+  return WriteFile(folder / "poses.txt", poses.data(), poses.size());
+}
+
+Status MakeFolder(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  return error ? SystemError("cannot create folder", path, error.value()) : Status();
+}
+
+Status WriteInto(const SimulatedDrive& drive,
+                 const fs::path& folder,
+                 const DriveProgress& progress) {
+  ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "velodyne"));
+  ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "labels"));
+  for (std::size_t i = 0; i < drive.scans(); ++i) {
+    ATLAS_RETURN_IF_ERROR(WriteScan(drive.Scan(i), i, folder));
+    if (progress) {
+      progress(i + 1);
+    }
+  }
+  return WriteText(drive, folder);
+}
+
+Status CheckTarget(const fs::path& folder) {
+  std::error_code error;
+  const fs::file_status status = fs::status(folder, error);
+  if (status.type() == fs::file_type::not_found) {
+    return {};
+  }
+  if (error) {
+    return SystemError("cannot look at", folder, error.value());
+  }
+  const bool is_empty_folder =
+      status.type() == fs::file_type::directory && fs::is_empty(folder, error);
+  if (error) {
+    return SystemError("cannot look into", folder, error.value());
+  }
+  return is_empty_folder ? Status()
+                         : Status(StatusCode::kConflict,
+                                  StrCat("folder ", folder.string(),
+                                         " exists and is not empty, expected a new one"));
+}
+
+}  // namespace
+
+Status WriteDrive(const SimulatedDrive& drive,
+                  const fs::path& folder,
+                  const DriveProgress& progress) {
+  ATLAS_RETURN_IF_ERROR(CheckTarget(folder));
+  // "a/b/" and "a/b" are the same folder.
+  const fs::path target = folder.has_filename() ? folder : folder.parent_path();
+  fs::path partial = target;
+  partial += ".partial";
+  std::error_code error;
+  fs::remove_all(partial, error);
+  Status status = error ? SystemError("cannot remove", partial, error.value())
+                        : WriteInto(drive, partial, progress);
+  if (status.ok()) {
+    fs::rename(partial, target, error);
+    status = error ? SystemError("cannot create folder", target, error.value()) : Status();
+  }
+  if (!status.ok()) {
+    fs::remove_all(partial, error);  // the first error is the one to tell
+  }
+  return status;
+}
+
+}  // namespace atlas

@@ -1,0 +1,73 @@
+// Casting, range noise along the ray, and truth.
+#include "core/simulation/scan_caster.h"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/simulation/hash_random.h"
+
+namespace atlas {
+namespace {
+
+struct LabelledHit {
+  float distance_m = 0.0F;
+  std::uint32_t label = 0;
+  float incidence = 0.0F;
+};
+
+LabelledHit Describe(const TriangleMesh& mesh, const MeshRay& ray, const MeshHit& hit) {
+  const TriangleEdges edges = EdgesOf(mesh, hit.triangle);
+  const Eigen::Vector3f normal = edges.edge1.cross(edges.edge2).normalized();
+  return {hit.distance_m, mesh.labels[hit.triangle], std::abs(normal.dot(ray.direction))};
+}
+
+}  // namespace
+
+ScanCaster::ScanCaster(LidarSensor sensor) : sensor_(std::move(sensor)) {
+  directions_.reserve(sensor_.rings() * sensor_.columns);
+  for (const double elevation_rad : sensor_.elevations_rad) {
+    for (std::size_t column = 0; column < sensor_.columns; ++column) {
+      const double azimuth_rad = 2.0 * std::numbers::pi * (static_cast<double>(column) + 0.5) /
+                                 static_cast<double>(sensor_.columns);
+      directions_.emplace_back(Eigen::Vector3d(std::cos(elevation_rad) * std::cos(azimuth_rad),
+                                               std::cos(elevation_rad) * std::sin(azimuth_rad),
+                                               std::sin(elevation_rad))
+                                   .cast<float>());
+    }
+  }
+}
+
+SimulatedScan ScanCaster::Cast(const CastableMesh& world,
+                               const CastableMesh& traffic,
+                               const Pose& T_world_sensor,
+                               const ScanNoise& noise) const {
+  SimulatedScan scan;
+  scan.points.reserve(directions_.size());
+  scan.labels.reserve(directions_.size());
+  const Eigen::Matrix3f rotation = T_world_sensor.linear().cast<float>();
+  MeshRay ray;
+  ray.origin = T_world_sensor.translation().cast<float>();
+  const auto max_range_m = static_cast<float>(sensor_.max_range_m);
+  for (std::size_t i = 0; i < directions_.size(); ++i) {
+    ray.direction = rotation * directions_[i];
+    const MeshHit still = world.bvh.Cast(ray, max_range_m);
+    const MeshHit moving = traffic.bvh.Cast(ray, still.distance_m);
+    if (!still.is_hit() && !moving.is_hit()) {
+      continue;
+    }
+    const LabelledHit hit =
+        moving.is_hit() ? Describe(traffic.mesh, ray, moving) : Describe(world.mesh, ray, still);
+    HashRandom random(noise.seed, noise.scan, i);
+    const double range_m = hit.distance_m + sensor_.range_sigma_m * random.Gaussian();
+    if (range_m < sensor_.min_range_m || range_m > sensor_.max_range_m) {
+      continue;
+    }
+    const Eigen::Vector3f p = directions_[i] * static_cast<float>(range_m);
+    scan.points.push_back({p.x(), p.y(), p.z(), hit.incidence});
+    scan.labels.push_back(hit.label);
+  }
+  return scan;
+}
+
+}  // namespace atlas

@@ -1,0 +1,101 @@
+// The folder layout, byte for byte, and folders that cannot be written.
+#include "core/simulation/drive_writer.h"
+
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace atlas {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ReadAll(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+SimulatedDrive ShortDrive() {
+  DriveOptions options;
+  options.spacing_m = 60.0;
+  options.sensor.columns = 90;
+  return SimulatedDrive::Create(MakeStreetWorld(), options).value();
+}
+
+class DriveWriterTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "drive_writer_XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path folder_;
+};
+
+TEST_F(DriveWriterTest, WritesWhatTheDriveHolds) {
+  const SimulatedDrive drive = ShortDrive();
+  ASSERT_EQ(drive.scans(), 4U);
+  std::size_t reported = 0;
+  const Status status =
+      WriteDrive(drive, folder_ / "new" / "drive", [&](std::size_t done) { reported = done; });
+  ASSERT_TRUE(status.ok()) << status.message();
+  EXPECT_EQ(reported, drive.scans());
+  const SimulatedScan scan = drive.Scan(2);
+  const std::string points = ReadAll(folder_ / "new/drive/velodyne/000002.bin");
+  ASSERT_EQ(points.size(), scan.points.size() * 16);
+  EXPECT_EQ(std::memcmp(points.data(), scan.points.data(), points.size()), 0);
+  EXPECT_EQ(ReadAll(folder_ / "new/drive/labels/000002.label").size(), scan.labels.size() * 4);
+  EXPECT_FALSE(fs::exists(folder_ / "new/drive.partial"));
+}
+
+TEST_F(DriveWriterTest, PosesReadBackExactly) {
+  const SimulatedDrive drive = ShortDrive();
+  ASSERT_TRUE(WriteDrive(drive, folder_ / "drive/", {}).ok());
+  std::ifstream poses(folder_ / "drive/poses.txt");
+  std::ifstream times(folder_ / "drive/times.txt");
+  for (std::size_t i = 0; i < drive.scans(); ++i) {
+    std::array<double, 12> numbers{};
+    for (double& number : numbers) {
+      poses >> number;
+    }
+    const auto pose = PoseFromRowMajor(numbers);
+    ASSERT_TRUE(pose.has_value());
+    EXPECT_LT((pose->matrix() - drive.sensor_pose(i).matrix()).norm(), 1e-9);
+    double time_s = -1.0;
+    times >> time_s;
+    EXPECT_DOUBLE_EQ(time_s, drive.time_s(i));
+  }
+  std::string rest;
+  EXPECT_FALSE(poses >> rest);
+}
+
+TEST_F(DriveWriterTest, RefusesAFolderThatHoldsSomething) {
+  std::ofstream(folder_ / "note.txt") << "mine";
+  const Status status = WriteDrive(ShortDrive(), folder_, {});
+  EXPECT_EQ(status.code(), StatusCode::kConflict);
+  EXPECT_EQ(ReadAll(folder_ / "note.txt"), "mine");
+}
+
+TEST_F(DriveWriterTest, AFileInTheWayIsATypedErrorThatLeavesNothing) {
+  std::ofstream(folder_ / "file") << "mine";
+  const Status status = WriteDrive(ShortDrive(), folder_ / "file" / "drive", {});
+  EXPECT_FALSE(status.ok());
+  EXPECT_NE(status.message().find("file/drive"), std::string::npos) << status.message();
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(DriveWriterTest, AnUnwritableFolderIsATypedError) {
+  const Status status = WriteDrive(ShortDrive(), "/proc/drive", {});
+  EXPECT_FALSE(status.ok());
+  EXPECT_NE(status.message().find("/proc/drive"), std::string::npos) << status.message();
+}
+
+}  // namespace
+}  // namespace atlas
