@@ -155,7 +155,8 @@ void BlockGatherer::GatherCell(const Resampler& r,
 }
 
 std::span<const Observation> BlockGatherer::Observations(std::int32_t x, std::int32_t y) const {
-  const auto cell = static_cast<std::size_t>(y * kBlockCells + x);
+  const std::size_t cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(kBlockCells) +
+                           static_cast<std::size_t>(x);
   return std::span(observations_).subspan(cell * capacity_, counts_[cell]);
 }
 

@@ -19,7 +19,7 @@ std::int64_t Distance(std::int32_t a, std::int32_t b) {
 
 AltitudeEstimate CellLayerBuilder::Estimate(const Observation& observation) const {
   return {observation.altitude_mm,
-          sigmas_.Sigma_100um(observation.source, observation.distance_step)};
+          sigmas_.Sigma100um(observation.source, observation.distance_step)};
 }
 
 void CellLayerBuilder::Build(std::span<const Observation> observations) {
@@ -163,7 +163,7 @@ void CellLayerBuilder::PublishLayers() {
   layers_.clear();
   for (const std::uint32_t index : published_) {
     const LayerSums& sums = sums_[index];
-    layers_.push_back({sums.provisional_mm, sigmas_.SigmaOfWeight_100um(sums.weight),
+    layers_.push_back({sums.provisional_mm, sigmas_.SigmaOfWeight100um(sums.weight),
                        sums.is_measured, sums.observations});
   }
 }

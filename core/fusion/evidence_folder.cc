@@ -110,7 +110,7 @@ void EvidenceFolder::FoldObservation(const Observation& observation, std::uint32
       FitColumn(observation.column, observation.column_base, spans_[layer]);
   if (nibbles != 0) {
     increment.has_column = true;
-    increment.column.Add(EvidenceOfNibbles(nibbles), profile_.session_clamp);
+    increment.column.AddNibbles(nibbles, profile_.session_clamp);
   }
 }
 

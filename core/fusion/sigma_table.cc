@@ -25,7 +25,7 @@ std::vector<std::uint16_t> DistanceSteps(std::int64_t count) {
 }
 
 // slope * d of the middle of a step.
-std::int64_t SlopeSigma_100um(const MapProfile& profile, std::int64_t step) {
+std::int64_t SlopeSigma100um(const MapProfile& profile, std::int64_t step) {
   constexpr std::int64_t kUmPpmPerUnit = 100 * 1'000'000;
   return RoundDiv(std::int64_t{profile.sigma_slope_ppm} * profile.cell_size_um * (2 * step + 1),
                   2 * SigmaTable::kStepsPerCell * kUmPpmPerUnit);
@@ -41,7 +41,7 @@ SigmaTable::SigmaTable(const MapProfile& profile, std::int32_t max_radius_cells)
   for (std::size_t source = 0; source < entries_.size(); ++source) {
     const std::int64_t base_100um = 10 * (std::int64_t{profile.sigma_base_mm} + extra_mm[source]);
     for (std::int64_t step = 0; step <= steps_.back(); ++step) {
-      const std::int64_t sigma = SlopeSigma_100um(profile, step) + base_100um;
+      const std::int64_t sigma = SlopeSigma100um(profile, step) + base_100um;
       const std::int64_t weight = std::max(RoundDiv(weight_scale_, sigma * sigma), std::int64_t{1});
       entries_[source].push_back(
           {static_cast<std::uint32_t>(sigma), static_cast<std::uint32_t>(weight)});
@@ -49,10 +49,10 @@ SigmaTable::SigmaTable(const MapProfile& profile, std::int32_t max_radius_cells)
   }
 }
 
-std::uint16_t SigmaTable::SigmaOfWeight_100um(std::int64_t weight) const {
+std::uint16_t SigmaTable::SigmaOfWeight100um(std::int64_t weight) const {
   const std::uint64_t half_units =
       Isqrt(static_cast<std::uint64_t>(RoundDiv(4 * weight_scale_, weight)));
-  return RoundSigma_100um((half_units + 1) / 2);
+  return RoundSigma100um((half_units + 1) / 2);
 }
 
 }  // namespace atlas

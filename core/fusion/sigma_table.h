@@ -26,14 +26,14 @@ class SigmaTable {
   // sqrt(d2 + 1/2).
   std::uint16_t Step(std::size_t d2) const { return steps_[d2]; }
 
-  std::uint32_t Sigma_100um(AltitudeSource source, std::uint16_t step) const {
+  std::uint32_t Sigma100um(AltitudeSource source, std::uint16_t step) const {
     return Of(source)[step].sigma_100um;
   }
   std::uint32_t Weight(AltitudeSource source, std::uint16_t step) const {
     return Of(source)[step].weight;
   }
   // sigma of a sum of weights, rounded for publication.
-  std::uint16_t SigmaOfWeight_100um(std::int64_t weight) const;
+  std::uint16_t SigmaOfWeight100um(std::int64_t weight) const;
 
  private:
   struct Entry {

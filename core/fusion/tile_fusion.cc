@@ -48,10 +48,10 @@ class TileFuser {
     gatherer_.Gather(block_x, block_y);
     for (std::int32_t y = 0; y < BlockGatherer::kBlockCells; ++y) {
       for (std::int32_t x = 0; x < BlockGatherer::kBlockCells; ++x) {
-        const std::int32_t row = block_y * BlockGatherer::kBlockCells + y;
-        const std::int32_t column = block_x * BlockGatherer::kBlockCells + x;
+        const auto row = static_cast<std::uint32_t>(block_y * BlockGatherer::kBlockCells + y);
+        const auto column = static_cast<std::uint32_t>(block_x * BlockGatherer::kBlockCells + x);
         FuseCell(gatherer_.Observations(x, y),
-                 result_.cells[static_cast<std::size_t>(row * side_ + column)]);
+                 result_.cells[std::size_t{row} * static_cast<std::uint32_t>(side_) + column]);
       }
     }
   }

@@ -31,7 +31,7 @@ constexpr std::uint8_t CodeOfSigma(std::uint64_t sigma_100um) {
 }
 
 // Never 0: every altitude is uncertain.
-constexpr std::uint16_t RoundSigma_100um(std::uint64_t sigma_100um) {
+constexpr std::uint16_t RoundSigma100um(std::uint64_t sigma_100um) {
   return SigmaOfCode(CodeOfSigma(std::max<std::uint64_t>(sigma_100um, 1)));
 }
 

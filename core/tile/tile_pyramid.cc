@@ -47,7 +47,7 @@ void CombineAltitudes(std::span<const ChildLayer> group, TileLayer& parent) {
   parent.altitude_mm = static_cast<std::int32_t>(reference_mm + RoundDiv128(moment, information));
   const std::uint64_t half_units =
       Isqrt(static_cast<std::uint64_t>(RoundDiv(4 * kInformationScale, information)));
-  parent.sigma_100um = RoundSigma_100um((half_units + 1) / 2);
+  parent.sigma_100um = RoundSigma100um((half_units + 1) / 2);
 }
 
 // Occupancy, flags and observations.

@@ -40,13 +40,10 @@ TEST(BytesTest, EverythingWrittenReadsBack) {
     out.I64(signed_value);
     out.I32(static_cast<std::int32_t>(value));
     ByteReader in(out.bytes());
-    EXPECT_EQ(in.Varint(), value);
-    EXPECT_EQ(in.SignedVarint(), signed_value);
-    EXPECT_EQ(in.SignedVarint(), -signed_value);
-    EXPECT_EQ(in.I64(), signed_value);
-    EXPECT_EQ(in.I32(), static_cast<std::int32_t>(value));
-    EXPECT_TRUE(in.ok());
-    EXPECT_EQ(in.remaining(), 0u);
+    const bool is_equal = in.Varint() == value && in.SignedVarint() == signed_value &&
+                          in.SignedVarint() == -signed_value && in.I64() == signed_value &&
+                          in.I32() == static_cast<std::int32_t>(value);
+    EXPECT_TRUE(is_equal && in.ok() && in.remaining() == 0) << value;
   }
 }
 

@@ -20,33 +20,53 @@ TEST(PlanesTest, ZigzagOrdersByMagnitude) {
   }
 }
 
+struct Values {
+  std::vector<std::uint32_t> planes;
+  Bytes nibbles;
+  Bytes bits;
+  std::vector<std::uint64_t> words;
+
+  friend bool operator==(const Values&, const Values&) = default;
+};
+
+Values RandomValues(std::size_t count, std::mt19937& random) {
+  Values values;
+  for (std::size_t i = 0; i < count; ++i) {
+    values.planes.push_back(static_cast<std::uint32_t>(random()) >> 8);
+    values.nibbles.push_back(random() & 15);
+    values.bits.push_back(random() & 1);
+    values.words.push_back(random() & 0xFFF);
+  }
+  return values;
+}
+
+Bytes Write(const Values& values) {
+  ByteWriter out;
+  WritePlanes(values.planes, 3, out);
+  WriteNibbles(values.nibbles, out);
+  WriteBits(values.bits, out);
+  WriteNibblePlanes(values.words, 3, out);
+  return out.Take();
+}
+
+Values Read(ByteReader& in, std::size_t count) {
+  Values values;
+  values.planes = ReadPlanes(in, count, 3);
+  values.nibbles = ReadNibbles(in, count);
+  values.bits = ReadBits(in, count);
+  values.words.resize(count);
+  ReadNibblePlanes(in, 3, values.words);
+  return values;
+}
+
 TEST(PlanesTest, AllLayoutsReadBackAtEveryLength) {
   std::mt19937 random(2);
   for (std::size_t count = 0; count < 40; ++count) {
-    std::vector<std::uint32_t> values(count);
-    Bytes nibbles(count);
-    Bytes bits(count);
-    std::vector<std::uint64_t> words(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      values[i] = static_cast<std::uint32_t>(random()) >> 8;
-      nibbles[i] = random() & 15;
-      bits[i] = random() & 1;
-      words[i] = random() & 0xFFF;
-    }
-    ByteWriter out;
-    WritePlanes(values, 3, out);
-    WriteNibbles(nibbles, out);
-    WriteBits(bits, out);
-    WriteNibblePlanes(words, 3, out);
-    ByteReader in(out.bytes());
-    EXPECT_EQ(ReadPlanes(in, count, 3), values);
-    EXPECT_EQ(ReadNibbles(in, count), nibbles);
-    EXPECT_EQ(ReadBits(in, count), bits);
-    std::vector<std::uint64_t> read(count);
-    ReadNibblePlanes(in, 3, read);
-    EXPECT_EQ(read, words);
-    EXPECT_TRUE(in.ok());
-    EXPECT_EQ(in.remaining(), 0u);
+    const Values values = RandomValues(count, random);
+    const Bytes bytes = Write(values);
+    ByteReader in(bytes);
+    EXPECT_EQ(Read(in, count), values) << count;
+    EXPECT_TRUE(in.ok() && in.remaining() == 0) << count;
   }
 }
 

@@ -32,6 +32,15 @@ QuantizedPose PoseOf(const Eigen::Quaterniond& rotation) {
   return QuantizedPose::FromPose(pose);
 }
 
+// The largest difference between the placement's numbers and those of doubles.
+double DeviationFromDoubles(const KeyframePlacement& placement, const Eigen::Matrix3d& m) {
+  const double norm = std::hypot(m(0, 0), m(1, 0));
+  return std::max({std::abs(placement.cos_yaw / kScale - m(0, 0) / norm),
+                   std::abs(placement.sin_yaw / kScale - m(1, 0) / norm),
+                   std::abs(placement.slope_x / kScale - m(2, 0)),
+                   std::abs(placement.slope_y / kScale - m(2, 1))});
+}
+
 TEST(KeyframePlacementTest, AgreesWithDoubles) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> angle(-180.0, 180.0);
@@ -44,14 +53,16 @@ TEST(KeyframePlacementTest, AgreesWithDoubles) {
     const auto placement = PlaceKeyframe(PoseOf(pose), Quantize(level));
     ASSERT_TRUE(placement.has_value()) << placement.error().message();
     const Eigen::Matrix3d m = (pose * level.conjugate()).toRotationMatrix();
-    const double norm = std::hypot(m(0, 0), m(1, 0));
-    EXPECT_NEAR(placement->cos_yaw / kScale, m(0, 0) / norm, 1e-8);
-    EXPECT_NEAR(placement->sin_yaw / kScale, m(1, 0) / norm, 1e-8);
-    EXPECT_NEAR(placement->slope_x / kScale, m(2, 0), 1e-8);
-    EXPECT_NEAR(placement->slope_y / kScale, m(2, 1), 1e-8);
-    EXPECT_EQ(placement->x_um, 12'500'000);
-    EXPECT_EQ(placement->z_um, 1'000'000);
+    EXPECT_LT(DeviationFromDoubles(*placement, m), 1e-8);
   }
+}
+
+TEST(KeyframePlacementTest, KeepsThePosition) {
+  const auto placement = PlaceKeyframe(PoseOf(About({0.0, 0.0, 1.0}, 30.0)), {1 << 30, 0, 0, 0});
+  ASSERT_TRUE(placement.has_value());
+  EXPECT_EQ(placement->x_um, 12'500'000);
+  EXPECT_EQ(placement->y_um, -7'250'000);
+  EXPECT_EQ(placement->z_um, 1'000'000);
 }
 
 TEST(KeyframePlacementTest, TheLevelOfItsOwnPoseLeavesNoTilt) {
@@ -82,6 +93,23 @@ TEST(KeyframePlacementTest, RefusesQuaternionsThatAreNotRotations) {
   EXPECT_FALSE(PlaceKeyframe(pose, {INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN}).has_value());
 }
 
+// All tiles of 1.6 m within 35 of the origin that the disc touches, by doubles.
+std::set<TileId> TouchedTiles(const KeyframePlacement& placement, double radius_m) {
+  const double x_m = 1e-6 * static_cast<double>(placement.x_um);
+  const double y_m = 1e-6 * static_cast<double>(placement.y_um);
+  std::set<TileId> touched;
+  for (std::int32_t y = -35; y < 35; ++y) {
+    for (std::int32_t x = -35; x < 35; ++x) {
+      const double dx = std::max({1.6 * x - x_m, x_m - 1.6 * (x + 1), 0.0});
+      const double dy = std::max({1.6 * y - y_m, y_m - 1.6 * (y + 1), 0.0});
+      if (std::hypot(dx, dy) <= radius_m) {
+        touched.insert({0, x, y});
+      }
+    }
+  }
+  return touched;
+}
+
 TEST(FootprintTest, HoldsExactlyTheTilesTheDiscTouches) {
   MapProfile profile;
   profile.tile_cells = 16;
@@ -91,19 +119,11 @@ TEST(FootprintTest, HoldsExactlyTheTilesTheDiscTouches) {
     const KeyframePlacement placement = testing::PlaceAt({position(random), position(random)});
     const std::int32_t radius = 1 + static_cast<std::int32_t>(random() % 60);
     const auto tiles = FootprintTiles(placement, {profile.cell_size_um, radius}, profile);
-    std::set<TileId> found(tiles.begin(), tiles.end());
+    const std::set<TileId> found(tiles.begin(), tiles.end());
+    EXPECT_EQ(found, TouchedTiles(placement, 0.1 * radius));
     EXPECT_EQ(found.size(), tiles.size());
     EXPECT_TRUE(std::is_sorted(tiles.begin(), tiles.end(),
                                [](const auto& a, const auto& b) { return a.Key() < b.Key(); }));
-    const double x_m = 1e-6 * static_cast<double>(placement.x_um);
-    const double y_m = 1e-6 * static_cast<double>(placement.y_um);
-    for (std::int32_t y = -35; y < 35; ++y) {
-      for (std::int32_t x = -35; x < 35; ++x) {
-        const double dx = std::max({1.6 * x - x_m, x_m - 1.6 * (x + 1), 0.0});
-        const double dy = std::max({1.6 * y - y_m, y_m - 1.6 * (y + 1), 0.0});
-        EXPECT_EQ(found.count({0, x, y}) == 1, std::hypot(dx, dy) <= 0.1 * radius) << x << ' ' << y;
-      }
-    }
   }
 }
 

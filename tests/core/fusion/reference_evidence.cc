@@ -7,6 +7,13 @@
 #include "tests/core/fusion/reference_cell.h"
 
 namespace atlas::testing {
+namespace {
+
+int EvidenceOfState(int state) {
+  return kNibbleEvidence[static_cast<std::size_t>(state)];
+}
+
+}  // namespace
 
 // Saturating folds: each session's words in time order, sessions in order of their last word.
 std::int64_t CellReference::FoldSessions(std::size_t layer,
@@ -61,7 +68,7 @@ std::uint64_t CellReference::FoldColumn(std::size_t layer) const {
     for (const Word& word : words_) {
       const int state = word.layer == layer ? ColumnState(word, layer, segment) : 0;
       if (state != 0) {
-        evidence[&word] = kNibbleEvidence[static_cast<std::size_t>(state)];
+        evidence.emplace(&word, EvidenceOfState(state));
       }
     }
     if (!evidence.empty()) {
@@ -87,7 +94,7 @@ TileLayer CellReference::Publish(std::size_t index) const {
   }
   TileLayer layer;
   layer.altitude_mm = static_cast<std::int32_t>(layers_[index].altitude_mm);
-  layer.sigma_100um = sigmas_.SigmaOfWeight_100um(layers_[index].weight);
+  layer.sigma_100um = sigmas_.SigmaOfWeight100um(layers_[index].weight);
   layer.occupancy = static_cast<std::int8_t>(FoldSessions(index, occupancy));
   layer.observations = static_cast<std::uint16_t>(std::min(observations, 65'535));
   layer.flags = static_cast<std::uint8_t>(

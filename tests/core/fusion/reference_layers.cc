@@ -74,6 +74,7 @@ std::vector<Word*> CellReference::Representatives(const std::vector<Word*>& make
     segments.back().push_back(word);
   }
   std::vector<Word*> representatives;
+  representatives.reserve(segments.size());
   for (const auto& segment : segments) {
     representatives.push_back(
         *std::min_element(segment.begin(), segment.end(), [](const Word* a, const Word* b) {
@@ -91,7 +92,7 @@ void CellReference::BuildLayers(const std::vector<Word*>& makers) {
                    [](const Word* a, const Word* b) { return a->altitude_mm < b->altitude_mm; });
   for (Word* word : sorted) {
     const AltitudeEstimate next{static_cast<std::int32_t>(word->altitude_mm),
-                                sigmas_.Sigma_100um(word->cell.source, word->distance_step)};
+                                sigmas_.Sigma100um(word->cell.source, word->distance_step)};
     bool is_same = false;
     if (!layers_.empty()) {
       const auto& of_layer = layers_.back().representatives;
@@ -202,6 +203,7 @@ void CellReference::DropUnsupported() {
     return std::pair(layers_[a].altitude_mm, a) < std::pair(layers_[b].altitude_mm, b);
   });
   std::vector<Layer> kept;
+  kept.reserve(order.size());
   for (const std::size_t i : order) {
     kept.push_back(layers_[i]);
   }

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/hash.h"
+#include "core/keyframe/keyframe_body.h"
 #include "tests/core/support/golden.h"
 #include "tests/core/support/golden_profile.h"
 #include "tests/core/support/keyframe_worlds.h"
@@ -110,6 +111,30 @@ TEST(KeyframeCodecTest, RefusesTrailingBytes) {
   EXPECT_EQ(DecodeError(WithChecksum(blob)), StatusCode::kInvalidData);
 }
 
+// A body alone, behind all checksums.
+bool BodyIsRefused(ByteSpan body, std::int32_t radius_cells) {
+  Keyframe decoded;
+  decoded.grid = {MapProfile().cell_size_um, radius_cells};
+  return DecodeKeyframeBody(body, decoded).code() == StatusCode::kInvalidData;
+}
+
+TEST(KeyframeCodecTest, RefusesBodiesOfTheWrongLength) {
+  Bytes body = EncodeKeyframeBody(RandomKeyframe(MapProfile(), 8, 5));
+  EXPECT_FALSE(BodyIsRefused(body, 8));
+  EXPECT_TRUE(BodyIsRefused({}, 8));
+  EXPECT_TRUE(BodyIsRefused(ByteSpan(body).first(body.size() - 1), 8));
+  body.push_back(0);
+  EXPECT_TRUE(BodyIsRefused(body, 8));
+}
+
+TEST(KeyframeCodecTest, RefusesStatesThatNoCellHas) {
+  Bytes body = EncodeKeyframeBody(RandomKeyframe(MapProfile(), 8, 5));
+  body[0] = 0x0C;  // occupancy 3
+  EXPECT_TRUE(BodyIsRefused(body, 8));
+  body[0] = 0x04;  // free, but not seen
+  EXPECT_TRUE(BodyIsRefused(body, 8));
+}
+
 TEST(KeyframeCodecTest, SaysThatANewerVersionIsUnsupported) {
   Bytes blob = EncodeKeyframe(BlankKeyframe(MapProfile(), 4));
   blob[4] = 2;
@@ -120,19 +145,20 @@ TEST(KeyframeCodecTest, SaysThatANewerVersionIsUnsupported) {
 // Headers that lie, with a checksum that fits: offsets of docs/formats/keyframe.md.
 TEST(KeyframeCodecTest, RefusesLyingHeaders) {
   const Bytes blob = EncodeKeyframe(BlankKeyframe(MapProfile(), 4));
-  const auto with_u16 = [&](std::size_t offset, unsigned value) {
-    Bytes bad = blob;
-    bad[offset] = static_cast<std::uint8_t>(value);
-    bad[offset + 1] = static_cast<std::uint8_t>(value >> 8);
-    return WithChecksum(bad);
+  ASSERT_EQ(DecodeError(WithChecksum(blob)), StatusCode::kOk);
+  struct Lie {
+    const char* about;
+    std::size_t offset;
+    unsigned value;  // of 16 bits
   };
-  EXPECT_EQ(DecodeError(WithChecksum(blob)), StatusCode::kOk);
-  EXPECT_EQ(DecodeError(with_u16(17, 0)), StatusCode::kInvalidData);       // radius
-  EXPECT_EQ(DecodeError(with_u16(17, 1'025)), StatusCode::kInvalidData);   // radius
-  EXPECT_EQ(DecodeError(with_u16(17, 5)), StatusCode::kInvalidData);       // another radius
-  EXPECT_EQ(DecodeError(with_u16(15, 1'000)), StatusCode::kInvalidData);   // 65 m cells
-  EXPECT_EQ(DecodeError(with_u16(21, 0)), StatusCode::kInvalidData);       // short quaternion
-  EXPECT_EQ(DecodeError(with_u16(41, 0xFFFF)), StatusCode::kInvalidData);  // a huge body
+  for (const Lie& lie : {Lie{"radius 0", 17, 0}, Lie{"radius 1025", 17, 1'025},
+                         Lie{"another radius", 17, 5}, Lie{"65 m cells", 15, 1'000},
+                         Lie{"a short quaternion", 21, 0}, Lie{"a huge body", 41, 0xFFFF}}) {
+    Bytes bad = blob;
+    bad[lie.offset] = static_cast<std::uint8_t>(lie.value);
+    bad[lie.offset + 1] = static_cast<std::uint8_t>(lie.value >> 8);
+    EXPECT_EQ(DecodeError(WithChecksum(bad)), StatusCode::kInvalidData) << lie.about;
+  }
 }
 
 TEST(KeyframeCodecTest, ValidateNamesWhatIsWrong) {

@@ -33,8 +33,8 @@ TEST(SigmaCodeTest, RoundsToTheNearestWithinThreePercent) {
 }
 
 TEST(SigmaCodeTest, EndsAreClamped) {
-  EXPECT_EQ(RoundSigma_100um(0), 1);
-  EXPECT_EQ(RoundSigma_100um(1'000'000'000), 63'488);
+  EXPECT_EQ(RoundSigma100um(0), 1);
+  EXPECT_EQ(RoundSigma100um(1'000'000'000), 63'488);
 }
 
 }  // namespace
