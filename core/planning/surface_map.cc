@@ -18,6 +18,7 @@ constexpr double kSameSurfaceSlope = 0.7;
 // An obstacle's altitude is that of the ground near it, known to about this much.
 constexpr double kObstacleHeightSlack_m = 0.3;
 constexpr double kClearanceSteps = 250.0;
+constexpr std::int64_t kHighest_mm = 100'000;
 // Slope is sampled no denser than this: closer cells share their noise.
 constexpr double kSlopeSampleStep_m = 0.2;
 
@@ -203,15 +204,29 @@ void SurfaceMap::InflateInto(SurfaceTile& target, std::size_t neighbour) {
     const std::int32_t y = shift_y + node.cell / side_;
     if (node.Has(SurfaceNode::kObstacle) && is_within_reach(x) && is_within_reach(y) &&
         !IsInsideObstacle(from, node)) {
-      StampDisc(target, x, y, node.altitude_mm);
+      StampDisc(target, x, y, BandOf(from, node));
     }
   }
+}
+
+SurfaceMap::HeightBand SurfaceMap::BandOf(const SurfaceTile& tile, const SurfaceNode& node) {
+  const std::int64_t altitude_mm = node.altitude_mm;
+  HeightBand band{altitude_mm, altitude_mm - kHighest_mm, altitude_mm + kHighest_mm};
+  for (std::uint32_t i = tile.cell_begin[node.cell]; i < tile.cell_begin[node.cell + 1U]; ++i) {
+    const std::int64_t middle_mm = (altitude_mm + tile.nodes[i].altitude_mm) / 2;
+    if (tile.nodes[i].altitude_mm > altitude_mm) {
+      band.high_mm = std::min(band.high_mm, middle_mm);
+    } else if (tile.nodes[i].altitude_mm < altitude_mm) {
+      band.low_mm = std::max(band.low_mm, middle_mm);
+    }
+  }
+  return band;
 }
 
 void SurfaceMap::StampDisc(SurfaceTile& target,
                            std::int32_t x,
                            std::int32_t y,
-                           std::int32_t altitude_mm) {
+                           const HeightBand& band) {
   for (const Offset& offset : clearance_offsets_) {
     const std::int32_t cx = x + offset.dx;
     const std::int32_t cy = y + offset.dy;
@@ -221,7 +236,9 @@ void SurfaceMap::StampDisc(SurfaceTile& target,
     const auto cell = static_cast<std::size_t>(cy * side_ + cx);
     for (std::uint32_t i = target.cell_begin[cell]; i < target.cell_begin[cell + 1]; ++i) {
       SurfaceNode& node = target.nodes[i];
-      if (std::abs(std::int64_t{node.altitude_mm} - altitude_mm) <= offset.height_limit_mm) {
+      const std::int64_t height_mm = node.altitude_mm;
+      if (std::abs(height_mm - band.altitude_mm) <= offset.height_limit_mm &&
+          height_mm >= band.low_mm && height_mm <= band.high_mm) {
         node.clearance = std::min(node.clearance, offset.clearance);
       }
     }

@@ -59,13 +59,22 @@ class SurfaceMap {
     std::uint8_t clearance = 0;
   };
 
+  // Heights that may belong to an obstacle's surface: no further than half-way to the surfaces
+  // above and below it, so that what stands under a ramp does not close the ramp.
+  struct HeightBand {
+    std::int64_t altitude_mm = 0;
+    std::int64_t low_mm = 0;
+    std::int64_t high_mm = 0;
+  };
+
   std::vector<Offset> ClearanceOffsets() const;
   std::vector<Offset> SlopeOffsets() const;
   Result<std::int32_t> Load(const TileId& id);
   Status AddMemory(std::size_t bytes);
   bool IsInsideObstacle(const SurfaceTile& tile, const SurfaceNode& node) const;
   void InflateInto(SurfaceTile& target, std::size_t neighbour);
-  void StampDisc(SurfaceTile& target, std::int32_t x, std::int32_t y, std::int32_t altitude_mm);
+  void StampDisc(SurfaceTile& target, std::int32_t x, std::int32_t y, const HeightBand& band);
+  static HeightBand BandOf(const SurfaceTile& tile, const SurfaceNode& node);
   bool IsGentle(const SurfaceTile& home, const SurfaceNode& node) const;
 
   TileSource& source_;
