@@ -152,6 +152,7 @@ Route Describe(const std::vector<NodeRef>& way,
   route.expansions = search.expansions();
   route.cost = search.cost();
   std::vector<Eigen::Vector3d> points;
+  points.reserve(way.size());
   for (const NodeRef& ref : way) {
     points.push_back(search.Position(ref));
   }

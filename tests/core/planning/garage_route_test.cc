@@ -75,26 +75,19 @@ TinyWorld MapGarage() {
   return map;
 }
 
-class GarageRouteTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() { map_ = new TinyWorld(MapGarage()); }
-  static void TearDownTestSuite() {
-    delete map_;
-    map_ = nullptr;
-  }
+// Mapped once for all tests.
+TinyWorld& Garage() {
+  static TinyWorld map = MapGarage();
+  return map;
+}
 
-  static Result<Route> PlanToTheRoof(double max_slope_deg) {
-    PlanRequest request{{28.0, 10.0, 0.0}, {-9.0, 10.0, kTop_m}, {}};
-    request.options.max_slope_deg = max_slope_deg;
-    return PlanRoute(*map_, map_->profile(), request);
-  }
+Result<Route> PlanToTheRoof(double max_slope_deg) {
+  PlanRequest request{{28.0, 10.0, 0.0}, {-9.0, 10.0, kTop_m}, {}};
+  request.options.max_slope_deg = max_slope_deg;
+  return PlanRoute(Garage(), Garage().profile(), request);
+}
 
-  static TinyWorld* map_;
-};
-
-TinyWorld* GarageRouteTest::map_ = nullptr;
-
-TEST_F(GarageRouteTest, FromTheStreetToTheRoof) {
+TEST(GarageRouteTest, FromTheStreetToTheRoof) {
   const auto route = PlanToTheRoof(25.0);
   ASSERT_TRUE(route.has_value()) << route.error().message();
   ASSERT_TRUE(route->found);
@@ -108,16 +101,16 @@ TEST_F(GarageRouteTest, FromTheStreetToTheRoof) {
   EXPECT_NEAR(last_z_m, kTop_m, 0.01);
 }
 
-TEST_F(GarageRouteTest, FiveDegreesDoNotClimbItsRamps) {
+TEST(GarageRouteTest, FiveDegreesDoNotClimbItsRamps) {
   const auto route = PlanToTheRoof(5.0);
   ASSERT_TRUE(route.has_value()) << route.error().message();
   EXPECT_FALSE(route->found);
 }
 
-TEST_F(GarageRouteTest, DecksStayPassableAtFiveDegrees) {
+TEST(GarageRouteTest, DecksStayPassableAtFiveDegrees) {
   PlanRequest request{{-9.0, 10.0, 3.2}, {9.0, 10.0, 3.2}, {}};
   request.options.max_slope_deg = 5.0;
-  const auto route = PlanRoute(*map_, map_->profile(), request);
+  const auto route = PlanRoute(Garage(), Garage().profile(), request);
   ASSERT_TRUE(route.has_value()) << route.error().message();
   EXPECT_TRUE(route->found);
   EXPECT_NEAR(route->length_m, 18.0, 0.5);
