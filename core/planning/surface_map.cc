@@ -60,7 +60,7 @@ Status SurfaceMap::AddMemory(std::size_t bytes) {
 }
 
 Result<std::int32_t> SurfaceMap::Load(const TileId& id) {
-  if (const auto known = slots_.find(id); known != slots_.end()) {
+  if (const auto known = slots_.find(id.Key()); known != slots_.end()) {
     return known->second;
   }
   const Result<const Tile*> tile = source_.Get(id);
@@ -79,7 +79,7 @@ Result<std::int32_t> SurfaceMap::Load(const TileId& id) {
       return Error(std::move(status));
     }
   }
-  slots_.emplace(id, slot);
+  slots_.emplace(id.Key(), slot);
   return slot;
 }
 

@@ -4,8 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include "core/base/status.h"
@@ -75,7 +75,8 @@ class SurfaceMap {
   double max_gradient_;  // metres per cell
   ObstacleInflation inflation_;
   std::vector<SlopeSample> slope_samples_;
-  std::map<TileId, std::int32_t> slots_;  // kNotThere where the source has none
+  // By TileId::Key; kNotThere where the source has none.
+  std::unordered_map<std::uint64_t, std::int32_t> slots_;
   std::vector<std::unique_ptr<SurfaceTile>> tiles_;
   std::size_t memory_bytes_ = 0;
 };

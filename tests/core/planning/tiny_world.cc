@@ -45,7 +45,7 @@ void TinyWorld::Put(std::int64_t cell_x, std::int64_t cell_y, const TileLayer& l
   const std::int64_t side = profile_.tile_cells;
   const TileId id{0, static_cast<std::int32_t>(FloorDiv(cell_x, side)),
                   static_cast<std::int32_t>(FloorDiv(cell_y, side))};
-  auto& cells = cells_[id];
+  auto& cells = cells_[id.Key()];
   cells.resize(static_cast<std::size_t>(side * side));
   const std::int64_t index = (cell_y - id.y * side) * side + cell_x - id.x * side;
   cells[static_cast<std::size_t>(index)].push_back(layer);
@@ -85,7 +85,7 @@ Result<const Tile*> TinyWorld::Get(const TileId& id) {
   if (!failure_.ok()) {
     return Error(failure_);
   }
-  const auto found = cells_.find(id);
+  const auto found = cells_.find(id.Key());
   if (found == cells_.end()) {
     return nullptr;
   }

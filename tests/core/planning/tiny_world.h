@@ -42,7 +42,7 @@ class TinyWorld : public TileSource {
 
  private:
   MapProfile profile_;
-  std::map<TileId, std::vector<std::vector<TileLayer>>> cells_;
+  std::map<std::uint64_t, std::vector<std::vector<TileLayer>>> cells_;
   Tile tile_;  // lives until the next Get, as the contract says
   std::size_t tiles_asked_ = 0;
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
