@@ -50,8 +50,8 @@ Status ValidateFusion(const MapProfile& profile) {
   if (profile.preset > FusionPreset::kBounded) {
     return OutOfRange("preset", static_cast<int>(profile.preset), "0 to 2");
   }
-  if (profile.overlap_permille < 100 || profile.overlap_permille > 950) {
-    return OutOfRange("overlap threshold in permille", profile.overlap_permille, "100 to 950");
+  if (profile.overlap_permille != 600) {  // the one threshold that core/tile has a table for
+    return OutOfRange("overlap threshold in permille", profile.overlap_permille, "600");
   }
   if (profile.same_layer_mm >= profile.other_layer_mm) {
     return OutOfRange("same-layer gate in mm", profile.same_layer_mm,

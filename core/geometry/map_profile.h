@@ -48,7 +48,7 @@ struct MapProfile {
 
   // Layers (paper III-C, eq. 1). Gates: preset strict and bounded only.
   FusionPreset preset = FusionPreset::kStrict;
-  std::uint16_t overlap_permille = 600;  // epsilon of the overlap rate
+  std::uint16_t overlap_permille = 600;  // epsilon of the overlap rate; no other yet
   std::uint16_t same_layer_mm = 500;     // closer than this: one layer
   std::uint16_t other_layer_mm = 2'000;  // farther than this: two layers
   std::uint16_t layer_span_mm = 1'500;   // no layer is thicker

@@ -44,8 +44,11 @@ class FrameDecoder {
   Result<std::optional<Bytes>> Next();
 
  private:
+  Result<std::optional<Bytes>> TakeFrame();
+
   std::uint32_t max_payload_bytes_;
   Bytes buffer_;
+  std::size_t consumed_ = 0;  // bytes of buffer_ already handed out
   std::optional<Status> failure_;
 };
 

@@ -1,0 +1,58 @@
+// `atlas digest`: one number for the whole atlas; equal atlases, equal digests.
+#include "client/cli/commands.h"
+#include "client/cli/seconds.h"
+
+namespace atlas {
+namespace {
+
+std::string Hex(ByteSpan bytes) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : bytes) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 0xF];
+  }
+  return text;
+}
+
+class DigestCommand : public Command {
+ public:
+  std::string Name() const override { return "digest"; }
+  std::string Summary() const override {
+    return "SHA-256 over all tiles, once everything is fused";
+  }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Optional("--timeout", "S", timeout_s_,
+                       "Give up (exit 5) after so many seconds [600]");
+  }
+
+  Status Run(CommandContext& context) override {
+    const auto timeout = TimeoutFromSeconds(timeout_s_);
+    if (!timeout) return timeout.error();
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const Result<DigestSummary> digest = client->Digest(*timeout);
+    if (!digest) return digest.error();
+    if (context.is_json) {
+      context.PrintJson({{"digest", Hex(digest->sha256)},
+                         {"tiles", digest->tiles},
+                         {"revision", digest->revision}});
+    } else {
+      context.out << Hex(digest->sha256) << "  " << digest->tiles << " tiles, revision "
+                  << digest->revision << '\n';
+    }
+    return {};
+  }
+
+ private:
+  double timeout_s_ = 600.0;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeDigestCommand() {
+  return std::make_unique<DigestCommand>();
+}
+
+}  // namespace atlas

@@ -1,0 +1,45 @@
+// A recorded drive into an atlas: survey, select, build keyframes, upload them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "client/atlas_client.h"
+#include "client/drive_selection.h"
+#include "client/keyframe_uploader.h"
+#include "core/base/status.h"
+#include "core/scan/drive_folder.h"
+
+namespace atlas {
+
+struct IngestOptions {
+  SessionKey session;  // of the part before the first jump
+  SelectionOptions selection;
+  std::optional<std::uint32_t> rings;
+  double max_range_m = 20.0;
+  std::optional<double> sensor_height_m;
+  bool is_deskewed = false;
+  double start_s = 0.0;  // added to the scans' times
+  std::optional<std::uint64_t> shuffle_seed;
+  UploadOptions upload;
+};
+
+struct IngestReport {
+  std::uint64_t keyframes = 0;  // selected
+  UploadTotals totals;
+  double metres = 0.0;
+  double frontend_s = 0.0;  // CPU time from scan to blob
+  double sensor_height_m = 0.0;
+  std::uint64_t sessions = 0;
+};
+
+// `progress` (may be empty) is called with the number of keyframes sent. Fails at the first scan
+// that is bad or keyframe that is refused, naming it; what was acknowledged until then stays.
+Result<IngestReport> IngestDrive(const DriveFolder& drive,
+                                 const IngestOptions& options,
+                                 AtlasClient& client,
+                                 const std::function<void(std::size_t, std::size_t)>& progress);
+
+}  // namespace atlas

@@ -1,0 +1,115 @@
+// What a client asks of a daemon and what it is told: plain values, no messages.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/bytes.h"
+#include "core/geometry/keyframe_key.h"
+#include "core/geometry/pose.h"
+#include "core/geometry/tile_id.h"
+
+namespace atlas {
+
+// The atlas at the other end, as it was when the connection was made.
+struct AtlasIdentity {
+  Bytes atlas_id;
+  std::uint64_t epoch = 0;
+  std::uint64_t revision = 0;
+};
+
+struct KeyframeUpload {
+  KeyframeKey key;
+  std::int64_t time_ms = 0;
+  QuantizedPose T_world_sensor;
+  ByteSpan blob;
+};
+
+struct PoseCorrection {
+  KeyframeKey key;
+  QuantizedPose T_world_sensor;
+};
+
+struct PoseBatchSummary {
+  std::uint32_t updated = 0;
+  std::uint32_t tiles_marked = 0;
+  std::uint64_t revision = 0;
+  std::uint64_t batch = 0;
+};
+
+// Without a disc: the whole atlas. Tiles come coarse first.
+struct RegionQuery {
+  struct Disc {
+    Eigen::Vector2d center_m = Eigen::Vector2d::Zero();
+    double radius_m = 0.0;
+  };
+  std::optional<Disc> disc;
+  std::uint8_t finest_level = 0;
+  bool is_only_finest = false;
+  std::uint64_t budget_bytes = 0;  // 0: none
+};
+
+// A tile as it was encoded; DecodeTile makes a Tile of it.
+struct TileBlob {
+  TileId id;
+  std::uint64_t revision = 0;
+  std::uint64_t payload_hash = 0;
+  Bytes blob;
+};
+
+struct RegionSummary {
+  std::uint64_t tiles = 0;
+  std::uint64_t bytes = 0;  // of the reply's frames
+  std::uint64_t revision = 0;
+  bool is_truncated = false;
+};
+
+struct AtlasStatus {
+  std::uint64_t revision = 0;
+  std::uint64_t keyframes = 0;
+  std::uint64_t sessions = 0;
+  std::uint64_t tiles = 0;
+  std::uint64_t dirty_tiles = 0;
+  std::uint64_t store_bytes = 0;
+  std::uint64_t tile_bytes = 0;
+  std::uint64_t keyframe_bytes = 0;
+  std::uint64_t cells = 0;
+  std::uint64_t multilayer_cells = 0;
+  std::uint64_t rss_bytes = 0;
+};
+
+struct WaitSummary {
+  std::uint64_t revision = 0;
+  std::uint64_t dirty_tiles = 0;
+};
+
+struct SessionSummary {
+  SessionKey key;
+  std::string state;
+  std::uint64_t keyframes = 0;
+  std::uint64_t bytes = 0;
+  std::int64_t first_time_ms = 0;
+  std::int64_t last_time_ms = 0;
+  std::uint32_t last_sequence = 0;
+};
+
+struct DigestSummary {
+  Bytes sha256;
+  std::uint64_t tiles = 0;
+  std::uint64_t revision = 0;
+};
+
+struct VerifySummary {
+  std::uint64_t checked = 0;
+  std::uint64_t damaged = 0;
+  std::uint64_t mismatched = 0;
+  std::vector<std::string> findings;
+  std::uint64_t revision = 0;
+};
+
+}  // namespace atlas

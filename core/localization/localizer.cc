@@ -1,0 +1,127 @@
+#include "core/localization/localizer.h"
+
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace atlas {
+namespace {
+
+// T_world_sensor without its tilt but with `R_level_sensor`'s: what the IMU says about the vertical
+// replaces what was predicted.
+Pose LevelFrame(const Pose& T_world_sensor) {
+  Pose level = Pose::Identity();
+  const double yaw_rad = SplitYaw(Eigen::Quaterniond(T_world_sensor.linear())).yaw_rad;
+  level.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  level.translation() = T_world_sensor.translation();
+  return level;
+}
+
+}  // namespace
+
+std::string_view LocalizationHealthName(LocalizationHealth health) {
+  switch (health) {
+    case LocalizationHealth::kGood:
+      return "good";
+    case LocalizationHealth::kWeak:
+      return "weak";
+    case LocalizationHealth::kLost:
+      return "lost";
+  }
+  return "lost";
+}
+
+Localizer::Localizer(const MapProfile& profile, TilesAround tiles, const LocalizerOptions& options)
+    : profile_(profile), tiles_(std::move(tiles)), options_(options) {}
+
+void Localizer::Start(const Pose& T_world_sensor) {
+  last_ = T_world_sensor;
+  motion_.reset();
+  is_first_ = true;
+}
+
+Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
+                                               const Eigen::Quaterniond& R_level_sensor) {
+  const Pose predicted = motion_ ? last_ * *motion_ : last_;
+  if (Status status = RenewWindow(predicted.translation()); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const ScanFeatures features = ExtractFeatures(scan, options_.features);
+  LocalizationResult result;
+  result.registration = Best(features, LevelFrame(predicted));
+  result.health = Judge(result.registration);
+  result.T_world_sensor = result.registration.T_world_level;
+  result.T_world_sensor.linear() =
+      result.registration.T_world_level.linear() * R_level_sensor.toRotationMatrix();
+  if (result.health == LocalizationHealth::kLost) {
+    result.T_world_sensor.translation() = predicted.translation();
+  }
+  if (!is_first_ && (motion_ || result.health == LocalizationHealth::kGood)) {
+    motion_ = last_.inverse() * result.T_world_sensor;
+  }
+  last_ = result.T_world_sensor;
+  is_first_ = false;
+  return result;
+}
+
+Status Localizer::RenewWindow(const Eigen::Vector3d& center) {
+  if (window_ && (center - window_center_).norm() < 0.5 * options_.window_margin_m) {
+    return {};
+  }
+  const double radius_m =
+      static_cast<double>(options_.features.max_range_m) + options_.window_margin_m;
+  const auto tiles = tiles_(center, radius_m);
+  if (!tiles) {
+    return tiles.error();
+  }
+  std::vector<const Tile*> views;
+  views.reserve(tiles->size());
+  for (const auto& tile : *tiles) {
+    views.push_back(tile.get());
+  }
+  window_.emplace(profile_, views, center, radius_m, options_.window);
+  window_center_ = center;
+  return {};
+}
+
+std::vector<Pose> Localizer::Hypotheses(const Pose& T_world_level) const {
+  std::vector<Pose> starts{T_world_level};
+  if (!is_first_ && !motion_) {
+    const Eigen::Vector3d ahead = T_world_level.linear().col(0);
+    for (double d = options_.search_step_m; d <= options_.search_ahead_m;
+         d += options_.search_step_m) {
+      starts.push_back(T_world_level);
+      starts.back().translation() += d * ahead;
+    }
+  }
+  return starts;
+}
+
+RegistrationResult Localizer::Best(const ScanFeatures& features, const Pose& T_world_level) const {
+  std::optional<RegistrationResult> best;
+  RegistrationOptions options = options_.registration;
+  if (!is_first_) {
+    options.start_sigma_m = options_.predicted_sigma_m;
+    options.start_sigma_rad = options_.predicted_sigma_rad;
+  }
+  for (const Pose& start : Hypotheses(T_world_level)) {
+    RegistrationResult result = Register(*window_, features, start, options);
+    if (!best || result.fit > best->fit) {
+      best = std::move(result);
+    }
+  }
+  return *best;
+}
+
+LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {
+  if (result.fit < options_.min_fit) {
+    return LocalizationHealth::kLost;
+  }
+  const Eigen::Matrix2d horizontal = result.information.topLeftCorner<2, 2>();
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues()(0);
+  const double sigma_m = least > 0.0 ? 1.0 / std::sqrt(least) : 1e9;
+  return sigma_m > options_.max_weak_sigma_m ? LocalizationHealth::kWeak
+                                             : LocalizationHealth::kGood;
+}
+
+}  // namespace atlas

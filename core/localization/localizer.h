@@ -1,0 +1,79 @@
+// Where the vehicle is: keeps a map window around it, predicts its motion, matches each scan and
+// says how far the answer can be believed.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "core/base/status.h"
+#include "core/localization/map_window.h"
+#include "core/localization/registration.h"
+#include "core/localization/scan_features.h"
+
+namespace atlas {
+
+// Level-0 tiles that touch the square of `radius_m` around a place; they live as long as the
+// result.
+using TilesAround = std::function<Result<std::vector<std::shared_ptr<const Tile>>>(
+    const Eigen::Vector3d& center, double radius_m)>;
+
+enum class LocalizationHealth : std::uint8_t {
+  kGood,
+  kWeak,  // one horizontal direction is not held by anything seen
+  kLost,  // the scan does not fit the map here
+};
+std::string_view LocalizationHealthName(LocalizationHealth health);
+
+struct LocalizerOptions {
+  FeatureOptions features;
+  MapWindowOptions window;
+  RegistrationOptions registration;
+  double window_margin_m = 12.0;   // beyond the features' range; the window is renewed half-way
+  double max_weak_sigma_m = 0.10;  // of the worst horizontal direction
+  double min_fit = 0.15;           // of RegistrationResult; less: lost
+  // How well the motion model knows the next pose, once the speed is known.
+  double predicted_sigma_m = 0.2;
+  double predicted_sigma_rad = 0.01;
+  // While the speed is unknown, starts are tried this far ahead of the last pose.
+  double search_ahead_m = 4.0;
+  double search_step_m = 0.5;
+};
+
+struct LocalizationResult {
+  Pose T_world_sensor = Pose::Identity();
+  LocalizationHealth health = LocalizationHealth::kLost;
+  RegistrationResult registration;
+};
+
+class Localizer {
+ public:
+  Localizer(const MapProfile& profile, TilesAround tiles, const LocalizerOptions& options);
+
+  // Forgets the motion; the next scan is near `T_world_sensor`.
+  void Start(const Pose& T_world_sensor);
+
+  // Requires Start(). `scan` is levelled by `R_level_sensor`. Errors are those of the tiles'
+  // source.
+  Result<LocalizationResult> Localize(const LeveledScan& scan,
+                                      const Eigen::Quaterniond& R_level_sensor);
+
+ private:
+  Status RenewWindow(const Eigen::Vector3d& center);
+  std::vector<Pose> Hypotheses(const Pose& T_world_level) const;
+  RegistrationResult Best(const ScanFeatures& features, const Pose& T_world_level) const;
+  LocalizationHealth Judge(const RegistrationResult& result) const;
+
+  MapProfile profile_;
+  TilesAround tiles_;
+  LocalizerOptions options_;
+  std::optional<MapWindow> window_;
+  Eigen::Vector3d window_center_ = Eigen::Vector3d::Zero();
+  Pose last_ = Pose::Identity();  // T_world_sensor
+  std::optional<Pose> motion_;    // from one scan to the next, sensor frame
+  bool is_first_ = true;
+};
+
+}  // namespace atlas

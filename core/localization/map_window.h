@@ -1,0 +1,98 @@
+// The part of the atlas around a vehicle, prepared for matching: columns as vertical lines with
+// horizontal normals, surface layers as planes, each behind a direct grid index.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/geometry/map_profile.h"
+#include "core/tile/tile.h"
+
+namespace atlas {
+
+struct MapWindowOptions {
+  std::uint8_t occupied_nibble = 10;  // p >= 0.61
+  float line_radius_m = 0.7F;         // neighbourhood that a line's normal comes from
+  float max_line_ratio = 0.35F;       // smaller over larger spread: a wall; above: a pole or a bush
+  float slope_baseline_m = 1.0F;      // either way, over which the ground's gradient is taken
+};
+
+// An occupied segment: where the structure around it stands, in the window's plane.
+struct ColumnLine {
+  Eigen::Vector2f center = Eigen::Vector2f::Zero();  // of the neighbourhood, window frame, metres
+  Eigen::Vector2f normal = Eigen::Vector2f::UnitX();
+  bool is_wall = false;  // only the distance along the normal counts
+};
+
+// A surface layer at a cell: z = z_m + gradient . ((x, y) - cell centre).
+struct SurfacePlane {
+  float z_m = 0.0F;
+  Eigen::Vector2f gradient = Eigen::Vector2f::Zero();
+};
+
+// Window frame: axes of the world, origin at `origin` (world, metres), floats are exact enough.
+class MapWindow {
+ public:
+  // `tiles`: level-0 tiles that touch the square of `radius_m` around `center`; others are ignored.
+  MapWindow(const MapProfile& profile,
+            std::span<const Tile* const> tiles,
+            const Eigen::Vector3d& center,
+            double radius_m,
+            const MapWindowOptions& options);
+
+  const Eigen::Vector3d& origin() const { return origin_; }
+  float cell_size_m() const { return cell_size_m_; }
+  std::size_t lines() const { return lines_.size(); }
+  std::size_t surfaces() const { return surfaces_.size(); }
+
+  // The line nearest to `p` (window frame) at its height, within `radius_m`; null without one.
+  const ColumnLine* NearestLine(const Eigen::Vector3f& p, float radius_m) const;
+  // Height above the surface layer nearest to `p`, if one is within `reach_m`, and its plane.
+  const SurfacePlane* NearestSurface(const Eigen::Vector3f& p,
+                                     float reach_m,
+                                     float* height_m) const;
+  // Whether an occupied segment stands at `p`.
+  bool IsOccupied(const Eigen::Vector3f& p) const;
+
+ private:
+  struct CellRef {
+    std::int32_t x;
+    std::int32_t y;
+  };
+
+  void AddTile(const MapProfile& profile, const Tile& tile, const MapWindowOptions& options);
+  void IndexSurfaces();
+  void FitGradients(const MapWindowOptions& options);
+  void FitLines(const MapWindowOptions& options);
+  ColumnLine FitLine(CellRef cell, int segment, const MapWindowOptions& options) const;
+  std::optional<float> SurfaceNear(CellRef cell, float z_m) const;
+
+  CellRef CellAt(float x_m, float y_m) const;
+  bool Contains(CellRef cell) const;
+  std::size_t Index(CellRef cell) const;
+  Eigen::Vector2f CellCenter(CellRef cell) const;
+  // Bit of the segment at height z in the masks; negative outside.
+  int SegmentAt(float z_m) const;
+  const ColumnLine& LineAt(std::size_t cell, int segment) const;
+
+  Eigen::Vector3d origin_;
+  std::int64_t first_cell_x_ = 0;  // world cell of window cell (0, 0)
+  std::int64_t first_cell_y_ = 0;
+  std::int32_t side_ = 0;
+  float cell_size_m_ = 0.1F;
+  float segment_height_m_ = 1.0F;
+  std::int64_t first_segment_ = 0;  // world segment of bit 0
+
+  std::vector<std::uint64_t> masks_;       // occupied segments, by cell
+  std::vector<std::uint32_t> first_line_;  // by cell: index of its lowest occupied segment's line
+  std::vector<ColumnLine> lines_;
+  std::vector<std::uint32_t> surface_begin_;                       // by cell, plus one
+  std::vector<SurfacePlane> surfaces_;                             // by cell, lowest first
+  std::vector<std::pair<std::uint32_t, float>> pending_surfaces_;  // (cell, z) while building
+};
+
+}  // namespace atlas

@@ -1,0 +1,194 @@
+#include "core/localization/registration.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace atlas {
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// Normal equations of residuals r(t, w) about the current pose: p = R(w) * arm + t.
+struct NormalEquations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+  int columns = 0;
+  int ground = 0;
+  double fit = 0.0;  // sum of robust weights
+
+  // Residual along the unit vector `direction` (world) of a point at `arm` from the sensor.
+  void Add(const Eigen::Vector3d& direction,
+           const Eigen::Vector3d& arm,
+           double residual,
+           double weight) {
+    Vector6d J;
+    J.head<3>() = direction;
+    J.tail<3>() = arm.cross(direction);
+    H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
+    g += weight * residual * J;
+  }
+};
+
+// Geman-McClure: a residual of several scales has no say.
+double RobustWeight(double residual, double scale) {
+  const double ratio = residual / scale;
+  const double denominator = 1.0 + ratio * ratio;
+  return 1.0 / (denominator * denominator);
+}
+
+struct Stage {
+  float radius_m;
+  float reach_m;
+};
+
+class Problem {
+ public:
+  Problem(const MapWindow& map, const ScanFeatures& features, const RegistrationOptions& options)
+      : map_(map), features_(features), options_(options) {}
+
+  NormalEquations Linearize(const Pose& pose, const Stage& stage) const {
+    NormalEquations equations;
+    const Eigen::Matrix3f R = pose.linear().cast<float>();
+    const Eigen::Vector3f t = (pose.translation() - map_.origin()).cast<float>();
+    for (const Eigen::Vector3f& p : features_.columns) {
+      AddColumn(R * p, t, stage, equations);
+    }
+    for (const Eigen::Vector3f& p : features_.ground) {
+      AddGround(R * p, t, stage, equations);
+    }
+    return equations;
+  }
+
+ private:
+  void AddColumn(const Eigen::Vector3f& arm,
+                 const Eigen::Vector3f& t,
+                 const Stage& stage,
+                 NormalEquations& equations) const {
+    const Eigen::Vector3f p = arm + t;
+    const ColumnLine* line = map_.NearestLine(p, stage.radius_m);
+    if (line == nullptr) {
+      return;
+    }
+    const Eigen::Vector2f offset = p.head<2>() - line->center;
+    const double along_normal = line->normal.dot(offset);
+    const Eigen::Vector2f tangent(-line->normal.y(), line->normal.x());
+    const double along_tangent = line->is_wall ? 0.0 : tangent.dot(offset);
+    const double scale = 0.4 * stage.radius_m;
+    const double robust = RobustWeight(std::hypot(along_normal, along_tangent), scale);
+    const double weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
+    ++equations.columns;
+    equations.fit += robust;
+    equations.Add({line->normal.x(), line->normal.y(), 0.0}, arm.cast<double>(), along_normal,
+                  weight);
+    if (!line->is_wall) {
+      equations.Add({tangent.x(), tangent.y(), 0.0}, arm.cast<double>(), along_tangent, weight);
+    }
+  }
+
+  void AddGround(const Eigen::Vector3f& arm,
+                 const Eigen::Vector3f& t,
+                 const Stage& stage,
+                 NormalEquations& equations) const {
+    float height_m = 0.0F;
+    const SurfacePlane* plane = map_.NearestSurface(arm + t, stage.reach_m, &height_m);
+    if (plane == nullptr) {
+      return;
+    }
+    const bool is_slope = plane->gradient.norm() >= options_.min_gradient;
+    const Eigen::Vector3d normal =
+        is_slope ? Eigen::Vector3d(-plane->gradient.x(), -plane->gradient.y(), 1.0).normalized()
+                 : Eigen::Vector3d::UnitZ();
+    const double residual = height_m * normal.z();
+    const double robust = RobustWeight(residual, 0.4 * stage.reach_m);
+    const double weight = robust / (options_.ground_sigma_m * options_.ground_sigma_m);
+    ++equations.ground;
+    equations.fit += robust;
+    equations.Add(normal, arm.cast<double>(), residual, weight);
+  }
+
+  const MapWindow& map_;
+  const ScanFeatures& features_;
+  const RegistrationOptions& options_;
+};
+
+// The levelled frame is upright within the IMU's error: roll and pitch stay near 0.
+void AddTiltPrior(const Pose& pose, double sigma_rad, NormalEquations& equations) {
+  const Eigen::Vector3d up = pose.linear().col(2);
+  const double weight = 1.0 / (sigma_rad * sigma_rad);
+  for (int axis = 3; axis < 5; ++axis) {
+    // A rotation w turns the vertical by w x up: about x it moves y by -w.
+    const double tilt = axis == 3 ? -up.y() : up.x();
+    equations.H(axis, axis) += weight;
+    equations.g(axis) += weight * tilt;
+  }
+}
+
+void AddStartPrior(const Pose& pose,
+                   const Pose& start,
+                   const RegistrationOptions& options,
+                   NormalEquations& equations) {
+  const double translation = 1.0 / (options.start_sigma_m * options.start_sigma_m);
+  const double rotation = 1.0 / (options.start_sigma_rad * options.start_sigma_rad);
+  const Eigen::AngleAxisd turned(pose.linear() * start.linear().transpose());
+  equations.H.diagonal().head<3>().array() += translation;
+  equations.g.head<3>() += translation * (pose.translation() - start.translation());
+  equations.H(5, 5) += rotation;
+  equations.g(5) += rotation * turned.angle() * turned.axis().z();
+}
+
+Pose Moved(const Pose& pose, const Vector6d& step) {
+  Pose moved = pose;
+  moved.translation() += step.head<3>();
+  const double angle = step.tail<3>().norm();
+  if (angle > 0.0) {
+    moved.linear() =
+        Eigen::AngleAxisd(angle, step.tail<3>() / angle).toRotationMatrix() * pose.linear();
+  }
+  return moved;
+}
+
+double Share(int part, std::size_t whole) {
+  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+}  // namespace
+
+RegistrationResult Register(const MapWindow& map,
+                            const ScanFeatures& features,
+                            const Pose& T_world_level_start,
+                            const RegistrationOptions& options) {
+  const Problem problem(map, features, options);
+  const Stage fine{options.fine_radius_m, options.fine_reach_m};
+  RegistrationResult result;
+  result.T_world_level = T_world_level_start;
+  for (int iteration = 0; iteration < options.max_iterations && !result.is_converged; ++iteration) {
+    const bool is_coarse = iteration < options.coarse_iterations;
+    const float left = is_coarse ? 1.0F - static_cast<float>(iteration) /
+                                              static_cast<float>(options.coarse_iterations)
+                                 : 0.0F;
+    const Stage stage{
+        options.fine_radius_m + left * (options.coarse_radius_m - options.fine_radius_m),
+        options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m)};
+    NormalEquations equations = problem.Linearize(result.T_world_level, stage);
+    AddTiltPrior(result.T_world_level, options.tilt_sigma_rad, equations);
+    AddStartPrior(result.T_world_level, T_world_level_start, options, equations);
+    const Matrix6d H = equations.H.selfadjointView<Eigen::Lower>();
+    const Vector6d step = H.ldlt().solve(-equations.g);
+    result.T_world_level = Moved(result.T_world_level, step);
+    result.is_converged = !is_coarse && step.head<3>().norm() < options.converged_m &&
+                          step.tail<3>().norm() < options.converged_rad;
+  }
+  const NormalEquations last = problem.Linearize(result.T_world_level, fine);
+  result.information = last.H.selfadjointView<Eigen::Lower>();
+  result.matched_columns = last.columns;
+  const std::size_t points = features.columns.size() + features.ground.size();
+  result.fit = points == 0 ? 0.0 : last.fit / static_cast<double>(points);
+  result.column_inliers = Share(last.columns, features.columns.size());
+  result.ground_inliers = Share(last.ground, features.ground.size());
+  return result;
+}
+
+}  // namespace atlas

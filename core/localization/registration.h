@@ -1,0 +1,47 @@
+// Fits a scan into a map window: Gauss-Newton on SE(3) with a robust kernel, coarse to fine.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+#include "core/localization/map_window.h"
+#include "core/localization/scan_features.h"
+
+namespace atlas {
+
+struct RegistrationOptions {
+  float coarse_radius_m = 1.2F;  // how far a column is looked for at first ...
+  float fine_radius_m = 0.4F;    // ... and in the end
+  float coarse_reach_m = 0.6F;   // the same for the ground's height
+  float fine_reach_m = 0.2F;
+  float column_sigma_m = 0.12F;
+  float ground_sigma_m = 0.05F;
+  double tilt_sigma_rad = 0.0087;  // the IMU's: 0.5 degrees
+  // How well the start is known: where nothing seen holds the vehicle, it stays there.
+  double start_sigma_m = 0.5;
+  double start_sigma_rad = 0.03;
+  // Gentler slopes do not hold a vehicle in the horizontal: their gradient is mostly noise.
+  float min_gradient = 0.03F;
+  int coarse_iterations = 8;
+  int max_iterations = 30;
+  double converged_m = 2e-4;
+  double converged_rad = 2e-5;
+};
+
+struct RegistrationResult {
+  Pose T_world_level = Pose::Identity();
+  // Of (translation, rotation vector), world axes, about the sensor.
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  double column_inliers = 0.0;  // share of column points that found a line, 0..1
+  double ground_inliers = 0.0;
+  int matched_columns = 0;
+  double fit = 0.0;  // mean robust weight over all points, unmatched ones 0: 0..1
+  bool is_converged = false;
+};
+
+RegistrationResult Register(const MapWindow& map,
+                            const ScanFeatures& features,
+                            const Pose& T_world_level_start,
+                            const RegistrationOptions& options);
+
+}  // namespace atlas

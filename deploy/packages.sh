@@ -1,0 +1,33 @@
+# Debian 12 packages, by purpose; sourced by the scripts beside it.
+BUILD_PACKAGES=(
+  g++ cmake ninja-build ccache pkg-config git
+  libboost1.81-dev libboost-json1.81-dev
+  libeigen3-dev libexpected-dev libzstd-dev libxxhash-dev
+  libprotobuf-dev protobuf-compiler
+  libsqlite3-dev libsqlitecpp-dev
+  libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev
+  libssl-dev libpng-dev
+)
+TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format python3 xz-utils)
+BENCH_PACKAGES=(libbenchmark-dev)
+
+# install_packages PACKAGE...: asks apt only for what is missing.
+install_packages() {
+  local missing=() package
+  for package in "$@"; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
+  done
+  if ((${#missing[@]} == 0)); then
+    return
+  fi
+  local sudo=()
+  if ((EUID != 0)); then
+    command -v sudo >/dev/null || {
+      echo "missing packages: ${missing[*]}; run as root or install sudo" >&2
+      return 1
+    }
+    sudo=(sudo)
+  fi
+  "${sudo[@]}" apt-get update -qq
+  "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+}

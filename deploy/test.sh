@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize] [--long]
+#   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, and TSan over
+#               the tests labelled threads
+#   --long      the tests labelled long too, at their full scale
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+sanitize=0
+long=0
+for argument in "$@"; do
+  case $argument in
+    --sanitize) sanitize=1 ;;
+    --long) long=1 ;;
+    *) echo "usage: deploy/test.sh [--sanitize] [--long]" >&2; exit 2 ;;
+  esac
+done
+. deploy/packages.sh
+. deploy/data.sh
+install_packages "${BUILD_PACKAGES[@]}" "${TEST_PACKAGES[@]}"
+find_data "$root"
+[[ -n ${ATLAS_DATA:-} ]] || echo "ATLAS_DATA is not set and ../shared/data is not there: tests on real drives will be skipped"
+
+# run PRESET CTEST_ARGUMENT...: configures, builds, tests.
+run() {
+  local preset=$1
+  shift
+  echo "== $preset"
+  cmake --preset "$preset" >/dev/null
+  cmake --build "build/$preset"
+  ctest --test-dir "build/$preset" --output-on-failure --no-tests=error --timeout 900 -j 2 "$@"
+}
+
+export ATLAS_TEST_SCALE=${ATLAS_TEST_SCALE:-1}
+if ((long)); then
+  ATLAS_TEST_LONG=1 run dev
+else
+  run dev -LE long
+fi
+if ((sanitize)); then
+  export ATLAS_TEST_SCALE=0.1
+  run asan -L 'unit|integration' -LE 'long|data'
+  run tsan -L threads -LE long
+fi

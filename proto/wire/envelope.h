@@ -1,0 +1,29 @@
+// Envelopes in and out of frames: hostile bytes to a Protobuf message with every count capped
+// before Protobuf allocates for it, and a message to a whole frame.
+#pragma once
+
+#include "proto/roadatlas/v1/atlas.pb.h"
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+#include "proto/wire/frame.h"
+
+namespace atlas {
+
+namespace wire = roadatlas::v1;
+
+// Elements of one repeated field in one envelope: poses of a batch, sessions of a reply.
+inline constexpr std::uint32_t kMaxRepeatedFields = 1u << 18;
+// Fields this build does not know, in one envelope; they are skipped and dropped.
+inline constexpr std::uint32_t kMaxUnknownFields = 1024;
+
+// The payload of one frame. kInvalidData when it is not an Envelope, kResourceExhausted when it is
+// larger than a frame may be or breaks one of the limits above. An envelope whose body this build
+// does not know parses, with BODY_NOT_SET.
+Result<wire::Envelope> ParseEnvelope(ByteSpan payload);
+
+// Header and payload, ready to be written. kResourceExhausted when the payload is above
+// kMaxFrameBytes.
+Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope);
+
+}  // namespace atlas

@@ -1,0 +1,121 @@
+#include "proto/wire/frame.h"
+
+#include <array>
+#include <cassert>
+#include <utility>
+
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+// Frozen: "RAF1" (Road Atlas frame, version 1).
+constexpr std::array<std::uint8_t, 4> kMagic = {'R', 'A', 'F', '1'};
+
+std::uint32_t PayloadChecksum(ByteSpan payload) {
+  return static_cast<std::uint32_t>(Hash64(payload));
+}
+
+bool StartsWithMagic(ByteSpan bytes) {
+  for (std::size_t i = 0; i < kMagic.size() && i < bytes.size(); ++i) {
+    if (bytes[i] != kMagic[i]) {
+      return false;
+    }
+  }
+  return true;
+}
+
+Status BadMagic() {
+  return Status(StatusCode::kInvalidData,
+                "frame: the first bytes are not RAF1; is this another protocol or port?");
+}
+
+}  // namespace
+
+Bytes EncodeFrameHeader(ByteSpan payload) {
+  assert(payload.size() <= kMaxFrameBytes);
+  ByteWriter out;
+  for (const std::uint8_t byte : kMagic) {
+    out.U8(byte);
+  }
+  out.U32(static_cast<std::uint32_t>(payload.size()));
+  out.U32(PayloadChecksum(payload));
+  return out.Take();
+}
+
+Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload_bytes) {
+  assert(header.size() == kFrameHeaderBytes);
+  if (!StartsWithMagic(header)) {
+    return Error(BadMagic());
+  }
+  ByteReader in(header.subspan(kMagic.size()));
+  FrameHeader result;
+  result.payload_bytes = in.U32();
+  result.checksum = in.U32();
+  if (result.payload_bytes > max_payload_bytes) {
+    return Error(StatusCode::kResourceExhausted,
+                 StrCat("frame: payload of ", result.payload_bytes, " bytes, expected at most ",
+                        max_payload_bytes));
+  }
+  return result;
+}
+
+Status CheckFramePayload(const FrameHeader& header, ByteSpan payload) {
+  if (payload.size() != header.payload_bytes || PayloadChecksum(payload) != header.checksum) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("frame: payload of ", payload.size(),
+                         " bytes does not have the checksum of its header"));
+  }
+  return {};
+}
+
+FrameDecoder::FrameDecoder(std::uint32_t max_payload_bytes)
+    : max_payload_bytes_(max_payload_bytes) {}
+
+void FrameDecoder::Push(ByteSpan bytes) {
+  if (failure_) {
+    return;
+  }
+  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(consumed_));
+  consumed_ = 0;
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+}
+
+Result<std::optional<Bytes>> FrameDecoder::Next() {
+  if (failure_) {
+    return Error(*failure_);
+  }
+  auto frame = TakeFrame();
+  if (!frame) {
+    failure_ = frame.error();
+    buffer_ = {};
+    consumed_ = 0;
+  }
+  return frame;
+}
+
+Result<std::optional<Bytes>> FrameDecoder::TakeFrame() {
+  const ByteSpan pending = ByteSpan(buffer_).subspan(consumed_);
+  if (!StartsWithMagic(pending)) {
+    return Error(BadMagic());
+  }
+  if (pending.size() < kFrameHeaderBytes) {
+    return std::nullopt;
+  }
+  const auto header = DecodeFrameHeader(pending.first(kFrameHeaderBytes), max_payload_bytes_);
+  if (!header) {
+    return Error(header.error());
+  }
+  if (pending.size() - kFrameHeaderBytes < header->payload_bytes) {
+    return std::nullopt;
+  }
+  const ByteSpan payload = pending.subspan(kFrameHeaderBytes, header->payload_bytes);
+  if (Status status = CheckFramePayload(*header, payload); !status.ok()) {
+    return Error(std::move(status));
+  }
+  consumed_ += kFrameHeaderBytes + payload.size();
+  return Bytes(payload.begin(), payload.end());
+}
+
+}  // namespace atlas

@@ -1,0 +1,65 @@
+#include "core/base/compression.h"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "core/base/hash.h"
+
+namespace atlas {
+namespace {
+
+Bytes SomeText() {
+  std::mt19937 random(3);
+  Bytes bytes(3'000);
+  for (auto& byte : bytes) {
+    byte = static_cast<std::uint8_t>(random() % 7);
+  }
+  return bytes;
+}
+
+TEST(CompressionTest, RoundTrip) {
+  const Bytes text = SomeText();
+  const Bytes frame = Compress(text, 3);
+  EXPECT_LT(frame.size(), text.size());
+  EXPECT_EQ(Decompress(frame, text.size()).value(), text);
+  EXPECT_EQ(Decompress(Compress({}, 3), 0).value(), Bytes());
+}
+
+TEST(CompressionTest, RefusesAnotherDeclaredSize) {
+  const Bytes text = SomeText();
+  const Bytes frame = Compress(text, 3);
+  const auto result = Decompress(frame, text.size() + 1);
+  ASSERT_FALSE(result.has_value());
+  EXPECT_EQ(result.error().code(), StatusCode::kInvalidData);
+}
+
+TEST(CompressionTest, RefusesTruncationAndTrailingBytes) {
+  const Bytes text = SomeText();
+  Bytes frame = Compress(text, 3);
+  for (std::size_t size = 0; size < frame.size(); ++size) {
+    EXPECT_FALSE(Decompress(ByteSpan(frame).first(size), text.size()).has_value()) << size;
+  }
+  frame.push_back(0);
+  EXPECT_FALSE(Decompress(frame, text.size()).has_value());
+}
+
+TEST(CompressionTest, AFlippedBitNeverChangesTheContent) {
+  const Bytes text = SomeText();
+  const Bytes frame = Compress(text, 3);
+  for (std::size_t bit = 0; bit < 8 * frame.size(); ++bit) {
+    Bytes damaged = frame;
+    damaged[bit / 8] = static_cast<std::uint8_t>(damaged[bit / 8] ^ (1u << (bit % 8)));
+    const auto result = Decompress(damaged, text.size());
+    EXPECT_TRUE(!result || *result == text) << "bit " << bit;
+  }
+}
+
+TEST(HashTest, GoldenValuesOfXxh64) {
+  EXPECT_EQ(Hash64({}), 0xEF46DB3751D8E999ULL);
+  const Bytes abc{'a', 'b', 'c'};
+  EXPECT_EQ(Hash64(abc), 0x44BC2CF5AD770999ULL);
+}
+
+}  // namespace
+}  // namespace atlas

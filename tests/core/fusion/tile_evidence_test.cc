@@ -1,0 +1,97 @@
+// Tiny worlds: the occupancy and columns that fusion makes of a handful of keyframes.
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/geometry/nibble.h"
+#include "tests/core/fusion/deck_world.h"
+
+namespace atlas {
+namespace {
+
+using testing::Middle;
+using testing::See;
+
+TEST(TileEvidenceTest, AMovingObjectIsGoneAfterMisses) {
+  std::vector<PlacedKeyframe> keyframes;
+  std::uint32_t sequence = 0;
+  const auto pass = [&](int count, Occupancy occupancy, std::uint64_t column) {
+    for (int i = 0; i < count; ++i) {
+      const testing::FrameName name{"car", "a", sequence++};
+      keyframes.push_back(See({.occupancy = occupancy, .column = column}, name));
+    }
+  };
+  // However long it stood: evidence saturates, so that a bounded number of misses removes it.
+  pass(50, Occupancy::kObstacle, 0x000000CC);
+  ASSERT_FALSE(Middle(keyframes)[0].is_traversable());
+  EXPECT_EQ(Middle(keyframes)[0].column & 15, 15u);
+  pass(6, Occupancy::kFree, 0x00000066);
+  const TileLayer layer = Middle(keyframes)[0];
+  EXPECT_TRUE(layer.is_traversable());
+  EXPECT_LT(layer.column & 15, kNibbleUnknown);
+}
+
+TEST(TileEvidenceTest, SessionsFoldInTheOrderOfTheirLastObservation) {
+  // Full evidence for, then full evidence against: neutral. The other way round as well, but three
+  // sessions for, saturating, then one against leaves nothing of the three.
+  const auto session = [](const char* name, std::uint32_t first, Occupancy occupancy) {
+    std::vector<PlacedKeyframe> keyframes;
+    for (std::uint32_t i = 0; i < 20; ++i) {
+      keyframes.push_back(See({.occupancy = occupancy}, {"car", name, first + i}));
+    }
+    return keyframes;
+  };
+  const auto occupancy_of = [&](std::uint32_t time_of_misses) {
+    std::vector<PlacedKeyframe> all;
+    for (const auto& part :
+         {session("x", 0, Occupancy::kObstacle), session("y", 100, Occupancy::kObstacle),
+          session("a", time_of_misses, Occupancy::kFree)}) {
+      all.insert(all.end(), part.begin(), part.end());
+    }
+    return Middle(all)[0].occupancy;
+  };
+  EXPECT_EQ(occupancy_of(200), 0);  // 64, 64 (clamped), 0
+  EXPECT_EQ(occupancy_of(50), 64);  // 64, 0, 64
+}
+
+TEST(TileEvidenceTest, EvidenceFoldsByTimeNotBySequence) {
+  // Hits saturate at +64 in four; one miss before or after them differs.
+  const auto occupancy_with_miss_at = [](std::int64_t time_ms) {
+    std::vector<PlacedKeyframe> keyframes;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      keyframes.push_back(See({.occupancy = Occupancy::kObstacle}, {"car", "a", i}));
+    }
+    keyframes.push_back(See({.occupancy = Occupancy::kFree}, {"car", "a", 9}));
+    keyframes.back().time_ms = time_ms;
+    return Middle(keyframes)[0].occupancy;
+  };
+  EXPECT_EQ(occupancy_with_miss_at(1'000), 64 - 12);
+  EXPECT_EQ(occupancy_with_miss_at(-1), 64);
+}
+
+TEST(TileEvidenceTest, ColumnsStandOnTheWorldsLattice) {
+  // Deck at 0.2 m, base offset 0.3 m: the base segment is [0, 1) m. The sensor is at 2.2 m, whose
+  // nearest lattice index is 2, so that the keyframe's segments start at index 0.
+  const auto layers = Middle({See({.z_m = 0.2, .column = 0x000006C0}, {})});
+  EXPECT_EQ(layers[0].column, 0x00000'6C0u);
+  // The deck at 0.8 m stands in segment [1, 2) m; the sensor at 2.8 m is nearest to index 3.
+  EXPECT_EQ(Middle({See({.z_m = 0.8, .column = 0x000006C0}, {})})[0].column, 0x00000'6C0u);
+  // At 0.6 m the sensor's index rounds up to 3 while the deck still stands in [0, 1) m.
+  EXPECT_EQ(Middle({See({.z_m = 0.6, .column = 0x000006C0}, {})})[0].column, 0x00006C00u);
+}
+
+TEST(TileEvidenceTest, ColumnsNeverCrossTheNextDeck) {
+  const std::uint64_t full = 0xCCCCCCCC;
+  const auto alone = Middle({See({.z_m = 0.0, .column = full}, {"car", "a", 1})});
+  EXPECT_EQ(alone[0].column, full);
+  const auto layers = Middle({See({.z_m = 0.0, .column = full}, {"car", "a", 1}),
+                              See({.z_m = 5.5, .column = full}, {"car", "b", 1})});
+  ASSERT_EQ(layers.size(), 2u);
+  // 5.5 m - 0.7 m slab: segments 0..3 of 1 m.
+  EXPECT_EQ(layers[0].column, 0x0000CCCCu);
+  // Deck at 5.5 m: the sensor's 7.5 m round to 8, so that its segments start at 6; base is 5.
+  EXPECT_EQ(layers[1].column, 0xCCCCCCC0u);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,162 @@
+#include "core/keyframe/keyframe_codec.h"
+
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "core/base/hash.h"
+#include "tests/core/support/golden.h"
+#include "tests/core/support/keyframe_worlds.h"
+
+namespace atlas {
+namespace {
+
+using testing::BlankKeyframe;
+using testing::RandomKeyframe;
+using testing::StreetKeyframe;
+
+// Replaces the checksum at the end, so that what lies behind it is tested.
+Bytes WithChecksum(Bytes blob) {
+  blob.resize(blob.size() - 8);
+  ByteWriter out;
+  out.Raw(blob);
+  out.U64(Hash64(blob));
+  return out.Take();
+}
+
+StatusCode DecodeError(ByteSpan blob) {
+  const auto result = DecodeKeyframe(blob);
+  return result ? StatusCode::kOk : result.error().code();
+}
+
+TEST(KeyframeCodecTest, RandomKeyframesReadBack) {
+  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+    const std::int32_t radius = 1 + static_cast<std::int32_t>(seed % 21);
+    MapProfile profile;
+    profile.column_segments = static_cast<std::uint8_t>(2u << (seed % 4));
+    const Keyframe keyframe = RandomKeyframe(profile, radius, seed);
+    ASSERT_TRUE(ValidateKeyframe(keyframe).ok());
+    const Bytes blob = EncodeKeyframe(keyframe);
+    const auto decoded = DecodeKeyframe(blob);
+    ASSERT_TRUE(decoded.has_value()) << decoded.error().message();
+    EXPECT_EQ(*decoded, keyframe) << "seed " << seed;
+    EXPECT_EQ(EncodeKeyframe(*decoded), blob);
+  }
+}
+
+TEST(KeyframeCodecTest, ExtremeAltitudesReadBack) {
+  Keyframe keyframe = BlankKeyframe(MapProfile(), 2);
+  const std::int16_t low = std::numeric_limits<std::int16_t>::min();
+  const std::int16_t high = std::numeric_limits<std::int16_t>::max();
+  for (std::size_t i = 0; i < keyframe.cells.size(); ++i) {
+    keyframe.cells[i] = {i % 2 == 0 ? low : high, Occupancy::kFree, AltitudeSource::kMeasured};
+    keyframe.columns[i] = ~std::uint64_t{0};
+  }
+  keyframe.anchors = {low};
+  EXPECT_EQ(DecodeKeyframe(EncodeKeyframe(keyframe)).value(), keyframe);
+}
+
+TEST(KeyframeCodecTest, AKeyframeThatSawNothingReadsBack) {
+  const Keyframe keyframe = BlankKeyframe(MapProfile(), 200);
+  const Bytes blob = EncodeKeyframe(keyframe);
+  EXPECT_LT(blob.size(), 200u);
+  EXPECT_EQ(DecodeKeyframe(blob).value(), keyframe);
+}
+
+TEST(KeyframeCodecTest, HeaderIsReadWithoutTheRest) {
+  Keyframe keyframe = StreetKeyframe(MapProfile(), 20, 1);
+  keyframe.level_quaternion = {1'073'554'091, 0, 20'077'802, 0};
+  const auto header = ReadKeyframeHeader(EncodeKeyframe(keyframe));
+  ASSERT_TRUE(header.has_value()) << header.error().message();
+  EXPECT_EQ(header->profile_hash, MapProfile().Hash());
+  EXPECT_EQ(header->grid, keyframe.grid);
+  EXPECT_EQ(header->level_quaternion, keyframe.level_quaternion);
+  EXPECT_EQ(header->sensor_height_mm, 1'730);
+  EXPECT_TRUE(CheckKeyframeProfile(*header, MapProfile()).ok());
+}
+
+TEST(KeyframeCodecTest, RefusesAnotherProfile) {
+  const auto header = ReadKeyframeHeader(EncodeKeyframe(BlankKeyframe(MapProfile(), 4)));
+  MapProfile other;
+  other.slab_margin_mm = 0;
+  EXPECT_EQ(CheckKeyframeProfile(*header, other).code(), StatusCode::kInvalidData);
+  KeyframeHeader lying = *header;
+  lying.grid.cell_size_um = 200'000;
+  EXPECT_EQ(CheckKeyframeProfile(lying, MapProfile()).code(), StatusCode::kInvalidData);
+}
+
+TEST(KeyframeCodecTest, RefusesTruncationAtEveryByte) {
+  const Bytes blob = EncodeKeyframe(RandomKeyframe(MapProfile(), 8, 3));
+  for (std::size_t size = 0; size < blob.size(); ++size) {
+    EXPECT_EQ(DecodeError(ByteSpan(blob).first(size)), StatusCode::kInvalidData) << size;
+  }
+}
+
+TEST(KeyframeCodecTest, RefusesEveryFlippedBit) {
+  const Bytes blob = EncodeKeyframe(RandomKeyframe(MapProfile(), 6, 4));
+  for (std::size_t bit = 0; bit < 8 * blob.size(); ++bit) {
+    Bytes damaged = blob;
+    damaged[bit / 8] = static_cast<std::uint8_t>(damaged[bit / 8] ^ (1u << (bit % 8)));
+    EXPECT_NE(DecodeError(damaged), StatusCode::kOk) << "bit " << bit;
+  }
+}
+
+TEST(KeyframeCodecTest, RefusesTrailingBytes) {
+  Bytes blob = EncodeKeyframe(BlankKeyframe(MapProfile(), 4));
+  blob.push_back(0);
+  EXPECT_EQ(DecodeError(blob), StatusCode::kInvalidData);
+  EXPECT_EQ(DecodeError(WithChecksum(blob)), StatusCode::kInvalidData);
+}
+
+TEST(KeyframeCodecTest, SaysThatANewerVersionIsUnsupported) {
+  Bytes blob = EncodeKeyframe(BlankKeyframe(MapProfile(), 4));
+  blob[4] = 2;
+  EXPECT_EQ(DecodeError(blob), StatusCode::kUnsupported);
+  EXPECT_EQ(ReadKeyframeHeader(blob).error().code(), StatusCode::kUnsupported);
+}
+
+// Headers that lie, with a checksum that fits: offsets of docs/formats/keyframe.md.
+TEST(KeyframeCodecTest, RefusesLyingHeaders) {
+  const Bytes blob = EncodeKeyframe(BlankKeyframe(MapProfile(), 4));
+  const auto with_u16 = [&](std::size_t offset, unsigned value) {
+    Bytes bad = blob;
+    bad[offset] = static_cast<std::uint8_t>(value);
+    bad[offset + 1] = static_cast<std::uint8_t>(value >> 8);
+    return WithChecksum(bad);
+  };
+  EXPECT_EQ(DecodeError(WithChecksum(blob)), StatusCode::kOk);
+  EXPECT_EQ(DecodeError(with_u16(17, 0)), StatusCode::kInvalidData);       // radius
+  EXPECT_EQ(DecodeError(with_u16(17, 1'025)), StatusCode::kInvalidData);   // radius
+  EXPECT_EQ(DecodeError(with_u16(17, 5)), StatusCode::kInvalidData);       // another radius
+  EXPECT_EQ(DecodeError(with_u16(15, 1'000)), StatusCode::kInvalidData);   // 65 m cells
+  EXPECT_EQ(DecodeError(with_u16(21, 0)), StatusCode::kInvalidData);       // short quaternion
+  EXPECT_EQ(DecodeError(with_u16(41, 0xFFFF)), StatusCode::kInvalidData);  // a huge body
+}
+
+TEST(KeyframeCodecTest, ValidateNamesWhatIsWrong) {
+  Keyframe keyframe = BlankKeyframe(MapProfile(), 4);
+  keyframe.columns[5] = 1;
+  EXPECT_NE(ValidateKeyframe(keyframe).message().find("cell 5"), std::string::npos);
+  keyframe = BlankKeyframe(MapProfile(), 4);
+  keyframe.cells[6].altitude_mm = 1;
+  EXPECT_FALSE(ValidateKeyframe(keyframe).ok());
+  keyframe = BlankKeyframe(MapProfile(), 4);
+  keyframe.cells[6].source = static_cast<AltitudeSource>(4);
+  EXPECT_FALSE(ValidateKeyframe(keyframe).ok());
+  keyframe = BlankKeyframe(MapProfile(), 4);
+  keyframe.anchors.push_back(0);
+  EXPECT_FALSE(ValidateKeyframe(keyframe).ok());
+}
+
+TEST(KeyframeCodecTest, GoldenFileReadsAndEncodesEqual) {
+  const Keyframe keyframe = RandomKeyframe(MapProfile(), 6, 42);
+  const Bytes golden = testing::GoldenFile("keyframe_v1.bin", EncodeKeyframe(keyframe));
+  const auto decoded = DecodeKeyframe(golden);
+  ASSERT_TRUE(decoded.has_value()) << decoded.error().message();
+  EXPECT_EQ(*decoded, keyframe);
+  EXPECT_EQ(EncodeKeyframe(*decoded), golden);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,102 @@
+#!/usr/bin/python3
+"""The floors of the house (docs/architecture.md) as a test: who may include whom.
+
+Usage: include_rule_test.py SOURCE_DIR. Prints each broken rule and exits 1 if there is one.
+"""
+
+import pathlib
+import re
+import sys
+
+# Folder -> folders of this repository that its files may include, besides their own. A folder that is
+# not listed here must not hold sources.
+FLOOR_1 = ["core/base", "core/geometry"]
+FLOOR_2 = FLOOR_1 + ["core/scan"]
+FLOOR_3 = FLOOR_2 + ["core/traversability", "core/grid", "core/column"]
+FLOOR_4 = FLOOR_3 + ["core/keyframe", "core/tile"]
+CORE = FLOOR_4 + ["core/fusion", "core/localization", "core/planning", "core/simulation"]
+WIRE = ["proto/wire", "proto/roadatlas/v1"]
+ALLOWED = {
+    "core/base": [],
+    "core/geometry": ["core/base"],
+    "core/scan": FLOOR_1,
+    "core/traversability": FLOOR_2,
+    "core/grid": FLOOR_2,
+    "core/column": FLOOR_2,
+    "core/keyframe": FLOOR_3,
+    "core/tile": FLOOR_3,
+    "core/fusion": FLOOR_4,
+    "core/localization": FLOOR_4,
+    "core/planning": FLOOR_4,
+    "core/simulation": FLOOR_4 + ["core/simulation/worlds"],
+    "core/simulation/worlds": FLOOR_4 + ["core/simulation"],
+    "proto/wire": FLOOR_1 + ["proto/roadatlas/v1"],
+    "server/store": FLOOR_1,
+    "server/store/sqlite": FLOOR_1 + ["server/store"],
+    "client": CORE + WIRE,
+    "client/render": CORE,
+    "server/service": CORE + ["server/store"],
+    "server/net": FLOOR_1 + WIRE + ["server/service", "server/store"],
+    "server/config": FLOOR_1,
+    "server": FLOOR_1 + ["server/config", "server/net", "server/service", "server/store",
+                         "server/store/sqlite"],
+    "client/cli": CORE + ["client", "client/render"],
+}
+# Libraries that stay behind a few doors: pattern -> folders that may include it.
+FENCED = {
+    r"<boost/asio|<boost/beast": ["server/net", "server", "client"],
+    r"\.pb\.h\"": ["proto/wire", "server/net", "client"],
+    r"<SQLiteCpp|<sqlite3": ["server/store/sqlite"],
+    r"<CLI/": ["client/cli", "server/config"],
+    r"<toml\+\+": ["server/config"],
+    r"<spdlog": ["server", "server/config", "server/net", "server/service", "server/store",
+                 "server/store/sqlite"],
+    r"<chrono>|<random>|<thread>|<mutex>|<ctime>": None,  # None: anywhere but core
+    r"<zstd|<xxhash": ["core/base"],
+    r"<png": ["client/render"],
+}
+INCLUDE = re.compile(r'^\s*#\s*include\s+([<"][^>"]+[>"])', re.M)
+
+
+def broken_rules(root):
+    for side in ("core", "proto", "server", "client"):
+        for path in sorted((root / side).rglob("*")):
+            if path.suffix not in (".h", ".cc"):
+                continue
+            folder = path.parent.relative_to(root).as_posix()
+            if folder not in ALLOWED:
+                yield path, f"folder {folder} has no floor: add it to docs/architecture.md and here"
+                continue
+            for include in INCLUDE.findall(path.read_text(encoding="utf-8")):
+                yield from check(path, folder, include)
+
+
+def check(path, folder, include):
+    if include.startswith('"'):
+        target = include.strip('"').rpartition("/")[0]
+        if target != folder and target not in ALLOWED[folder]:
+            yield path, f"includes {include}: {folder} may not see {target or 'the top'}"
+    for pattern, doors in FENCED.items():
+        if re.search(pattern, include):
+            if doors is None and folder.startswith("core/"):
+                yield path, f"includes {include}: core has no clock, threads or randomness"
+            elif doors is not None and folder not in doors:
+                yield path, f"includes {include}: only {', '.join(doors)} may"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1])
+    found = list(broken_rules(root))
+    for path, message in found:
+        print(f"{path.relative_to(root)}: {message}")
+    files = sum(1 for side in ("core", "proto", "server", "client")
+                for path in (root / side).rglob("*") if path.suffix in (".h", ".cc"))
+    if files == 0:
+        print(f"no sources below {root}")
+        return 1
+    print(f"{files} files, {len(found)} broken rules")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,60 @@
+// Wire values to core's types and back, and the ones that must not come through.
+#include "proto/wire/convert.h"
+
+#include <gtest/gtest.h>
+
+namespace atlas {
+namespace {
+
+TEST(ConvertTest, KeyRoundTrips) {
+  const KeyframeKey key{{"bus-7", "2026.01_a"}, 4'000'000'000u};
+  EXPECT_EQ(KeyFromWire(KeyToWire(key)).value(), key);
+}
+
+TEST(ConvertTest, RefusesANameThatIsNone) {
+  wire::KeyframeKey message = KeyToWire({{"bus", "day"}, 1});
+  message.set_vehicle("../etc");
+  EXPECT_EQ(KeyFromWire(message).error().code(), StatusCode::kInvalidArgument);
+}
+
+TEST(ConvertTest, PoseRoundTrips) {
+  Pose pose = Pose::Identity();
+  pose.rotate(Eigen::AngleAxisd(-2.5, Eigen::Vector3d(0.1, -0.2, 1.0).normalized()));
+  pose.translation() = Eigen::Vector3d(-1234.567891, 98765.4, -12.5);
+  const QuantizedPose quantized = QuantizedPose::FromPose(pose);
+  EXPECT_EQ(PoseFromWire(PoseToWire(quantized)).value(), quantized);
+}
+
+TEST(ConvertTest, RefusesAPoseThatIsNone) {
+  EXPECT_EQ(PoseFromWire(wire::Pose()).error().code(), StatusCode::kInvalidData);
+  wire::Pose far = PoseToWire(QuantizedPose());
+  far.set_x_um(std::int64_t{1} << 62);
+  EXPECT_EQ(PoseFromWire(far).error().code(), StatusCode::kInvalidData);
+}
+
+TEST(ConvertTest, ProfileRoundTrips) {
+  MapProfile profile;
+  profile.cell_size_um = 200'000;
+  EXPECT_EQ(ProfileFromWire(ProfileToWire(profile)).value(), profile);
+  EXPECT_FALSE(ProfileFromWire("").has_value());
+}
+
+TEST(ConvertTest, ErrorsSayWhetherToRetry) {
+  const RemoteError conflict = ErrorFromWire(ErrorToWire({StatusCode::kConflict, "other bytes"}));
+  EXPECT_EQ(conflict.status, Status(StatusCode::kConflict, "other bytes"));
+  EXPECT_FALSE(conflict.retry);
+  const RemoteError down = ErrorFromWire(ErrorToWire({StatusCode::kUnavailable, "draining"}));
+  EXPECT_TRUE(down.retry);
+  EXPECT_GT(down.retry_after_ms, 0u);
+}
+
+TEST(ConvertTest, AnUnknownErrorCodeIsNeverOk) {
+  wire::Error message;
+  for (const int code : {0, -1, 11, 1000}) {
+    message.set_code(code);
+    EXPECT_EQ(ErrorFromWire(message).status.code(), StatusCode::kInternal) << code;
+  }
+}
+
+}  // namespace
+}  // namespace atlas
