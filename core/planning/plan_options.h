@@ -25,7 +25,8 @@ struct PlanOptions {
   double min_support = 0.4;
   // Unknown cells are not traversable, but a hole in a sparse map no longer than this is crossed.
   double max_gap_m = 0.2;
-  // A column segment counts as occupied from here on (a single return is 0.73).
+  // Column segments and cells count as occupied from here on (a single return is 0.73): where hits
+  // and misses balance, a cell is not driven over but does not close what lies around it.
   double occupied_probability = 0.6;
 
   // Driving closer than this to an inflated obstacle costs up to 1 + comfort_weight times as much.

@@ -20,7 +20,8 @@ class Snapper {
   Snapper(SurfaceMap& map, const MapProfile& profile, const PlanOptions& options)
       : map_(map), profile_(profile), options_(options) {}
 
-  // The drivable node nearest in plan.
+  // The drivable node nearest in plan; none where there is a traversable surface, but none that
+  // this vehicle may stand on. kNotFound where there is no such surface at all.
   Result<NodeRef> Snap(const char* what, const Eigen::Vector3d& point) {
     const std::int64_t side = profile_.tile_cells;
     const auto cell_of = [&](double m) {
@@ -38,11 +39,11 @@ class Snapper {
         }
       }
     }
-    if (best.ref.is_none()) {
+    if (!best.is_anything_open) {
       return Error(
           StatusCode::kNotFound,
-          StrCat("plan: no drivable surface within ", reach_m, " m of the ", what, " (", point.x(),
-                 ", ", point.y(), ", ", point.z(), "), expected one between ",
+          StrCat("plan: no traversable surface within ", reach_m, " m of the ", what, " (",
+                 point.x(), ", ", point.y(), ", ", point.z(), "), expected one between ",
                  options_.snap_below_m, " m below and ", options_.snap_above_m, " m above it"));
     }
     return best.ref;
@@ -52,6 +53,7 @@ class Snapper {
   struct Best {
     double distance_m = std::numeric_limits<double>::infinity();
     NodeRef ref;
+    bool is_anything_open = false;
   };
 
   Status SearchTile(const TileId& id, const Eigen::Vector3d& point, Best& best) {
@@ -70,8 +72,13 @@ class Snapper {
         continue;
       }
       const NodeRef ref = Standing(used, cell, point.z());
-      if (!ref.is_none() && map_.IsDrivable(ref)) {
-        best = {distance_m, ref};
+      if (ref.is_none() || !map_.node(ref).Has(SurfaceNode::kOpen)) {
+        continue;
+      }
+      best.is_anything_open = true;
+      if (map_.IsDrivable(ref)) {
+        best.distance_m = distance_m;
+        best.ref = ref;
       }
     }
     return {};
@@ -137,6 +144,25 @@ std::vector<Eigen::Vector3d> ThinOut(const std::vector<Eigen::Vector3d>& points,
   return kept;
 }
 
+Route Describe(const std::vector<NodeRef>& way,
+               const RouteSearch& search,
+               const PlanOptions& options) {
+  Route route;
+  route.found = !way.empty();
+  route.expansions = search.expansions();
+  route.cost = search.cost();
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(way.size());
+  for (const NodeRef& ref : way) {
+    points.push_back(search.Position(ref));
+  }
+  route.waypoints = ThinOut(points, options);
+  for (std::size_t i = 1; i < route.waypoints.size(); ++i) {
+    route.length_m += (route.waypoints[i] - route.waypoints[i - 1]).norm();
+  }
+  return route;
+}
+
 }  // namespace
 
 Result<Route> PlanRoute(TileSource& tiles, const MapProfile& profile, const PlanRequest& request) {
@@ -153,24 +179,16 @@ Result<Route> PlanRoute(TileSource& tiles, const MapProfile& profile, const Plan
   if (!goal) {
     return Error(goal.error());
   }
-  RouteSearch search(map, profile, request.options);
-  const auto way = search.Run(*start, *goal);
-  if (!way) {
-    return Error(way.error());
-  }
   Route route;
-  route.found = !way->empty();
+  if (!start->is_none() && !goal->is_none()) {
+    RouteSearch search(map, profile, request.options);
+    const auto way = search.Run(*start, *goal);
+    if (!way) {
+      return Error(way.error());
+    }
+    route = Describe(*way, search, request.options);
+  }
   route.tiles_loaded = map.tiles_loaded();
-  route.expansions = search.expansions();
-  route.cost = search.cost();
-  std::vector<Eigen::Vector3d> points;
-  for (const NodeRef& ref : *way) {
-    points.push_back(search.Position(ref));
-  }
-  route.waypoints = ThinOut(points, request.options);
-  for (std::size_t i = 1; i < route.waypoints.size(); ++i) {
-    route.length_m += (route.waypoints[i] - route.waypoints[i - 1]).norm();
-  }
   return route;
 }
 

@@ -30,9 +30,10 @@ struct Route {
 };
 
 // The cheapest route for the vehicle that the options describe, over level-0 tiles loaded as
-// needed; found = false when the surfaces that start and goal stand on are not joined. kNotFound:
-// no drivable surface near start or goal; kInvalidArgument: options out of range, or a point
-// outside the world; kResourceExhausted: the limit of expansions or memory; errors of tiles.
+// needed; found = false when the surfaces that start and goal stand on are not joined for this
+// vehicle. kNotFound: no traversable surface near start or goal; kInvalidArgument: options out of
+// range, or a point outside the world; kResourceExhausted: the limit of expansions or memory;
+// tiles' errors.
 Result<Route> PlanRoute(TileSource& tiles, const MapProfile& profile, const PlanRequest& request);
 
 }  // namespace atlas

@@ -2,7 +2,6 @@
 #include "core/planning/route_search.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -39,8 +38,9 @@ Eigen::Vector3d RouteSearch::Position(const NodeRef& ref) const {
   const SurfaceNode& node = tile.nodes[ref.node];
   const std::int64_t side = profile_.tile_cells;
   const double cell_m = profile_.cell_size_m();
-  return {(static_cast<double>(tile.id.x * side + node.cell % side) + 0.5) * cell_m,
-          (static_cast<double>(tile.id.y * side + node.cell / side) + 0.5) * cell_m,
+  const std::int64_t x = tile.id.x * side + node.cell % side;
+  const std::int64_t y = tile.id.y * side + node.cell / side;
+  return {(static_cast<double>(x) + 0.5) * cell_m, (static_cast<double>(y) + 0.5) * cell_m,
           1e-3 * node.altitude_mm};
 }
 

@@ -1,4 +1,4 @@
-// Loading, inflation and the slope of the fitted plane.
+// Loading tiles, and the slope of the plane fitted around a node.
 #include "core/planning/surface_map.h"
 
 #include <algorithm>
@@ -13,17 +13,10 @@
 namespace atlas {
 namespace {
 
-// Surfaces differ in height by no more than this per metre across, be it on the steepest ramp.
+// A sample beyond a step and this much slope belongs to another surface.
 constexpr double kSameSurfaceSlope = 0.7;
-// An obstacle's altitude is that of the ground near it, known to about this much.
-constexpr double kObstacleHeightSlack_m = 0.3;
-constexpr double kClearanceSteps = 250.0;
 // Slope is sampled no denser than this: closer cells share their noise.
 constexpr double kSlopeSampleStep_m = 0.2;
-
-std::int32_t Millimetres(double m) {
-  return static_cast<std::int32_t>(std::lround(m * 1e3));
-}
 
 }  // namespace
 
@@ -32,45 +25,28 @@ SurfaceMap::SurfaceMap(TileSource& source, const MapProfile& profile, const Plan
       profile_(profile),
       options_(options),
       side_(profile.tile_cells),
-      clearance_offsets_(ClearanceOffsets()),
-      slope_offsets_(SlopeOffsets()) {}
+      max_gradient_(std::tan(options.max_slope_deg * std::numbers::pi / 180.0) *
+                    profile.cell_size_m()),
+      inflation_(profile, options),
+      slope_samples_(SlopeSamples()) {}
 
-std::vector<SurfaceMap::Offset> SurfaceMap::ClearanceOffsets() const {
-  const double reach_m = options_.clearance_reach_m();
+std::vector<SurfaceMap::SlopeSample> SurfaceMap::SlopeSamples() const {
   const double cell_m = profile_.cell_size_m();
-  const auto reach = static_cast<std::int32_t>(reach_m / cell_m);
-  std::vector<Offset> offsets;
-  for (std::int32_t dy = -reach; dy <= reach; ++dy) {
-    for (std::int32_t dx = -reach; dx <= reach; ++dx) {
-      const double distance_m = std::hypot(dx, dy) * cell_m;
-      if (distance_m <= reach_m) {
-        const double steps = reach_m > 0.0 ? kClearanceSteps * distance_m / reach_m : 0.0;
-        offsets.push_back({dx, dy,
-                           Millimetres(kObstacleHeightSlack_m + kSameSurfaceSlope * distance_m),
-                           static_cast<std::uint8_t>(std::lround(steps))});
-      }
-    }
-  }
-  return offsets;
-}
-
-std::vector<SurfaceMap::Offset> SurfaceMap::SlopeOffsets() const {
-  const double cell_m = profile_.cell_size_m();
-  const auto step = std::max<std::int32_t>(
-      1, static_cast<std::int32_t>(
-             std::lround(std::min(kSlopeSampleStep_m, options_.slope_radius_m) / cell_m)));
-  const auto reach = static_cast<std::int32_t>(options_.slope_radius_m / cell_m);
-  std::vector<Offset> offsets;
-  for (std::int32_t dy = -(reach / step) * step; dy <= reach; dy += step) {
-    for (std::int32_t dx = -(reach / step) * step; dx <= reach; dx += step) {
-      const double distance_m = std::hypot(dx, dy) * cell_m;
+  const double step_m = std::min(kSlopeSampleStep_m, options_.slope_radius_m);
+  const auto step = std::max(1, static_cast<std::int32_t>(std::lround(step_m / cell_m)));
+  const auto steps = static_cast<std::int32_t>(options_.slope_radius_m / cell_m) / step;
+  std::vector<SlopeSample> samples;
+  for (std::int32_t y = -steps; y <= steps; ++y) {
+    for (std::int32_t x = -steps; x <= steps; ++x) {
+      const double distance_m = std::hypot(x, y) * step * cell_m;
       if (distance_m <= options_.slope_radius_m) {
-        offsets.push_back(
-            {dx, dy, Millimetres(options_.max_step_m + kSameSurfaceSlope * distance_m), 0});
+        const double limit_m = options_.max_step_m + kSameSurfaceSlope * distance_m;
+        samples.push_back(
+            {x * step, y * step, static_cast<std::int32_t>(std::lround(limit_m * 1e3))});
       }
     }
   }
-  return offsets;
+  return samples;
 }
 
 Status SurfaceMap::AddMemory(std::size_t bytes) {
@@ -84,7 +60,7 @@ Status SurfaceMap::AddMemory(std::size_t bytes) {
 }
 
 Result<std::int32_t> SurfaceMap::Load(const TileId& id) {
-  if (const auto known = slots_.find(id); known != slots_.end()) {
+  if (const auto known = slots_.find(id.Key()); known != slots_.end()) {
     return known->second;
   }
   const Result<const Tile*> tile = source_.Get(id);
@@ -103,12 +79,12 @@ Result<std::int32_t> SurfaceMap::Load(const TileId& id) {
       return Error(std::move(status));
     }
   }
-  slots_.emplace(id, slot);
+  slots_.emplace(id.Key(), slot);
   return slot;
 }
 
 Result<std::int32_t> SurfaceMap::Ready(const TileId& id) {
-  const auto slot = Load(id);
+  auto slot = Load(id);
   if (slot && *slot != SurfaceTile::kNotThere) {
     if (Status status = MakeReady(static_cast<std::uint32_t>(*slot)); !status.ok()) {
       return Error(std::move(status));
@@ -122,22 +98,23 @@ Status SurfaceMap::MakeReady(std::uint32_t slot) {
   if (tile.is_ready) {
     return {};
   }
-  for (std::int32_t i = 0; i < 9; ++i) {
-    const TileId id{tile.id.level, tile.id.x + i % 3 - 1, tile.id.y + i / 3 - 1};
+  std::array<const SurfaceTile*, 9> around{};
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    const TileId id{tile.id.level, tile.id.x + static_cast<std::int32_t>(i % 3) - 1,
+                    tile.id.y + static_cast<std::int32_t>(i / 3) - 1};
     const bool is_in_range = std::min(id.x, id.y) >= TileId::kMinCoordinate &&
                              std::max(id.x, id.y) <= TileId::kMaxCoordinate;
-    const auto around = is_in_range ? Load(id) : Result<std::int32_t>(SurfaceTile::kNotThere);
-    if (!around) {
-      return around.error();
+    const auto loaded = is_in_range ? Load(id) : Result<std::int32_t>(SurfaceTile::kNotThere);
+    if (!loaded) {
+      return loaded.error();
     }
-    tile.around[static_cast<std::size_t>(i)] = *around;
+    tile.around[i] = *loaded;
+    if (*loaded != SurfaceTile::kNotThere) {
+      around[i] = tiles_[static_cast<std::size_t>(*loaded)].get();
+    }
   }
   tile.is_ready = true;
-  for (std::size_t i = 0; i < tile.around.size(); ++i) {
-    if (tile.around[i] != SurfaceTile::kNotThere) {
-      InflateInto(tile, i);
-    }
-  }
+  inflation_.Inflate(tile, around);
   return {};
 }
 
@@ -162,108 +139,45 @@ CellNodes SurfaceMap::Cell(const SurfaceTile& home, std::int32_t x, std::int32_t
     return {};
   }
   const SurfaceTile& tile = *tiles_[static_cast<std::size_t>(slot)];
-  const auto cell = static_cast<std::size_t>(y * side_ + x);
+  const auto cell = static_cast<std::uint32_t>(y * side_ + x);
   return {static_cast<std::uint32_t>(slot), tile.cell_begin[cell], tile.cell_begin[cell + 1]};
 }
 
-// Obstacles on all four sides: the disc around it lies in theirs.
-bool SurfaceMap::IsInsideObstacle(const SurfaceTile& tile, const SurfaceNode& node) const {
-  const std::int32_t x = node.cell % side_;
-  const std::int32_t y = node.cell / side_;
-  if (x == 0 || y == 0 || x == side_ - 1 || y == side_ - 1) {
-    return false;
-  }
-  for (const std::int32_t step : {-1, 1, -side_, side_}) {
-    const auto cell = static_cast<std::size_t>(node.cell + step);
-    bool is_obstacle = false;
-    for (std::uint32_t i = tile.cell_begin[cell]; i < tile.cell_begin[cell + 1]; ++i) {
-      const SurfaceNode& other = tile.nodes[i];
-      is_obstacle = is_obstacle || (other.Has(SurfaceNode::kObstacle) &&
-                                    std::abs(std::int64_t{other.altitude_mm} - node.altitude_mm) <=
-                                        Millimetres(kObstacleHeightSlack_m));
-    }
-    if (!is_obstacle) {
-      return false;
+const SurfaceNode* SurfaceMap::SameSurface(const SurfaceTile& home,
+                                           const SurfaceNode& node,
+                                           const SlopeSample& sample) const {
+  const CellNodes cell = Cell(home, node.cell % side_ + sample.dx, node.cell / side_ + sample.dy);
+  std::int64_t nearest_mm = std::int64_t{sample.height_limit_mm} + 1;
+  const SurfaceNode* nearest = nullptr;
+  for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
+    const SurfaceNode& other = tiles_[cell.slot]->nodes[i];
+    const std::int64_t apart_mm = std::abs(std::int64_t{other.altitude_mm} - node.altitude_mm);
+    if (apart_mm < nearest_mm) {
+      nearest_mm = apart_mm;
+      nearest = &other;
     }
   }
-  return true;
+  return nearest;
 }
 
-void SurfaceMap::InflateInto(SurfaceTile& target, std::size_t neighbour) {
-  const SurfaceTile& from = *tiles_[static_cast<std::size_t>(target.around[neighbour])];
-  const std::int32_t shift_x = (static_cast<std::int32_t>(neighbour % 3) - 1) * side_;
-  const std::int32_t shift_y = (static_cast<std::int32_t>(neighbour / 3) - 1) * side_;
-  const auto reach =
-      static_cast<std::int32_t>(options_.clearance_reach_m() / profile_.cell_size_m());
-  const auto is_within_reach = [&](std::int32_t v) {
-    return v >= -reach && v < side_ + reach;
-  };
-  for (const SurfaceNode& node : from.nodes) {
-    const std::int32_t x = shift_x + node.cell % side_;
-    const std::int32_t y = shift_y + node.cell / side_;
-    if (node.Has(SurfaceNode::kObstacle) && is_within_reach(x) && is_within_reach(y) &&
-        !IsInsideObstacle(from, node)) {
-      StampDisc(target, x, y, node.altitude_mm);
-    }
-  }
-}
-
-void SurfaceMap::StampDisc(SurfaceTile& target,
-                           std::int32_t x,
-                           std::int32_t y,
-                           std::int32_t altitude_mm) {
-  for (const Offset& offset : clearance_offsets_) {
-    const std::int32_t cx = x + offset.dx;
-    const std::int32_t cy = y + offset.dy;
-    if (cx < 0 || cy < 0 || cx >= side_ || cy >= side_) {
-      continue;
-    }
-    const auto cell = static_cast<std::size_t>(cy * side_ + cx);
-    for (std::uint32_t i = target.cell_begin[cell]; i < target.cell_begin[cell + 1]; ++i) {
-      SurfaceNode& node = target.nodes[i];
-      if (std::abs(std::int64_t{node.altitude_mm} - altitude_mm) <= offset.height_limit_mm) {
-        node.clearance = std::min(node.clearance, offset.clearance);
-      }
-    }
-  }
-}
-
-double SurfaceMap::Clearance(const SurfaceNode& node) const {
-  const double reach_m = options_.clearance_reach_m();
-  return node.clearance == SurfaceNode::kFar ? reach_m : reach_m * node.clearance / kClearanceSteps;
-}
-
-// Fits a plane to the same surface around the node: what is near in height, measured and free.
+// Whether the surface around the node is known and not too steep. The plane is fitted to what is
+// measured and free.
 bool SurfaceMap::IsGentle(const SurfaceTile& home, const SurfaceNode& node) const {
-  const std::int32_t x = node.cell % side_;
-  const std::int32_t y = node.cell / side_;
   PlaneFit fit;
   std::size_t known = 0;
-  for (const Offset& offset : slope_offsets_) {
-    const CellNodes cell = Cell(home, x + offset.dx, y + offset.dy);
-    std::int32_t nearest_mm = offset.height_limit_mm + 1;
-    const SurfaceNode* nearest = nullptr;
-    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
-      const SurfaceNode& other = tiles_[cell.slot]->nodes[i];
-      const std::int64_t apart_mm = std::abs(std::int64_t{other.altitude_mm} - node.altitude_mm);
-      if (apart_mm < nearest_mm) {
-        nearest_mm = static_cast<std::int32_t>(apart_mm);
-        nearest = &other;
-      }
-    }
-    if (nearest == nullptr) {
+  for (const SlopeSample& sample : slope_samples_) {
+    const SurfaceNode* other = SameSurface(home, node, sample);
+    if (other == nullptr) {
       continue;
     }
     ++known;
-    if (nearest->Has(SurfaceNode::kMeasured) && !nearest->Has(SurfaceNode::kObstacle)) {
-      fit.Add(offset.dx, offset.dy, 1e-3 * (nearest->altitude_mm - node.altitude_mm));
+    if (other->Has(SurfaceNode::kMeasured) && !other->Has(SurfaceNode::kObstacle)) {
+      fit.Add(sample.dx, sample.dy, 1e-3 * (other->altitude_mm - node.altitude_mm));
     }
   }
-  const double support = static_cast<double>(known) / static_cast<double>(slope_offsets_.size());
+  const double support = static_cast<double>(known) / static_cast<double>(slope_samples_.size());
   const auto gradient = fit.Gradient();
-  return support >= options_.min_support && gradient.has_value() &&
-         *gradient <=
-             std::tan(options_.max_slope_deg * std::numbers::pi / 180.0) * profile_.cell_size_m();
+  return support >= options_.min_support && gradient.has_value() && *gradient <= max_gradient_;
 }
 
 bool SurfaceMap::IsDrivable(const NodeRef& ref) {

@@ -1,14 +1,15 @@
-// The part of the atlas that a plan has looked at: tiles loaded as needed, obstacles inflated on
-// their own surface, and the answer to "may a vehicle's middle be here?".
+// The part of the atlas that a plan has looked at: tiles loaded as needed, obstacles inflated, and
+// the answer to "may a vehicle's middle be here?".
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include "core/base/status.h"
+#include "core/planning/obstacle_inflation.h"
 #include "core/planning/plan_options.h"
 #include "core/planning/surface_tile.h"
 #include "core/planning/tile_source.h"
@@ -43,7 +44,7 @@ class SurfaceMap {
   // Requires that the node's tile is ready. Computed once.
   bool IsDrivable(const NodeRef& ref);
   // Metres to the nearest obstacle on the node's surface, at most options.clearance_reach_m().
-  double Clearance(const SurfaceNode& node) const;
+  double Clearance(const SurfaceNode& node) const { return inflation_.Clearance(node); }
 
   std::size_t tiles_loaded() const { return tiles_.size(); }
   std::size_t memory_bytes() const { return memory_bytes_; }
@@ -52,29 +53,30 @@ class SurfaceMap {
 
  private:
   // A cell beside another, and what may be taken as the same surface there.
-  struct Offset {
+  struct SlopeSample {
     std::int32_t dx = 0;
     std::int32_t dy = 0;
     std::int32_t height_limit_mm = 0;
-    std::uint8_t clearance = 0;
   };
 
-  std::vector<Offset> ClearanceOffsets() const;
-  std::vector<Offset> SlopeOffsets() const;
+  std::vector<SlopeSample> SlopeSamples() const;
   Result<std::int32_t> Load(const TileId& id);
   Status AddMemory(std::size_t bytes);
-  bool IsInsideObstacle(const SurfaceTile& tile, const SurfaceNode& node) const;
-  void InflateInto(SurfaceTile& target, std::size_t neighbour);
-  void StampDisc(SurfaceTile& target, std::int32_t x, std::int32_t y, std::int32_t altitude_mm);
+  // Null when there is none within the sample's limit.
+  const SurfaceNode* SameSurface(const SurfaceTile& home,
+                                 const SurfaceNode& node,
+                                 const SlopeSample& sample) const;
   bool IsGentle(const SurfaceTile& home, const SurfaceNode& node) const;
 
   TileSource& source_;
   const MapProfile& profile_;
   const PlanOptions& options_;
   std::int32_t side_;
-  std::vector<Offset> clearance_offsets_;
-  std::vector<Offset> slope_offsets_;
-  std::map<TileId, std::int32_t> slots_;  // kNotThere where the source has none
+  double max_gradient_;  // metres per cell
+  ObstacleInflation inflation_;
+  std::vector<SlopeSample> slope_samples_;
+  // By TileId::Key; kNotThere where the source has none.
+  std::unordered_map<std::uint64_t, std::int32_t> slots_;
   std::vector<std::unique_ptr<SurfaceTile>> tiles_;
   std::size_t memory_bytes_ = 0;
 };

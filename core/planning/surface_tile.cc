@@ -15,6 +15,7 @@ struct Limits {
   std::int32_t headroom_mm;
   std::int32_t headroom_to_next_mm;  // to the surface above
   std::uint8_t occupied_state;       // the lowest that counts
+  std::int32_t occupied_evidence;    // the lowest that counts
   const MapProfile& profile;
 };
 
@@ -26,8 +27,13 @@ Limits LimitsOf(const MapProfile& profile, const PlanOptions& options) {
   while (state < 15 && NibbleProbability(state) < options.occupied_probability) {
     ++state;
   }
+  std::int32_t evidence = 1;
+  while (evidence < kEvidenceLimit &&
+         EvidenceProbability(evidence) < options.occupied_probability) {
+    ++evidence;
+  }
   return {to_mm(options.headroom_m), to_mm(options.headroom_m + options.slab_thickness_m), state,
-          profile};
+          evidence, profile};
 }
 
 // Segments are as high as a person: one counts when its middle lies below the headroom, so that the
@@ -48,12 +54,19 @@ bool IsColumnInTheWay(const TileLayer& layer, const Limits& limits) {
   return false;
 }
 
+// Slopes seen from below leave traces of surfaces in the air over ramps, far less certain than the
+// floor that was driven on: a surface above counts when it is known at least as well as this one.
+bool IsCeilingLow(const TileLayer& layer, const TileLayer& above, const Limits& limits) {
+  return std::int64_t{above.altitude_mm} - layer.altitude_mm < limits.headroom_to_next_mm &&
+         above.sigma_100um <= layer.sigma_100um && above.observations >= layer.observations;
+}
+
 SurfaceNode MakeNode(const TileLayer& layer, const TileLayer* above, const Limits& limits) {
   SurfaceNode node;
   node.altitude_mm = layer.altitude_mm;
-  const bool is_low = above != nullptr && std::int64_t{above->altitude_mm} - layer.altitude_mm <
-                                              limits.headroom_to_next_mm;
-  const bool is_obstacle = layer.occupancy > 0 || is_low || IsColumnInTheWay(layer, limits);
+  const bool is_low = above != nullptr && IsCeilingLow(layer, *above, limits);
+  const bool is_obstacle =
+      layer.occupancy >= limits.occupied_evidence || is_low || IsColumnInTheWay(layer, limits);
   if (is_obstacle) {
     node.flags |= SurfaceNode::kObstacle;
   } else if (layer.is_traversable()) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "core/base/status.h"
@@ -26,7 +27,7 @@ struct SurfaceNode {
   std::int32_t altitude_mm = 0;
   std::uint16_t cell = 0;
   std::uint8_t flags = 0;
-  std::uint8_t clearance = kFar;  // to the nearest obstacle, in 1/250 of the reach
+  std::uint8_t clearance = kFar;  // ObstacleInflation::Clearance
 
   bool Has(std::uint8_t flag) const { return (flags & flag) != 0; }
 };
@@ -58,6 +59,12 @@ struct SurfaceTile {
   std::array<std::int32_t, 9> around{};
   bool is_ready = false;
 
+  std::span<SurfaceNode> Nodes(std::uint32_t cell) {
+    return std::span(nodes).subspan(cell_begin[cell], cell_begin[cell + 1] - cell_begin[cell]);
+  }
+  std::span<const SurfaceNode> Nodes(std::uint32_t cell) const {
+    return std::span(nodes).subspan(cell_begin[cell], cell_begin[cell + 1] - cell_begin[cell]);
+  }
   std::size_t memory_bytes() const {
     return cell_begin.capacity() * sizeof(std::uint32_t) + nodes.capacity() * sizeof(SurfaceNode) +
            search.capacity() * sizeof(SearchNode);
