@@ -109,9 +109,9 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
 }  // namespace
 
 AtlasClient::AtlasClient(std::unique_ptr<RpcChannel> channel,
-                         MapProfile profile,
+                         const MapProfile& profile,
                          AtlasIdentity atlas)
-    : channel_(std::move(channel)), profile_(std::move(profile)), atlas_(std::move(atlas)) {}
+    : channel_(std::move(channel)), profile_(profile), atlas_(std::move(atlas)) {}
 AtlasClient::AtlasClient(AtlasClient&&) noexcept = default;
 AtlasClient& AtlasClient::operator=(AtlasClient&&) noexcept = default;
 AtlasClient::~AtlasClient() = default;
@@ -127,9 +127,9 @@ Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
   if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {
     return Error(std::move(status));
   }
-  Result<MapProfile> profile = ProfileFromWire(hello.profile());
+  const Result<MapProfile> profile = ProfileFromWire(hello.profile());
   if (!profile) return Error(profile.error().WithContext("daemon's handshake"));
-  return AtlasClient(std::move(channel), *std::move(profile), IdentityFromWire(hello));
+  return AtlasClient(std::move(channel), *profile, IdentityFromWire(hello));
 }
 
 Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection> corrections,

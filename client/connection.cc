@@ -69,7 +69,7 @@ Status Connection::Impl::Finish(const std::optional<error_code>& done,
   io_.restart();
   io_.run_until(deadline);
   if (!done) {
-    const Status status = Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
+    Status status = Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
     io_.restart();
     io_.run();  // the cancelled operation still refers to our buffers
     return status;

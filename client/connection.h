@@ -17,6 +17,8 @@ class Connection {
   // kUnavailable when nobody listens there, kTimeout after `timeout`.
   static Result<Connection> Open(const Endpoint& endpoint, std::chrono::milliseconds timeout);
 
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
   Connection(Connection&&) noexcept;
   Connection& operator=(Connection&&) noexcept;
   ~Connection();
