@@ -36,7 +36,7 @@ Status BadMagic() {
 Bytes EncodeFrameHeader(ByteSpan payload) {
   assert(payload.size() <= kMaxFrameBytes);
   ByteWriter out;
-  for (const std::uint8_t byte : kMagic) {  // not Raw: g++ 12 warns about it at -O3, wrongly
+  for (const std::uint8_t byte : kMagic) {
     out.U8(byte);
   }
   out.U32(static_cast<std::uint32_t>(payload.size()));

@@ -1,0 +1,245 @@
+#include "server/config/daemon_config.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <system_error>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include "core/base/str_cat.h"
+#include "server/config/config_file.h"
+
+namespace atlas {
+namespace {
+
+struct Setting {
+  const char* key;  // in the file
+  const char* flag;
+  const char* environment;
+  const char* help;
+};
+
+constexpr Setting kSettings[] = {
+    {"data", "--data", "ATLASD_DATA", "directory of the atlas; made if there is none"},
+    {"listen", "--listen", "ATLASD_LISTEN",
+     "HOST:PORT, loopback only; port 0 takes a free one (127.0.0.1:7447)"},
+    {"workers", "--workers", "ATLASD_WORKERS", "fusion threads; 0 is one a core (0)"},
+    {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "memory for decoded keyframes (128)"},
+    {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "debug, info, warning or error (info)"},
+    {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "new atlas: metres a cell (0.1)"},
+    {"map.segments", "--segments", "ATLASD_SEGMENTS",
+     "new atlas: segments a column: 2, 4, 8 or 16 (8)"},
+    {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT",
+     "new atlas: metres a segment (1)"},
+    {"map.preset", "--preset", "ATLASD_PRESET", "new atlas: fusion preset: strict (strict)"},
+};
+
+using Settings = std::map<std::string, std::string>;
+
+Status BadValue(const std::string& key, const std::string& text, const char* expected) {
+  return Status(StatusCode::kInvalidArgument, StrCat(key, " is '", text, "', expected ", expected));
+}
+
+template <typename T>
+std::optional<T> ParseNumber(const std::string& text) {
+  T value{};
+  const char* const end = text.data() + text.size();
+  const auto [next, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && next == end ? std::optional<T>(value) : std::nullopt;
+}
+
+bool IsLoopback(const std::string& host) {
+  return host == "::1" || host.starts_with("127.");
+}
+
+Status ApplyListen(const std::string& text, DaemonConfig& config) {
+  const std::size_t colon = text.rfind(':');
+  const auto port = colon == std::string::npos ? std::nullopt
+                                               : ParseNumber<std::uint16_t>(text.substr(colon + 1));
+  if (!port) {
+    return BadValue("listen", text, "HOST:PORT");
+  }
+  config.port = *port;
+  config.host = text.substr(0, colon);
+  if (config.host == "localhost") {
+    config.host = "127.0.0.1";
+  }
+  if (config.host.size() > 2 && config.host.front() == '[' && config.host.back() == ']') {
+    config.host = config.host.substr(1, config.host.size() - 2);
+  }
+  if (!IsLoopback(config.host)) {
+    return BadValue(
+        "listen", text,
+        "a loopback address: there is no TLS yet, and nothing leaves this machine in the clear");
+  }
+  return {};
+}
+
+template <typename T>
+Status ApplyNumber(const std::string& key, const std::string& text, std::optional<T>& value) {
+  value = ParseNumber<T>(text);
+  return value ? Status() : BadValue(key, text, "a number");
+}
+
+Status ApplyCount(const std::string& key, const std::string& text, int low, int high, int& value) {
+  const auto number = ParseNumber<int>(text);
+  if (!number || *number < low || *number > high) {
+    return BadValue(key, text, StrCat("a whole number from ", low, " to ", high).c_str());
+  }
+  value = *number;
+  return {};
+}
+
+Status ApplyLogLevel(const std::string& text, DaemonConfig& config) {
+  if (text != "debug" && text != "info" && text != "warning" && text != "error") {
+    return BadValue("log_level", text, "debug, info, warning or error");
+  }
+  config.log_level = text;
+  return {};
+}
+
+Status Apply(const std::string& key, const std::string& text, DaemonConfig& config) {
+  if (key == "data") {
+    config.data = text;
+    return {};
+  }
+  if (key == "listen") {
+    return ApplyListen(text, config);
+  }
+  if (key == "workers") {
+    return ApplyCount(key, text, 0, 64, config.workers);
+  }
+  if (key == "cache_mib") {
+    return ApplyCount(key, text, 8, 65'536, config.cache_mib);
+  }
+  if (key == "log_level") {
+    return ApplyLogLevel(text, config);
+  }
+  if (key == "map.cell_size") {
+    return ApplyNumber(key, text, config.cell_size_m);
+  }
+  if (key == "map.segments") {
+    return ApplyNumber(key, text, config.segments);
+  }
+  if (key == "map.segment_height") {
+    return ApplyNumber(key, text, config.segment_height_m);
+  }
+  if (text != "strict") {
+    return BadValue("preset", text, "strict");
+  }
+  config.preset = text;
+  return {};
+}
+
+// File, then environment, then flags: later ones win.
+Result<Settings> Collect(const Settings& flags, const std::string& file) {
+  Settings settings;
+  if (!file.empty()) {
+    Result<Settings> read = ReadConfigFile(file);
+    if (!read) {
+      return read;
+    }
+    settings = std::move(*read);
+  }
+  for (const Setting& setting : kSettings) {
+    if (const char* value = std::getenv(setting.environment); value != nullptr) {
+      settings[setting.key] = value;
+    }
+  }
+  for (const auto& [key, value] : flags) {
+    settings[key] = value;
+  }
+  return settings;
+}
+
+}  // namespace
+
+Result<MapProfile> DaemonConfig::NewProfile() const {
+  MapProfile profile;
+  if (cell_size_m) {
+    profile.cell_size_um = static_cast<std::uint32_t>(std::llround(*cell_size_m * 1e6));
+  }
+  if (segments) {
+    profile.column_segments = static_cast<std::uint8_t>(*segments);
+  }
+  if (segment_height_m) {
+    profile.segment_height_mm = static_cast<std::uint16_t>(std::llround(*segment_height_m * 1e3));
+  }
+  const bool is_sane =
+      (!cell_size_m || (*cell_size_m > 0.0 && *cell_size_m <= 100.0)) &&
+      (!segments || (*segments > 0 && *segments <= 16)) &&
+      (!segment_height_m || (*segment_height_m > 0.0 && *segment_height_m <= 60.0));
+  if (!is_sane) {
+    return Error(StatusCode::kInvalidArgument,
+                 "map: expected a cell size of 0.02 to 1 m, 2, 4, 8 or 16 segments of 0.1 to 4 m");
+  }
+  if (Status status = profile.Validate(); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return profile;
+}
+
+Status DaemonConfig::CheckAgainst(const MapProfile& existing) const {
+  const Result<MapProfile> asked = NewProfile();
+  if (!asked) {
+    return asked.error();
+  }
+  const auto differs = [](const char* what, double have, double want) {
+    return Status(StatusCode::kInvalidData, StrCat("the atlas has a ", what, " of ", have, ", not ",
+                                                   want, ": it is fixed when an atlas is made"));
+  };
+  if (cell_size_m && asked->cell_size_um != existing.cell_size_um) {
+    return differs("cell size", existing.cell_size_m(), *cell_size_m);
+  }
+  if (segments && asked->column_segments != existing.column_segments) {
+    return differs("number of segments", existing.column_segments, *segments);
+  }
+  if (segment_height_m && asked->segment_height_mm != existing.segment_height_mm) {
+    return differs("segment height", existing.segment_height_m(), *segment_height_m);
+  }
+  return {};
+}
+
+Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
+  CLI::App app("atlasd: the Road Atlas map server", "atlasd");
+  app.set_version_flag("--version", "atlasd " ATLAS_VERSION);
+  Settings flags;
+  std::string file;
+  app.add_option("--config", file, "TOML file with these settings");
+  for (const Setting& setting : kSettings) {
+    app.add_option_function<std::string>(
+        setting.flag, [&flags, key = setting.key](const std::string& value) { flags[key] = value; },
+        setting.help);
+  }
+  DaemonCommand command;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    command.text = app.help();
+    return command;
+  } catch (const CLI::CallForVersion&) {
+    command.text = app.version() + "\n";
+    return command;
+  } catch (const CLI::ParseError& error) {
+    return Error(StatusCode::kInvalidArgument, error.what());
+  }
+  const Result<Settings> settings = Collect(flags, file);
+  if (!settings) {
+    return Error(settings.error());
+  }
+  for (const auto& [key, value] : *settings) {
+    if (Status status = Apply(key, value, command.config); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  if (command.config.data.empty()) {
+    return Error(StatusCode::kInvalidArgument, "--data DIR is required");
+  }
+  return command;
+}
+
+}  // namespace atlas

@@ -1,0 +1,45 @@
+// What the daemon is told: flags > environment > file > default (docs/daemon.md).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/base/status.h"
+#include "core/geometry/map_profile.h"
+
+namespace atlas {
+
+struct DaemonConfig {
+  std::filesystem::path data;  // required
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 7447;
+  int workers = 0;      // fusion threads; 0: one a core
+  int cache_mib = 128;  // decoded keyframes, all workers together
+  std::string log_level = "info";
+
+  // Of the map, given by whoever starts the daemon; checked against an atlas that exists already.
+  std::optional<double> cell_size_m;
+  std::optional<int> segments;
+  std::optional<double> segment_height_m;
+  std::optional<std::string> preset;
+
+  // The profile for a new atlas. kInvalidArgument on values out of range.
+  Result<MapProfile> NewProfile() const;
+  // kInvalidData naming the first map option given that differs from `existing`.
+  Status CheckAgainst(const MapProfile& existing) const;
+};
+
+// What the command line asks for: to run with a configuration, or to print a text and end.
+struct DaemonCommand {
+  DaemonConfig config;
+  std::optional<std::string> text;  // of --help or --version
+};
+
+// kInvalidArgument on unknown flags, keys (with file and line) and values, and on an address that
+// is not loopback.
+Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv);
+
+}  // namespace atlas

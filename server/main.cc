@@ -1,0 +1,136 @@
+// atlasd: opens the store, starts fusion, serves until it is told to stop.
+
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <random>
+#include <string>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "core/base/str_cat.h"
+#include "server/config/daemon_config.h"
+#include "server/net/tcp_server.h"
+#include "server/service/atlas_service.h"
+#include "server/service/fusion_scheduler.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace atlas {
+namespace {
+
+// As for the command line: 1 failure, 2 usage, 3 not found, 4 conflict, 5 unavailable, 6 bad data.
+int ExitCode(StatusCode code) {
+  switch (code) {
+    case StatusCode::kOk:
+      return 0;
+    case StatusCode::kInvalidArgument:
+      return 2;
+    case StatusCode::kNotFound:
+      return 3;
+    case StatusCode::kConflict:
+      return 4;
+    case StatusCode::kUnavailable:
+    case StatusCode::kTimeout:
+      return 5;
+    case StatusCode::kInvalidData:
+    case StatusCode::kUnsupported:
+      return 6;
+    default:
+      return 1;
+  }
+}
+
+int Fail(const Status& status) {
+  spdlog::error("{}: {}", StatusCodeName(status.code()), status.message());
+  return ExitCode(status.code());
+}
+
+std::int64_t NowMs() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::array<std::uint8_t, 16> RandomId() {
+  std::random_device random;
+  std::array<std::uint8_t, 16> id{};
+  for (std::uint8_t& byte : id) {
+    byte = static_cast<std::uint8_t>(random());
+  }
+  return id;
+}
+
+Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
+  const Result<MapProfile> profile = config.NewProfile();
+  if (!profile) {
+    return Error(profile.error());
+  }
+  SqliteStoreOptions options;
+  options.directory = config.data;
+  options.new_profile = *profile;
+  options.new_atlas_id = RandomId();
+  Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
+  if (store) {
+    if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return store;
+}
+
+FusionOptions FusionFrom(const DaemonConfig& config) {
+  FusionOptions options;
+  options.workers = config.workers;
+  options.cache_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
+  return options;
+}
+
+int Serve(const DaemonConfig& config) {
+  Result<std::unique_ptr<AtlasStore>> store = OpenStore(config);
+  if (!store) {
+    return Fail(store.error());
+  }
+  FusionScheduler fusion(**store, FusionFrom(config), &NowMs);
+  AtlasService service(**store, &NowMs, [&fusion] { fusion.Wake(); });
+  TcpServer server(service, NetOptions());
+  const Result<std::string> address = server.Listen(config.host, config.port);
+  if (!address) {
+    return Fail(address.error());
+  }
+  fusion.Start();
+  std::printf("listening %s\n", address->c_str());
+  std::fflush(stdout);
+  spdlog::info("atlas in {}", config.data.string());
+  server.Run();
+  fusion.Stop();
+  spdlog::info("stopped");
+  return 0;
+}
+
+int Main(int argc, const char* const* argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("atlasd"));
+  const Result<DaemonCommand> command = ParseDaemonCommand(argc, argv);
+  if (!command) {
+    return Fail(command.error());
+  }
+  if (command->text) {
+    std::fputs(command->text->c_str(), stdout);
+    return 0;
+  }
+  spdlog::set_level(spdlog::level::from_str(command->config.log_level));
+  return Serve(command->config);
+}
+
+}  // namespace
+}  // namespace atlas
+
+int main(int argc, char** argv) {
+  try {
+    return atlas::Main(argc, argv);
+  } catch (const std::exception& error) {
+    spdlog::critical("{}", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,26 @@
+// Limits of the network side: every queue, count and wait has one.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+#include "proto/wire/frame.h"
+
+namespace atlas {
+
+struct NetOptions {
+  std::size_t max_connections = 1024;
+  std::uint32_t max_frame_bytes = kMaxFrameBytes;
+  std::size_t max_requests_in_flight = 64;     // a connection
+  std::size_t max_queued_bytes = 4u << 20;     // replies waiting for a slow reader, a connection
+  std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection
+  int service_threads = 4;                     // that may block on the disk
+  std::chrono::milliseconds handshake{5'000};
+  std::chrono::milliseconds idle{3'600'000};      // between two frames
+  std::chrono::milliseconds frame{30'000};        // from a frame's first byte to its last
+  std::chrono::milliseconds write_stall{30'000};  // without a byte taken by the peer
+  std::chrono::milliseconds drain{10'000};        // for requests in flight at shutdown
+};
+
+}  // namespace atlas

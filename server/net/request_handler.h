@@ -1,0 +1,53 @@
+// One request in, its replies out: the wire's side of every use case of AtlasService.
+#pragma once
+
+#include <chrono>
+#include <functional>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/thread_pool.hpp>
+
+#include "proto/wire/envelope.h"
+#include "server/net/net_options.h"
+#include "server/net/reply_writer.h"
+#include "server/service/atlas_service.h"
+
+namespace atlas {
+
+// Shared by all connections; used on the network thread only. What may block runs on `pool`.
+class RequestHandler {
+ public:
+  RequestHandler(AtlasService& service, boost::asio::thread_pool& pool, const NetOptions& options)
+      : service_(service), pool_(pool), options_(options) {}
+
+  // The first frame of a connection. False when it ends the connection; the error was then sent.
+  boost::asio::awaitable<bool> Greet(wire::Envelope request, ReplyWriter& out);
+  // Every later one: sends its replies, or one error.
+  boost::asio::awaitable<void> Handle(wire::Envelope request, ReplyWriter& out);
+
+ private:
+  using Envelope = wire::Envelope;
+
+  boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
+  static boost::asio::awaitable<Status> Refuse(const Envelope& request);
+  boost::asio::awaitable<Status> Upload(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> UpdatePoses(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
+
+  // Until `is_done` holds for the store's dirty state; kTimeout carries how many tiles are dirty.
+  using DirtyPredicate = bool (*)(const DirtyState& state, std::uint64_t revision);
+  boost::asio::awaitable<Result<DirtyState>> WaitFor(DirtyPredicate is_done,
+                                                     std::uint64_t revision,
+                                                     std::chrono::milliseconds timeout);
+
+  AtlasService& service_;
+  boost::asio::thread_pool& pool_;
+  const NetOptions& options_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,174 @@
+#include "server/net/tcp_server.h"
+
+#include <algorithm>
+#include <csignal>
+#include <exception>
+#include <utility>
+#include <vector>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <spdlog/spdlog.h>
+
+#include "core/base/str_cat.h"
+#include "server/net/connection.h"
+#include "server/net/request_handler.h"
+
+namespace atlas {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+}  // namespace
+
+class TcpServer::Impl {
+ public:
+  Impl(AtlasService& service, const NetOptions& options)
+      : options_(options),
+        pool_(static_cast<std::size_t>(options.service_threads)),
+        handler_(service, pool_, options_),
+        acceptor_(io_),
+        signals_(io_) {}
+
+  Result<std::string> Listen(const std::string& host, std::uint16_t port) {
+    error_code error;
+    const asio::ip::address address = asio::ip::make_address(host, error);
+    if (error) {
+      return Error(StatusCode::kInvalidArgument,
+                   StrCat("listen address '", host, "' is no IP address"));
+    }
+    const tcp::endpoint endpoint(address, port);
+    acceptor_.open(endpoint.protocol(), error);
+    if (!error) {
+      acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
+    }
+    if (!error) {
+      acceptor_.bind(endpoint, error);
+    }
+    if (!error) {
+      acceptor_.listen(asio::socket_base::max_listen_connections, error);
+    }
+    if (error) {
+      return Error(StatusCode::kUnavailable,
+                   StrCat("cannot listen on ", endpoint, ": ", error.message()));
+    }
+    return StrCat(acceptor_.local_endpoint());
+  }
+
+  void Run() {
+    signals_.add(SIGTERM);
+    signals_.add(SIGINT);
+    signals_.async_wait([this](error_code error, int number) {
+      if (!error) {
+        spdlog::info("signal {}: draining", number);
+        Drain();
+      }
+    });
+    asio::co_spawn(io_, Accept(), [](std::exception_ptr failure) {
+      if (failure) {
+        std::rethrow_exception(failure);
+      }
+    });
+    io_.run();
+    pool_.join();
+  }
+
+  void Stop() {
+    asio::post(io_, [this] { Drain(); });
+  }
+
+ private:
+  asio::awaitable<void> Accept() {
+    while (acceptor_.is_open()) {
+      error_code error;
+      tcp::socket socket =
+          co_await acceptor_.async_accept(asio::redirect_error(asio::use_awaitable, error));
+      if (error == asio::error::operation_aborted) {
+        co_return;
+      }
+      if (error) {
+        // Out of descriptors or a peer that left: wait a little, serve the others meanwhile.
+        spdlog::warn("accept: {}", error.message());
+        asio::steady_timer pause(io_, std::chrono::milliseconds(50));
+        co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
+        continue;
+      }
+      Admit(std::move(socket));
+    }
+  }
+
+  void Admit(tcp::socket socket) {
+    std::erase_if(connections_, [](const auto& weak) { return weak.expired(); });
+    if (connections_.size() >= options_.max_connections) {
+      spdlog::warn("connection refused: {} are open", connections_.size());
+      return;  // the socket closes
+    }
+    error_code ignored;  // an option that speeds things up, no more
+    socket.set_option(tcp::no_delay(true), ignored);
+    const auto connection = std::make_shared<Connection>(std::move(socket), handler_, options_);
+    connections_.push_back(connection);
+    connection->Start();
+  }
+
+  void Drain() {
+    error_code ignored;  // it may be closed already
+    acceptor_.close(ignored);
+    signals_.cancel(ignored);
+    for (const auto& weak : connections_) {
+      if (const auto connection = weak.lock()) {
+        connection->Drain();
+      }
+    }
+    drain_limit_ = std::make_unique<asio::steady_timer>(io_, options_.drain);
+    drain_limit_->async_wait([this](error_code error) {
+      if (!error) {
+        spdlog::warn("requests in flight were cut after {} ms", options_.drain.count());
+        io_.stop();
+      }
+    });
+    asio::co_spawn(io_, StopWhenIdle(), asio::detached);
+  }
+
+  asio::awaitable<void> StopWhenIdle() {
+    asio::steady_timer pause(io_);
+    while (!std::all_of(connections_.begin(), connections_.end(),
+                        [](const auto& weak) { return weak.expired(); })) {
+      pause.expires_after(std::chrono::milliseconds(10));
+      co_await pause.async_wait(asio::use_awaitable);
+    }
+    drain_limit_->cancel();
+  }
+
+  NetOptions options_;
+  asio::io_context io_{1};
+  asio::thread_pool pool_;
+  RequestHandler handler_;
+  tcp::acceptor acceptor_;
+  asio::signal_set signals_;
+  std::vector<std::weak_ptr<Connection>> connections_;
+  std::unique_ptr<asio::steady_timer> drain_limit_;
+};
+
+TcpServer::TcpServer(AtlasService& service, const NetOptions& options)
+    : impl_(std::make_unique<Impl>(service, options)) {}
+TcpServer::~TcpServer() = default;
+
+Result<std::string> TcpServer::Listen(const std::string& host, std::uint16_t port) {
+  return impl_->Listen(host, port);
+}
+void TcpServer::Run() {
+  impl_->Run();
+}
+void TcpServer::Stop() {
+  impl_->Stop();
+}
+
+}  // namespace atlas

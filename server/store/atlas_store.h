@@ -1,0 +1,81 @@
+// The store of one atlas: keyframes, poses with their history, dirty marks, and the tiles made of
+// them. Every write is one transaction; `done` is called once it is on disk, on the store's own
+// thread, and must not block. Reads may be called from any thread, see one snapshot each, and hold
+// nothing when they return. Rows whose checksum is wrong are kInvalidData and name the row.
+//
+// Writes fail with kResourceExhausted on a full disk, kPermissionDenied on a read-only one,
+// kUnavailable when the queue is full, the disk fails or the store is closing; they then left no
+// trace.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+class AtlasStore {
+ public:
+  template <typename T>
+  using Done = std::function<void(Result<T>)>;
+
+  AtlasStore() = default;
+  AtlasStore(const AtlasStore&) = delete;
+  AtlasStore& operator=(const AtlasStore&) = delete;
+  virtual ~AtlasStore() = default;
+
+  virtual const AtlasIdentity& identity() const = 0;
+
+  // Same key, blob hash and time as a stored one: a duplicate, nothing changes, even if its pose
+  // was corrected since. Other content under the key: kConflict. Marks the footprint dirty.
+  virtual void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) = 0;
+  // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
+  // and marks nothing. Marks the union of the old and the new footprints.
+  virtual void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) = 0;
+
+  // Leases up to `max_tiles` dirty tiles of the lowest level in the wave: a level starts when the
+  // one below is done, so that each parent is built once.
+  virtual void ClaimDirty(ClaimRequest request, Done<ClaimResult> done) = 0;
+  // Stores, replaces or deletes a tile. Its revision moves, and its parent is marked, only when its
+  // payload hash does. The mark is cleared only if its generation is still the claimed one.
+  // kConflict when the claim's lease ran out and was given to another owner, or was built.
+  virtual void FinishTile(FinishedTile tile, Done<FinishResult> done) = 0;
+  // Gives a claim back, to be taken again at `retry_at_ms`.
+  virtual void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) = 0;
+  // Marks tiles to be built again, e.g. one that was found damaged. The value: marks set.
+  virtual void MarkDirty(std::vector<TileId> ids, Done<std::uint32_t> done) = 0;
+
+  // In the order of `keys`; kNotFound names the first unknown one.
+  virtual Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
+  // The keyframes of live sessions whose footprints touch a level-0 tile.
+  virtual Result<TileSources> GatherTile(const TileId& id) = 0;
+  virtual Result<Bytes> ReadKeyframeBlob(std::int64_t id) = 0;
+  // Ids above `after_id` in order, up to `limit`.
+  virtual Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
+                                                            std::uint32_t limit) = 0;
+  // One keyframe with its pose and session: every checksum around it is verified.
+  virtual Result<KeyframeRecord> ReadKeyframe(std::int64_t id) = 0;
+
+  // nullopt: there is no such tile.
+  virtual Result<std::optional<StoredTile>> ReadTile(const TileId& id) = 0;
+  // Tiles in one snapshot, in the order of `ids`.
+  virtual Result<std::vector<std::optional<StoredTile>>> ReadTiles(std::span<const TileId> ids) = 0;
+  // Calls `visit` for every tile in the rectangle, in key order, without reading blobs.
+  virtual Status ScanTiles(const TileRect& rect,
+                           const std::function<void(const TileSummary&)>& visit) = 0;
+  // Tiles above `after_key` in key order, all levels, up to `limit`; `after_key` -1 is the start.
+  virtual Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key,
+                                                     std::uint32_t limit) = 0;
+  // Level-0 tiles that some footprint touches, above `after_key`, in key order.
+  virtual Result<std::vector<TileId>> ListFootprintTiles(std::int64_t after_key,
+                                                         std::uint32_t limit) = 0;
+
+  virtual Result<DirtyState> ReadDirtyState() = 0;
+  virtual Result<StoreCounts> ReadCounts() = 0;
+  virtual Result<std::vector<SessionRecord>> ListSessions() = 0;
+};
+
+}  // namespace atlas

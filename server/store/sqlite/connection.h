@@ -1,0 +1,98 @@
+// One SQLite connection with its settings and its prepared statements. Owned and used by one thread
+// at a time. Everything here throws SQLite::Exception; reader_pool and write_queue turn it into a
+// Status.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+
+#include "core/base/bytes.h"
+
+namespace atlas {
+
+// A prepared statement in use: bind in order, step, read columns. Frees it for the next use, and
+// the read snapshot it may hold, when it goes out of scope.
+class Query {
+ public:
+  explicit Query(SQLite::Statement& statement) : statement_(&statement) {}
+  Query(const Query&) = delete;
+  Query& operator=(const Query&) = delete;
+  ~Query();
+
+  Query& Bind(std::int64_t value);
+  Query& Bind(std::uint64_t value) { return Bind(static_cast<std::int64_t>(value)); }
+  Query& Bind(std::int32_t value) { return Bind(std::int64_t{value}); }
+  Query& Bind(std::uint32_t value) { return Bind(std::int64_t{value}); }
+  Query& Bind(std::string_view text);
+  Query& Bind(ByteSpan bytes);  // must outlive the query
+  Query& BindNull();
+
+  // The next row; false after the last one.
+  bool Step() { return statement_->executeStep(); }
+  // Runs a statement without rows; the number of rows it changed.
+  int Run() { return statement_->exec(); }
+
+  // The next column of the row, in order.
+  std::int64_t Int();
+  std::uint64_t Unsigned() { return static_cast<std::uint64_t>(Int()); }
+  std::int32_t Int32() { return static_cast<std::int32_t>(Int()); }
+  std::uint32_t Unsigned32() { return static_cast<std::uint32_t>(Int()); }
+  std::string Text();
+  Bytes Blob();
+  // Back to the first column: after each Step() of a statement with several rows.
+  void Rewind() { column_ = 0; }
+
+ private:
+  SQLite::Statement* statement_;
+  int parameter_ = 0;
+  int column_ = 0;
+};
+
+struct ConnectionOptions {
+  enum class Mode { kCreate, kReadWrite, kReadOnly };
+
+  std::filesystem::path file;
+  Mode mode = Mode::kReadOnly;
+  int cache_kib = 8 * 1024;  // page cache of this connection
+  int busy_timeout_ms = 5'000;
+};
+
+class Connection {
+ public:
+  explicit Connection(const ConnectionOptions& options);
+
+  // `sql` is a string literal: statements are kept by its address. Not to be nested in itself.
+  Query Prepare(const char* sql);
+  void Execute(const char* sql) { database_.exec(sql); }
+  // The first column of the first row of a statement that is run once.
+  std::int64_t Ask(const char* sql);
+  // False after SQLite rolled the transaction back by itself (full disk, I/O error).
+  bool is_in_transaction() const;
+
+ private:
+  SQLite::Database database_;
+  std::unordered_map<const char*, std::unique_ptr<SQLite::Statement>> statements_;
+};
+
+// A read transaction: everything inside sees one state of the atlas.
+class Snapshot {
+ public:
+  explicit Snapshot(Connection& connection) : connection_(connection) {
+    connection_.Execute("BEGIN");
+  }
+  Snapshot(const Snapshot&) = delete;
+  Snapshot& operator=(const Snapshot&) = delete;
+  ~Snapshot();
+
+ private:
+  Connection& connection_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,139 @@
+#include "server/store/sqlite/data_directory.h"
+
+#include <array>
+#include <cerrno>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace fs = std::filesystem;
+namespace {
+
+Status DiskError(const std::string& what, const fs::path& path, int error) {
+  StatusCode code = StatusCode::kUnavailable;
+  if (error == EACCES || error == EPERM || error == EROFS) {
+    code = StatusCode::kPermissionDenied;
+  } else if (error == ENOSPC || error == EDQUOT) {
+    code = StatusCode::kResourceExhausted;
+  } else if (error == ENOENT || error == ENOTDIR || error == EEXIST) {
+    code = StatusCode::kNotFound;
+  }
+  return Status(code,
+                StrCat(what, " ", path.string(), ": ", std::generic_category().message(error)));
+}
+
+std::string ReadHolder(int fd) {
+  std::array<char, 32> text{};
+  const ssize_t size = ::pread(fd, text.data(), text.size() - 1, 0);
+  std::string holder(text.data(), size > 0 ? static_cast<std::size_t>(size) : 0);
+  while (!holder.empty() && holder.back() == '\n') {
+    holder.pop_back();
+  }
+  return holder.empty() ? "unknown" : holder;
+}
+
+// The process id is for people; a disk too full for it does not matter.
+void WriteHolder(int fd) {
+  const std::string text = StrCat(::getpid(), "\n");
+  if (::ftruncate(fd, 0) == 0) {
+    [[maybe_unused]] const ssize_t written = ::pwrite(fd, text.data(), text.size(), 0);
+  }
+}
+
+Status CheckContents(const fs::path& directory) {
+  std::error_code error;
+  for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (name != "lock" && !name.starts_with("atlas.db") && name != "lost+found") {
+      return Status(StatusCode::kInvalidArgument,
+                    StrCat("data directory ", directory.string(), " holds '", name,
+                           "' but no atlas; expected an atlas, or an empty or missing directory"));
+    }
+  }
+  return error ? DiskError("data directory", directory, error.value()) : Status();
+}
+
+}  // namespace
+
+Result<DataDirectory> DataDirectory::Lock(const fs::path& directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) {
+    return Error(DiskError("data directory", directory, error.value()));
+  }
+  if (!fs::exists(directory / "atlas.db", error)) {
+    if (Status status = CheckContents(directory); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  const fs::path lock = directory / "lock";
+  const int fd = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (fd < 0) {
+    return Error(DiskError("data directory: cannot open", lock, errno));
+  }
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    Status status(StatusCode::kConflict, StrCat("data directory ", directory.string(),
+                                                " is in use by process ", ReadHolder(fd)));
+    ::close(fd);
+    return Error(std::move(status));
+  }
+  WriteHolder(fd);
+  return DataDirectory(directory, fd);
+}
+
+DataDirectory::DataDirectory(fs::path directory, int lock_fd)
+    : directory_(std::move(directory)), lock_fd_(lock_fd) {}
+
+DataDirectory::DataDirectory(DataDirectory&& other) noexcept
+    : directory_(std::move(other.directory_)), lock_fd_(std::exchange(other.lock_fd_, -1)) {}
+
+DataDirectory::~DataDirectory() {
+  if (lock_fd_ >= 0) {
+    ::close(lock_fd_);
+  }
+}
+
+bool DataDirectory::has_atlas() const {
+  std::error_code error;
+  return fs::exists(database_file(), error);
+}
+
+void DataDirectory::RemoveUnfinished() const {
+  for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+    std::error_code error;  // what cannot be removed is met again when it is written
+    fs::remove(unfinished_file().string() + suffix, error);
+  }
+}
+
+Status DataDirectory::Publish() const {
+  if (::rename(unfinished_file().c_str(), database_file().c_str()) != 0) {
+    return DiskError("data directory: cannot rename", unfinished_file(), errno);
+  }
+  const int fd = ::open(directory_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) {
+    return DiskError("data directory: cannot open", directory_, errno);
+  }
+  const int synced = ::fsync(fd);
+  const int error = errno;
+  ::close(fd);
+  return synced == 0 ? Status() : DiskError("data directory: cannot sync", directory_, error);
+}
+
+std::uint64_t DataDirectory::StoreBytes() const {
+  std::uint64_t bytes = 0;
+  for (const char* suffix : {"", "-wal"}) {
+    std::error_code error;
+    const auto size = fs::file_size(database_file().string() + suffix, error);
+    bytes += error ? 0 : size;
+  }
+  return bytes;
+}
+
+}  // namespace atlas

@@ -1,0 +1,40 @@
+// The daemon's data directory: who holds it, and whether there is an atlas in it. One process at a
+// time, by a lock on DIR/lock that the kernel releases however the process ends.
+#pragma once
+
+#include <filesystem>
+
+#include "core/base/status.h"
+
+namespace atlas {
+
+class DataDirectory {
+ public:
+  // Makes the directory if it is missing. kConflict names the process that holds it,
+  // kPermissionDenied and kUnavailable say what the disk refused, kInvalidArgument when the
+  // directory holds other files but no atlas.
+  static Result<DataDirectory> Lock(const std::filesystem::path& directory);
+
+  DataDirectory(DataDirectory&& other) noexcept;
+  DataDirectory& operator=(DataDirectory&&) = delete;
+  DataDirectory(const DataDirectory&) = delete;
+  DataDirectory& operator=(const DataDirectory&) = delete;
+  ~DataDirectory();
+
+  bool has_atlas() const;
+  std::filesystem::path database_file() const { return directory_ / "atlas.db"; }
+  // Where a new atlas is made, so that atlas.db is whole from its first moment.
+  std::filesystem::path unfinished_file() const { return directory_ / "atlas.db.new"; }
+  void RemoveUnfinished() const;
+  // unfinished_file() becomes database_file(), durably.
+  Status Publish() const;
+  std::uint64_t StoreBytes() const;
+
+ private:
+  DataDirectory(std::filesystem::path directory, int lock_fd);
+
+  std::filesystem::path directory_;
+  int lock_fd_ = -1;
+};
+
+}  // namespace atlas

@@ -1,0 +1,28 @@
+// Table sessions: what each drive of a vehicle has contributed.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+struct SessionRow {
+  std::int64_t id = 0;
+  SessionRecord record;
+};
+
+// nullopt: unknown. kInvalidData: its row is damaged.
+Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
+Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
+Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
+
+// The live session `key`, made if it is new.
+Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key);
+// Counts one more keyframe in.
+void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);
+
+}  // namespace atlas

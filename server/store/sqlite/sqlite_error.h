@@ -1,0 +1,21 @@
+// What SQLite throws, as the Status that callers act on.
+#pragma once
+
+#include <exception>
+
+#include "core/base/status.h"
+
+namespace SQLite {
+class Exception;
+}
+
+namespace atlas {
+
+// Full disk: kResourceExhausted. Read-only or forbidden: kPermissionDenied. Damage: kInvalidData.
+// Failing or busy disk: kUnavailable. Everything else is a mistake of this program: kInternal.
+Status StatusFromSqlite(const SQLite::Exception& error);
+
+// For the one place where work runs on a connection: SQLite's exceptions and bad_alloc.
+Status StatusFromException(const std::exception& error);
+
+}  // namespace atlas

@@ -1,0 +1,299 @@
+#include "server/store/sqlite/sqlite_store.h"
+
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/counters.h"
+#include "server/store/sqlite/data_directory.h"
+#include "server/store/sqlite/dirty_table.h"
+#include "server/store/sqlite/keyframe_table.h"
+#include "server/store/sqlite/reader_pool.h"
+#include "server/store/sqlite/schema.h"
+#include "server/store/sqlite/session_table.h"
+#include "server/store/sqlite/tile_table.h"
+#include "server/store/sqlite/transactions.h"
+#include "server/store/sqlite/write_queue.h"
+
+namespace atlas {
+namespace {
+
+ConnectionOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
+  return {std::move(file), ConnectionOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
+}
+
+ConnectionOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
+  return {std::move(file), ConnectionOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
+}
+
+class SqliteStore final : public AtlasStore {
+ public:
+  SqliteStore(const SqliteStoreOptions& options,
+              DataDirectory directory,
+              AtlasIdentity identity,
+              std::unique_ptr<Connection> writer)
+      : directory_(std::move(directory)),
+        identity_(std::move(identity)),
+        writes_(std::move(writer), {options.max_queued_writes, options.max_group}),
+        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
+
+  const AtlasIdentity& identity() const override { return identity_; }
+
+  void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) override {
+    Write<PutKeyframeResult>(std::move(done), [k = std::move(keyframe)](Connection& connection) {
+      return PutKeyframeInStore(connection, k);
+    });
+  }
+  void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) override {
+    Write<PoseBatchResult>(std::move(done), [b = std::move(batch)](Connection& connection) {
+      return UpdatePosesInStore(connection, b);
+    });
+  }
+  void ClaimDirty(ClaimRequest request, Done<ClaimResult> done) override {
+    Write<ClaimResult>(std::move(done), [r = std::move(request)](Connection& connection) {
+      return Result<ClaimResult>(ClaimTiles(connection, r));
+    });
+  }
+  void FinishTile(FinishedTile tile, Done<FinishResult> done) override {
+    const std::uint8_t levels = identity_.profile.levels;
+    Write<FinishResult>(std::move(done), [levels, t = std::move(tile)](Connection& connection) {
+      return FinishTileInStore(connection, t, levels);
+    });
+  }
+  void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) override {
+    Write<bool>(std::move(done), [retry_at_ms, c = std::move(claim)](Connection& connection) {
+      const bool is_held = CheckClaim(connection, c).ok();
+      if (is_held) {
+        PostponeClaim(connection, c, retry_at_ms);
+      }
+      return Result<bool>(is_held);
+    });
+  }
+  void MarkDirty(std::vector<TileId> ids, Done<std::uint32_t> done) override {
+    Write<std::uint32_t>(std::move(done), [i = std::move(ids)](Connection& connection) {
+      return Result<std::uint32_t>(MarkDirtyInStore(connection, i));
+    });
+  }
+
+  Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) override;
+  Result<TileSources> GatherTile(const TileId& id) override;
+  Result<Bytes> ReadKeyframeBlob(std::int64_t id) override {
+    return readers_.Run<Bytes>([id](Connection& connection) { return ReadBlob(connection, id); });
+  }
+  Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
+                                                    std::uint32_t limit) override;
+  Result<KeyframeRecord> ReadKeyframe(std::int64_t id) override {
+    return readers_.Run<KeyframeRecord>(
+        [id](Connection& connection) { return ReadKeyframeRecord(connection, id); });
+  }
+
+  Result<std::optional<StoredTile>> ReadTile(const TileId& id) override {
+    return readers_.Run<std::optional<StoredTile>>(
+        [&id](Connection& connection) { return ReadTileRow(connection, id); });
+  }
+  Result<std::vector<std::optional<StoredTile>>> ReadTiles(std::span<const TileId> ids) override;
+  Status ScanTiles(const TileRect& rect,
+                   const std::function<void(const TileSummary&)>& visit) override;
+  Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key, std::uint32_t limit) override {
+    return readers_.Run<std::vector<TileSummary>>([&](Connection& connection) {
+      return Result<std::vector<TileSummary>>(ListTileRows(connection, after_key, limit));
+    });
+  }
+  Result<std::vector<TileId>> ListFootprintTiles(std::int64_t after_key,
+                                                 std::uint32_t limit) override;
+
+  Result<DirtyState> ReadDirtyState() override {
+    return readers_.Run<DirtyState>(
+        [](Connection& connection) { return Result<DirtyState>(ReadDirty(connection)); });
+  }
+  Result<StoreCounts> ReadCounts() override;
+  Result<std::vector<SessionRecord>> ListSessions() override {
+    return readers_.Run<std::vector<SessionRecord>>(
+        [](Connection& connection) { return ReadSessions(connection); });
+  }
+
+ private:
+  // Queues `work`, which returns a Result<T>; `done` gets it once it is on disk.
+  template <typename T, typename Work>
+  void Write(Done<T> done, Work work) {
+    auto result = std::make_shared<Result<T>>(Error(StatusCode::kInternal, "store: not run"));
+    WriteQueue::Operation operation;
+    operation.run = [result, work = std::move(work)](Connection& connection) {
+      *result = work(connection);
+      return result->has_value() ? Status() : result->error();
+    };
+    operation.finish = [result, done = std::move(done)](const Status& status) {
+      if (status.ok()) {
+        done(std::move(*result));
+      } else {
+        done(Error(status));
+      }
+    };
+    writes_.Submit(std::move(operation));
+  }
+
+  DataDirectory directory_;  // first in, last out: the lock outlives every connection
+  AtlasIdentity identity_;
+  WriteQueue writes_;
+  ReaderPool readers_;
+};
+
+Result<std::vector<KeyframeRecord>> SqliteStore::FindKeyframes(std::span<const KeyframeKey> keys) {
+  using Records = std::vector<KeyframeRecord>;
+  return readers_.Run<Records>([keys](Connection& connection) -> Result<Records> {
+    Records records;
+    for (const KeyframeKey& key : keys) {
+      auto record = FindKeyframeRecord(connection, key);
+      if (!record) {
+        return Error(record.error());
+      }
+      records.push_back(std::move(*record));
+    }
+    return records;
+  });
+}
+
+Result<TileSources> SqliteStore::GatherTile(const TileId& id) {
+  return readers_.Run<TileSources>([&id](Connection& connection) -> Result<TileSources> {
+    TileSources sources;
+    sources.revision = ReadCounter(connection, Counter::kRevision);
+    for (const std::int64_t keyframe : KeyframesTouching(connection, id)) {
+      auto record = ReadKeyframeRecord(connection, keyframe);
+      if (!record) {
+        return Error(record.error());
+      }
+      if (record->session_state == SessionState::kLive) {
+        sources.keyframes.push_back(std::move(*record));
+      }
+    }
+    return sources;
+  });
+}
+
+Result<std::vector<std::int64_t>> SqliteStore::ListKeyframeIds(std::int64_t after_id,
+                                                               std::uint32_t limit) {
+  using Ids = std::vector<std::int64_t>;
+  return readers_.Run<Ids>([=](Connection& connection) -> Result<Ids> {
+    Query row = connection.Prepare("SELECT id FROM keyframes WHERE id > ? ORDER BY id LIMIT ?");
+    row.Bind(after_id).Bind(limit);
+    Ids ids;
+    while (row.Step()) {
+      row.Rewind();
+      ids.push_back(row.Int());
+    }
+    return ids;
+  });
+}
+
+Result<std::vector<std::optional<StoredTile>>> SqliteStore::ReadTiles(std::span<const TileId> ids) {
+  using Tiles = std::vector<std::optional<StoredTile>>;
+  return readers_.Run<Tiles>([ids](Connection& connection) -> Result<Tiles> {
+    Tiles tiles;
+    for (const TileId& id : ids) {
+      auto tile = ReadTileRow(connection, id);
+      if (!tile) {
+        return Error(tile.error());
+      }
+      tiles.push_back(std::move(*tile));
+    }
+    return tiles;
+  });
+}
+
+Status SqliteStore::ScanTiles(const TileRect& rect,
+                              const std::function<void(const TileSummary&)>& visit) {
+  const auto result = readers_.Run<bool>([&](Connection& connection) {
+    ScanTileRows(connection, rect, visit);
+    return Result<bool>(true);
+  });
+  return result ? Status() : result.error();
+}
+
+Result<std::vector<TileId>> SqliteStore::ListFootprintTiles(std::int64_t after_key,
+                                                            std::uint32_t limit) {
+  using Ids = std::vector<TileId>;
+  return readers_.Run<Ids>([=](Connection& connection) -> Result<Ids> {
+    Query row = connection.Prepare(
+        "SELECT DISTINCT tile_key FROM keyframe_tiles WHERE tile_key > ? ORDER BY tile_key LIMIT "
+        "?");
+    row.Bind(after_key).Bind(limit);
+    Ids ids;
+    while (row.Step()) {
+      row.Rewind();
+      const auto id = TileId::FromKey(row.Unsigned());
+      if (!id) {
+        return Error(id.error().WithContext("store: footprint index"));
+      }
+      ids.push_back(*id);
+    }
+    return ids;
+  });
+}
+
+Result<StoreCounts> SqliteStore::ReadCounts() {
+  return readers_.Run<StoreCounts>([this](Connection& connection) -> Result<StoreCounts> {
+    StoreCounts counts;
+    counts.revision = ReadCounter(connection, Counter::kRevision);
+    counts.keyframes = ReadCounter(connection, Counter::kKeyframes);
+    counts.keyframe_bytes = ReadCounter(connection, Counter::kKeyframeBytes);
+    counts.sessions = ReadCounter(connection, Counter::kSessions);
+    counts.tiles = ReadCounter(connection, Counter::kTiles);
+    counts.tile_bytes = ReadCounter(connection, Counter::kTileBytes);
+    counts.cells = ReadCounter(connection, Counter::kCells);
+    counts.multilayer_cells = ReadCounter(connection, Counter::kMultilayerCells);
+    counts.dirty_tiles = ReadDirty(connection).dirty_tiles;
+    counts.store_bytes = directory_.StoreBytes();
+    return counts;
+  });
+}
+
+Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
+  if (!options.new_profile) {
+    return Status(StatusCode::kNotFound,
+                  StrCat("there is no atlas in ", options.directory.string()));
+  }
+  ATLAS_RETURN_IF_ERROR(options.new_profile->Validate());
+  directory.RemoveUnfinished();
+  try {
+    Connection connection(
+        {directory.unfinished_file(), ConnectionOptions::Mode::kCreate, 2'000, 5'000});
+    CreateSchema(connection, {*options.new_profile, options.new_atlas_id, 1});
+  } catch (const std::exception& error) {
+    directory.RemoveUnfinished();
+    return StatusFromException(error).WithContext("creating an atlas");
+  }
+  return directory.Publish();
+}
+
+Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
+                                              const SqliteStoreOptions& options) {
+  try {
+    auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
+    auto identity = ReadIdentity(*writer);
+    if (!identity) {
+      return Error(identity.error().WithContext(directory.database_file().string()));
+    }
+    writer->Execute("PRAGMA journal_mode = WAL");
+    DropAllLeases(*writer);
+    return std::make_unique<SqliteStore>(options, std::move(directory), std::move(*identity),
+                                         std::move(writer));
+  } catch (const std::exception& error) {
+    return Error(StatusFromException(error).WithContext(directory.database_file().string()));
+  }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& options) {
+  auto directory = DataDirectory::Lock(options.directory);
+  if (!directory) {
+    return Error(directory.error());
+  }
+  if (!directory->has_atlas()) {
+    if (Status status = CreateAtlas(*directory, options); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return OpenAtlas(std::move(*directory), options);
+}
+
+}  // namespace atlas

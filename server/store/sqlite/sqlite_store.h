@@ -1,0 +1,32 @@
+// The atlas in one SQLite database in a directory of its own (docs/formats/store.md).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "server/store/atlas_store.h"
+
+namespace atlas {
+
+struct SqliteStoreOptions {
+  std::filesystem::path directory;
+  // For a directory without an atlas: what the new one agrees on, and its 16 random bytes.
+  std::optional<MapProfile> new_profile;
+  std::array<std::uint8_t, 16> new_atlas_id{};
+  int writer_cache_kib = 32 * 1024;
+  int reader_cache_kib = 4 * 1024;
+  std::size_t max_readers = 16;  // connections; more threads wait for one
+  std::size_t max_queued_writes = 4'096;
+  std::size_t max_group = 64;  // operations a commit
+};
+
+// Opens the atlas in the directory, or makes one if it is missing or empty and a profile is given.
+// kNotFound: there is none and no profile. kConflict: another process has it open.
+// kUnsupported: a newer schema. kInvalidData: not an atlas. Disk errors as in atlas_store.h.
+// Closing it finishes what is queued.
+Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& options);
+
+}  // namespace atlas

@@ -1,0 +1,154 @@
+#include "server/store/sqlite/transactions.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/counters.h"
+#include "server/store/sqlite/dirty_table.h"
+#include "server/store/sqlite/keyframe_table.h"
+#include "server/store/sqlite/pose_table.h"
+#include "server/store/sqlite/session_table.h"
+#include "server/store/sqlite/tile_table.h"
+
+namespace atlas {
+namespace {
+
+bool IsSameUpload(const KeyframeRow& stored, const NewKeyframe& keyframe) {
+  return stored.blob_bytes == keyframe.blob.size() && stored.blob_hash == Hash64(keyframe.blob) &&
+         stored.record.time_ms == keyframe.time_ms;
+}
+
+PutKeyframeResult AddKeyframe(Connection& connection,
+                              const NewKeyframe& keyframe,
+                              const SessionRow& session) {
+  const std::uint64_t revision = NextRevision(connection);
+  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kLastKeyframeId, 1));
+  InsertKeyframe(connection, keyframe, id, session.id, revision);
+  WritePose(connection, {id, keyframe.pose, revision, 0, keyframe.key.session.vehicle});
+  WriteFootprint(connection, id, keyframe.footprint);
+  for (const TileId& tile : keyframe.footprint) {
+    MarkTile(connection, tile, revision, revision);
+  }
+  CountKeyframe(connection, session, keyframe);
+  AddToCounter(connection, Counter::kKeyframes, 1);
+  AddToCounter(connection, Counter::kKeyframeBytes,
+               static_cast<std::int64_t>(keyframe.blob.size()));
+  return {false, revision, static_cast<std::uint32_t>(keyframe.footprint.size())};
+}
+
+// The tiles to mark for one pose of a batch; empty when the pose does not change.
+Result<std::vector<TileId>> MovePose(Connection& connection,
+                                     const NewPose& update,
+                                     const PoseChange& change) {
+  const auto stored = FindKeyframeRecord(connection, update.key);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  if (stored->pose == update.pose) {
+    return std::vector<TileId>();
+  }
+  PoseChange numbered = change;
+  numbered.keyframe_id = stored->id;
+  numbered.pose = update.pose;
+  WritePose(connection, numbered);
+  std::vector<TileId> tiles = ReadFootprint(connection, stored->id);
+  tiles.insert(tiles.end(), update.footprint.begin(), update.footprint.end());
+  WriteFootprint(connection, stored->id, update.footprint);
+  return tiles;
+}
+
+Status CheckKeysDiffer(const PoseBatch& batch) {
+  std::set<KeyframeKey> seen;
+  for (const NewPose& update : batch.poses) {
+    if (!seen.insert(update.key).second) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("pose batch: keyframe ", update.key, " is in it twice"));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKeyframe& keyframe) {
+  const auto session = FindOrAddSession(connection, keyframe.key.session);
+  if (!session) {
+    return Error(session.error());
+  }
+  const auto stored = FindKeyframeRow(connection, session->id, keyframe.key.sequence);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  if (!*stored) {
+    return AddKeyframe(connection, keyframe, *session);
+  }
+  if (!IsSameUpload(**stored, keyframe)) {
+    return Error(StatusCode::kConflict,
+                 StrCat("keyframe ", keyframe.key, " is in the atlas with other content"));
+  }
+  return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
+}
+
+Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBatch& batch) {
+  if (Status status = CheckKeysDiffer(batch); !status.ok()) {
+    return Error(std::move(status));
+  }
+  PoseBatchResult result;
+  PoseChange change;
+  change.revision = ReadCounter(connection, Counter::kRevision) + 1;
+  change.batch = ReadCounter(connection, Counter::kBatch) + 1;
+  change.author = batch.author;
+  std::set<TileId> marked;
+  for (const NewPose& update : batch.poses) {
+    const auto tiles = MovePose(connection, update, change);
+    if (!tiles) {
+      return Error(tiles.error());
+    }
+    result.updated += tiles->empty() ? 0u : 1u;
+    marked.insert(tiles->begin(), tiles->end());
+  }
+  if (result.updated == 0) {
+    result.revision = change.revision - 1;
+    return result;
+  }
+  result.revision = NextRevision(connection);
+  result.batch = AddToCounter(connection, Counter::kBatch, 1);
+  result.tiles_marked = static_cast<std::uint32_t>(marked.size());
+  for (const TileId& tile : marked) {
+    MarkTile(connection, tile, result.revision, result.revision);
+  }
+  WritePoseBatch(connection, batch, result);
+  return result;
+}
+
+Result<FinishResult> FinishTileInStore(Connection& connection,
+                                       const FinishedTile& tile,
+                                       std::uint8_t levels) {
+  if (Status status = CheckClaim(connection, tile.claim); !status.ok()) {
+    return Error(std::move(status));
+  }
+  FinishResult result;
+  const TileId& id = tile.claim.id;
+  result.is_changed = StoreTile(connection, id, tile.content, tile.fused_revision);
+  if (result.is_changed) {
+    result.revision = ReadCounter(connection, Counter::kRevision);
+    if (id.level + 1 < levels) {
+      MarkTile(connection, id.Parent(), result.revision, tile.claim.since);
+    }
+  }
+  SettleClaim(connection, tile.claim);
+  return result;
+}
+
+std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids) {
+  const std::uint64_t revision = NextRevision(connection);
+  for (const TileId& id : ids) {
+    MarkTile(connection, id, revision, revision);
+  }
+  return static_cast<std::uint32_t>(ids.size());
+}
+
+}  // namespace atlas

@@ -1,0 +1,184 @@
+// What goes into an AtlasStore and what comes out of it: plain values, no storage engine in sight.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/bytes.h"
+#include "core/geometry/grid_geometry.h"
+#include "core/geometry/keyframe_key.h"
+#include "core/geometry/map_profile.h"
+#include "core/geometry/pose.h"
+#include "core/geometry/tile_id.h"
+
+namespace atlas {
+
+// Fixed when the atlas was created.
+struct AtlasIdentity {
+  MapProfile profile;
+  std::array<std::uint8_t, 16> atlas_id{};
+  std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup
+};
+
+// Frozen numbers (docs/formats/store.md). Only kLive has behaviour yet.
+enum class SessionState : std::uint8_t { kStaged = 0, kLive = 1, kQuarantined = 2, kRetracted = 3 };
+
+struct PositionPrior {
+  std::int64_t x_um = 0;
+  std::int64_t y_um = 0;
+  std::int64_t z_um = 0;
+  std::uint32_t radius_mm = 0;
+};
+
+struct NewKeyframe {
+  KeyframeKey key;
+  std::int64_t time_ms = 0;
+  QuantizedPose pose;
+  GridGeometry grid;  // of the blob's header, as is the next
+  std::array<std::int32_t, 4> level_quaternion{};
+  std::optional<PositionPrior> prior;
+  Bytes blob;
+  std::vector<TileId> footprint;  // the level-0 tiles it touches at `pose`
+};
+
+struct PutKeyframeResult {
+  bool is_duplicate = false;
+  std::uint64_t revision = 0;
+  std::uint32_t tiles_marked = 0;
+};
+
+struct NewPose {
+  KeyframeKey key;
+  QuantizedPose pose;
+  std::vector<TileId> footprint;  // at `pose`
+};
+
+struct PoseBatch {
+  std::vector<NewPose> poses;
+  std::string author;
+  std::uint64_t if_revision = 0;  // reserved: stored, without behaviour
+};
+
+struct PoseBatchResult {
+  std::uint32_t updated = 0;
+  std::uint32_t tiles_marked = 0;
+  std::uint64_t revision = 0;
+  std::uint64_t batch = 0;
+};
+
+// A stored keyframe without its blob: enough to place it on the map.
+struct KeyframeRecord {
+  std::int64_t id = 0;
+  KeyframeKey key;
+  std::int64_t time_ms = 0;
+  GridGeometry grid;
+  std::array<std::int32_t, 4> level_quaternion{};
+  QuantizedPose pose;
+  SessionState session_state = SessionState::kLive;
+};
+
+// What a level-0 tile is fused from, read in one snapshot.
+struct TileSources {
+  std::uint64_t revision = 0;
+  std::vector<KeyframeRecord> keyframes;
+};
+
+struct TileContent {
+  Bytes blob;
+  std::uint64_t payload_hash = 0;
+  std::uint32_t cells = 0;             // with a layer
+  std::uint32_t multilayer_cells = 0;  // with two or more
+};
+
+struct TileSummary {
+  TileId id;
+  std::uint64_t revision = 0;
+  std::uint64_t payload_hash = 0;
+  std::uint32_t blob_bytes = 0;
+};
+
+struct StoredTile {
+  TileId id;
+  std::uint64_t revision = 0;
+  std::uint64_t payload_hash = 0;
+  Bytes blob;
+};
+
+// A right to build one dirty tile.
+struct TileClaim {
+  TileId id;
+  std::string owner;
+  std::uint64_t generation = 0;  // the revision that marked it last
+  std::uint64_t since = 0;       // the first revision that the tile does not reflect
+};
+
+struct ClaimRequest {
+  std::string owner;  // one name a worker: a lease that ran out may be another's already
+  std::int64_t now_ms = 0;
+  std::int64_t lease_ms = 0;
+  std::uint32_t max_tiles = 1;
+  std::uint64_t wave = 0;  // only marks whose `since` is at most this revision
+};
+
+struct ClaimResult {
+  std::vector<TileClaim> claims;
+  bool is_wave_done = false;  // no mark of the wave is left, claimed or not
+};
+
+struct FinishedTile {
+  TileClaim claim;
+  std::uint64_t fused_revision = 0;    // of the snapshot that it was made from
+  std::optional<TileContent> content;  // none: the tile is empty
+};
+
+struct FinishResult {
+  bool is_changed = false;
+  std::uint64_t revision = 0;  // the tile's, if it changed
+};
+
+struct DirtyState {
+  std::uint64_t revision = 0;
+  std::uint64_t dirty_tiles = 0;
+  std::uint64_t oldest_since = 0;  // lowest `since` of all marks; 0 without marks
+};
+
+struct StoreCounts {
+  std::uint64_t revision = 0;
+  std::uint64_t keyframes = 0;
+  std::uint64_t keyframe_bytes = 0;
+  std::uint64_t sessions = 0;
+  std::uint64_t tiles = 0;
+  std::uint64_t tile_bytes = 0;
+  std::uint64_t cells = 0;             // level 0
+  std::uint64_t multilayer_cells = 0;  // level 0
+  std::uint64_t dirty_tiles = 0;
+  std::uint64_t store_bytes = 0;
+};
+
+struct SessionRecord {
+  SessionKey key;
+  SessionState state = SessionState::kLive;
+  std::uint64_t keyframes = 0;
+  std::uint64_t bytes = 0;
+  std::int64_t first_time_ms = 0;
+  std::int64_t last_time_ms = 0;
+  std::uint32_t last_sequence = 0;
+};
+
+// Tile coordinates of one level, both ends included.
+struct TileRect {
+  std::uint8_t level = 0;
+  std::int32_t min_x = TileId::kMinCoordinate;
+  std::int32_t min_y = TileId::kMinCoordinate;
+  std::int32_t max_x = TileId::kMaxCoordinate;
+  std::int32_t max_y = TileId::kMaxCoordinate;
+
+  bool Contains(const TileId& id) const {
+    return id.level == level && id.x >= min_x && id.x <= max_x && id.y >= min_y && id.y <= max_y;
+  }
+};
+
+}  // namespace atlas

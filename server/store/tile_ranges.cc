@@ -1,0 +1,103 @@
+#include "server/store/tile_ranges.h"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+namespace atlas {
+namespace {
+
+constexpr int kShardBits = 10;
+constexpr int kCoordinateBits = 29;
+
+// A square of 2^bits tiles a side whose lower corner is aligned to its size: its keys are
+// consecutive.
+struct Square {
+  std::int64_t x = 0;
+  std::int64_t y = 0;
+  int bits = 0;
+
+  std::int64_t side() const { return std::int64_t{1} << bits; }
+};
+
+enum class Overlap { kNone, kPart, kWhole };
+
+Overlap OverlapOf(const Square& square, const TileRect& rect) {
+  const std::int64_t last_x = square.x + square.side() - 1;
+  const std::int64_t last_y = square.y + square.side() - 1;
+  if (square.x > rect.max_x || last_x < rect.min_x || square.y > rect.max_y ||
+      last_y < rect.min_y) {
+    return Overlap::kNone;
+  }
+  const bool is_inside = square.x >= rect.min_x && last_x <= rect.max_x && square.y >= rect.min_y &&
+                         last_y <= rect.max_y;
+  return is_inside ? Overlap::kWhole : Overlap::kPart;
+}
+
+KeyRange RangeOf(const Square& square, std::uint8_t level) {
+  const TileId corner{level, static_cast<std::int32_t>(square.x),
+                      static_cast<std::int32_t>(square.y)};
+  const auto first = static_cast<std::int64_t>(corner.Key());
+  return {first, first + (std::int64_t{1} << (2 * square.bits)) - 1};
+}
+
+std::vector<Square> Overlapping(const std::vector<Square>& squares, const TileRect& rect) {
+  std::vector<Square> result;
+  for (const Square& square : squares) {
+    if (square.bits == 0 || OverlapOf(square, rect) == Overlap::kWhole) {
+      result.push_back(square);
+      continue;
+    }
+    const Square child{square.x, square.y, square.bits - 1};
+    const std::int64_t half = child.side();
+    for (const auto& [dx, dy] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {  // key order
+      const Square quarter{child.x + dx * half, child.y + dy * half, child.bits};
+      if (OverlapOf(quarter, rect) != Overlap::kNone) {
+        result.push_back(quarter);
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<KeyRange> CoverRect(const TileRect& rect, std::size_t max_ranges) {
+  assert(max_ranges >= 4);
+  if (rect.min_x > rect.max_x || rect.min_y > rect.max_y) {
+    return {};
+  }
+  std::vector<Square> squares{{TileId::kMinCoordinate, TileId::kMinCoordinate, kCoordinateBits}};
+  for (int step = 0; step < kCoordinateBits; ++step) {
+    std::vector<Square> finer = Overlapping(squares, rect);
+    if (finer.size() > max_ranges) {
+      break;
+    }
+    squares = std::move(finer);
+  }
+  std::vector<KeyRange> ranges;
+  for (const Square& square : squares) {
+    const KeyRange range = RangeOf(square, rect.level);
+    if (!ranges.empty() && ranges.back().last + 1 == range.first) {
+      ranges.back().last = range.last;
+    } else {
+      ranges.push_back(range);
+    }
+  }
+  return ranges;
+}
+
+KeyRange LevelRange(std::uint8_t level) {
+  return RangeOf({TileId::kMinCoordinate, TileId::kMinCoordinate, kCoordinateBits}, level);
+}
+
+std::int64_t ShardOf(const TileId& id) {
+  TileId region = id;
+  if (id.level < kShardBits) {
+    const int shift = kShardBits - id.level;
+    region = {kShardBits, id.x >> shift, id.y >> shift};
+  }
+  return static_cast<std::int64_t>(region.Key());
+}
+
+}  // namespace atlas

@@ -1,0 +1,150 @@
+// The front end in small worlds: flat ground, a kerb, a wall, a ceiling, a ramp.
+#include "core/keyframe/keyframe_builder.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "core/geometry/nibble.h"
+#include "core/keyframe/keyframe_codec.h"
+#include "tests/core/support/synthetic_scan.h"
+
+namespace atlas {
+namespace {
+
+using testing::GroundRange;
+using testing::Nearest;
+using testing::Scan;
+using testing::Vlp16;
+
+constexpr double kHeight_m = 1.8;
+
+// A wall across the road, `x_m` ahead.
+std::optional<double> WallAhead(const Eigen::Vector3d& direction, double x_m) {
+  return direction.x() > 1e-6 ? std::optional<double>(x_m / direction.x()) : std::nullopt;
+}
+
+class KeyframeBuilderTest : public ::testing::Test {
+ protected:
+  Keyframe Build(const testing::World& world,
+                 const Eigen::Quaterniond& R_level_sensor = Eigen::Quaterniond::Identity()) {
+    const PointCloud cloud = Scan(Vlp16(), world);
+    SensorLayoutEstimator estimator;
+    estimator.Add(cloud);
+    KeyframeBuilderOptions options;
+    options.sensor_height_m = kHeight_m;
+    const KeyframeBuilder builder(profile_, *estimator.Estimate(), options);
+    Keyframe keyframe = builder.Build(cloud, R_level_sensor);
+    EXPECT_TRUE(ValidateKeyframe(keyframe).ok());
+    const Result<Keyframe> decoded = DecodeKeyframe(EncodeKeyframe(keyframe));
+    EXPECT_TRUE(decoded.has_value() && *decoded == keyframe);
+    return keyframe;
+  }
+
+  static std::size_t CellAt(const Keyframe& keyframe, double x_m, double y_m) {
+    return keyframe.grid.Index(static_cast<std::int32_t>(std::floor(x_m / 0.1)),
+                               static_cast<std::int32_t>(std::floor(y_m / 0.1)));
+  }
+
+  // State of the column's segment at height `z_m` (levelled frame) of the cell at (x, y).
+  std::uint8_t Segment(const Keyframe& keyframe, double x_m, double y_m, double z_m) const {
+    const auto ix = static_cast<std::int32_t>(std::floor(x_m / 0.1));
+    const auto iy = static_cast<std::int32_t>(std::floor(y_m / 0.1));
+    const int segment = static_cast<int>(std::floor(z_m / profile_.segment_height_m())) -
+                        keyframe.anchors[keyframe.BlockIndex(ix, iy)];
+    EXPECT_GE(segment, 0);
+    EXPECT_LT(segment, profile_.column_segments);
+    return NibbleAt(keyframe.columns[keyframe.grid.Index(ix, iy)], segment);
+  }
+
+  MapProfile profile_;
+};
+
+TEST_F(KeyframeBuilderTest, FlatGroundIsFreeAndAtTheSensorsHeight) {
+  const Keyframe keyframe =
+      Build([](const Eigen::Vector3d& d) { return GroundRange(d, kHeight_m); });
+  for (double r = 1.0; r < 14.5; r += 0.9) {  // the ring at -7 degrees ends at 14.7 m
+    for (int k = 0; k < 24; ++k) {
+      const KeyframeCell& cell =
+          keyframe.cells[CellAt(keyframe, r * std::cos(k * 0.26), r * std::sin(k * 0.26))];
+      EXPECT_EQ(cell.occupancy, Occupancy::kFree) << r << " " << k;
+      EXPECT_NEAR(cell.altitude_mm, -1800, 15) << r << " " << k;
+    }
+  }
+}
+
+TEST_F(KeyframeBuilderTest, AWallEndsTheGroundAndRaisesColumns) {
+  const Keyframe keyframe = Build([](const Eigen::Vector3d& d) {
+    return Nearest(GroundRange(d, kHeight_m), WallAhead(d, 10.05));
+  });
+  EXPECT_EQ(keyframe.cells[CellAt(keyframe, 9.0, 0.05)].occupancy, Occupancy::kFree);
+  EXPECT_EQ(keyframe.cells[CellAt(keyframe, 10.05, 0.05)].occupancy, Occupancy::kObstacle);
+  EXPECT_EQ(keyframe.cells[CellAt(keyframe, 11.0, 0.05)].occupancy, Occupancy::kUnknown);
+  EXPECT_NEAR(keyframe.cells[CellAt(keyframe, 10.05, 0.05)].altitude_mm, -1800, 50);
+  EXPECT_EQ(Segment(keyframe, 10.05, 0.05, 0.5), kNibbleHit);
+  EXPECT_EQ(Segment(keyframe, 10.05, 0.05, -0.5), kNibbleHit);
+  EXPECT_EQ(Segment(keyframe, 6.05, 0.05, 0.5), kNibbleMiss);
+  EXPECT_EQ(Segment(keyframe, 11.05, 0.05, 0.5), 0);  // nothing is known behind it
+}
+
+TEST_F(KeyframeBuilderTest, ACeilingIsNoGroundAndStopsNoVehicle) {
+  const Keyframe keyframe = Build([](const Eigen::Vector3d& d) {
+    const std::optional<double> ceiling =
+        d.z() > 0.0 ? std::optional<double>(1.2 / d.z()) : std::nullopt;
+    return Nearest(GroundRange(d, kHeight_m), ceiling);
+  });
+  for (double x = 3.0; x < 14.5; x += 0.5) {
+    const KeyframeCell& cell = keyframe.cells[CellAt(keyframe, x, 0.05)];
+    EXPECT_EQ(cell.occupancy, Occupancy::kFree) << x;
+    EXPECT_LT(cell.altitude_mm, -1700) << x;
+  }
+}
+
+TEST_F(KeyframeBuilderTest, ATiltedVehicleStandsOnATiltedPlane) {
+  // Level ground, the sensor pitched by 10 degrees: the levelled frame shows flat ground again, but
+  // below the vehicle itself the plane of its wheels.
+  const Eigen::Quaterniond pitch(
+      Eigen::AngleAxisd(10.0 * testing::kDegree, Eigen::Vector3d::UnitY()));
+  const Keyframe keyframe =
+      Build([&](const Eigen::Vector3d& d) { return GroundRange(pitch * d, kHeight_m); }, pitch);
+  const KeyframeCell& far = keyframe.cells[CellAt(keyframe, 12.0, 0.05)];
+  EXPECT_NEAR(far.altitude_mm, -1800, 30);
+  const KeyframeCell& below = keyframe.cells[CellAt(keyframe, 1.0, 0.05)];
+  EXPECT_NEAR(below.altitude_mm, -1800 - 1000.0 * 1.05 * std::tan(10.0 * testing::kDegree), 40);
+}
+
+TEST_F(KeyframeBuilderTest, AScanWithoutReturnsSeesNothingButItsOwnPlace) {
+  KeyframeBuilderOptions options;
+  const KeyframeBuilder builder(profile_, SensorLayout{EgoBox(), std::vector<float>(16, 0.0F)},
+                                options);
+  const Keyframe keyframe = builder.Build(PointCloud(), Eigen::Quaterniond::Identity());
+  EXPECT_TRUE(ValidateKeyframe(keyframe).ok());
+  for (const KeyframeCell& cell : keyframe.cells) {
+    EXPECT_NE(cell.occupancy, Occupancy::kObstacle);
+  }
+}
+
+TEST_F(KeyframeBuilderTest, OptionsOutOfRangeAreNamed) {
+  KeyframeBuilderOptions options;
+  EXPECT_TRUE(options.Validate(profile_).ok());
+  options.max_range_m = 0.5;
+  EXPECT_EQ(options.Validate(profile_).code(), StatusCode::kInvalidArgument);
+  options.max_range_m = 20.0;
+  options.sensor_height_m = std::nan("");
+  EXPECT_EQ(options.Validate(profile_).code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(KeyframeBuilderTest, SensorHeightIsTheMedianOfTheGround) {
+  const PointCloud cloud =
+      Scan(Vlp16(), [](const Eigen::Vector3d& d) { return GroundRange(d, 1.42); });
+  SensorLayoutEstimator estimator;
+  estimator.Add(cloud);
+  const std::vector<LeveledScan> scans{
+      SegmentScan(cloud, *estimator.Estimate(), 1, Eigen::Quaterniond::Identity(), {})};
+  EXPECT_NEAR(EstimateSensorHeight(scans).value(), 1.42, 0.005);
+  EXPECT_EQ(EstimateSensorHeight({}).error().code(), StatusCode::kInvalidData);
+}
+
+}  // namespace
+}  // namespace atlas

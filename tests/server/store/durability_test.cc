@@ -1,0 +1,248 @@
+// What the disk does to the store: reopening, locks, other schemas, damage, no room, no right.
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <fstream>
+#include <future>
+
+#include <sqlite3.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/server/store/store_fixture.h"
+
+namespace atlas {
+namespace {
+
+const TileId kA{0, 0, 0};
+
+class DurabilityTest : public StoreTest {
+ protected:
+  // Runs SQL on the closed database.
+  void Tamper(const std::string& sql) {
+    store_.reset();
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(db);
+  }
+  void OpenWithOneTile() {
+    Open();
+    ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
+    ASSERT_TRUE(Finish(Claim().claims.at(0), Content(7)).has_value());
+  }
+};
+
+TEST_F(DurabilityTest, AnAcknowledgedGroupIsThereAfterReopening) {
+  Open();
+  constexpr int kUploads = 300;
+  std::atomic<int> acknowledged = 0;
+  std::promise<void> all;
+  for (std::uint32_t i = 0; i < kUploads; ++i) {
+    store_->PutKeyframe(MakeKeyframe(i, {kA}), [&](const Result<PutKeyframeResult>& result) {
+      EXPECT_TRUE(result.has_value());
+      if (++acknowledged == kUploads) {
+        all.set_value();
+      }
+    });
+  }
+  all.get_future().wait();
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 300u);
+  EXPECT_EQ(store_->ReadCounts()->revision, 300u);
+  EXPECT_EQ(store_->GatherTile(kA)->keyframes.size(), 300u);
+}
+
+TEST_F(DurabilityTest, AnAcknowledgedWriteSurvivesAKilledProcess) {
+  std::array<int, 2> pipe_ends{};
+  ASSERT_EQ(::pipe(pipe_ends.data()), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    Open();
+    const char ok = Put(MakeKeyframe(1, {kA})).has_value() ? 1 : 0;
+    [[maybe_unused]] const auto written = ::write(pipe_ends[1], &ok, 1);
+    ::pause();
+  }
+  char ok = 0;
+  ASSERT_EQ(::read(pipe_ends[0], &ok, 1), 1);
+  EXPECT_EQ(OpenCode(), StatusCode::kConflict);  // the child holds the directory
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  ::close(pipe_ends[0]);
+  ::close(pipe_ends[1]);
+  ASSERT_EQ(ok, 1);
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 1u);
+  EXPECT_EQ(Dirty().dirty_tiles, 1u);
+}
+
+TEST_F(DurabilityTest, ASecondOpenIsRefusedAndNamesTheProcess) {
+  Open();
+  const auto second = OpenSqliteStore(options_);
+  ASSERT_FALSE(second.has_value());
+  EXPECT_EQ(second.error().code(), StatusCode::kConflict);
+  EXPECT_NE(second.error().message().find(std::to_string(::getpid())), std::string::npos);
+}
+
+TEST_F(DurabilityTest, IdentityIsKept) {
+  options_.new_profile->cell_size_um = 200'000;
+  Open();
+  options_.new_profile = MapProfile();
+  options_.new_atlas_id = {9};
+  Open();
+  EXPECT_EQ(store_->identity().profile.cell_size_um, 200'000u);
+  EXPECT_EQ(store_->identity().atlas_id[0], 1);
+}
+
+TEST_F(DurabilityTest, WithoutAProfileNothingIsCreated) {
+  options_.new_profile.reset();
+  EXPECT_EQ(OpenCode(), StatusCode::kNotFound);
+  EXPECT_FALSE(std::filesystem::exists(Database()));
+}
+
+TEST_F(DurabilityTest, ADirectoryOfOtherFilesIsLeftAlone) {
+  std::filesystem::create_directories(options_.directory);
+  std::ofstream(options_.directory / "holiday.jpg") << "x";
+  EXPECT_EQ(OpenCode(), StatusCode::kInvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists(options_.directory / "lock"));
+}
+
+TEST_F(DurabilityTest, ANewerSchemaIsRefused) {
+  Open();
+  Tamper("PRAGMA user_version = 2");
+  EXPECT_EQ(OpenCode(), StatusCode::kUnsupported);
+}
+
+TEST_F(DurabilityTest, AnotherProgramsDatabaseIsRefused) {
+  Open();
+  Tamper("PRAGMA application_id = 7");
+  EXPECT_EQ(OpenCode(), StatusCode::kInvalidData);
+  std::ofstream(Database(), std::ios::trunc) << std::string(20'000, 'x');
+  EXPECT_EQ(OpenCode(), StatusCode::kInvalidData);
+}
+
+TEST_F(DurabilityTest, ADamagedProfileIsRefused) {
+  Open();
+  Tamper("UPDATE meta SET epoch = 5");
+  EXPECT_EQ(OpenCode(), StatusCode::kInvalidData);
+}
+
+TEST_F(DurabilityTest, DamagedRowsAreDetectedAndTheOthersServed) {
+  const std::vector<std::string> damages = {
+      "UPDATE keyframes SET time_ms = time_ms + 1",
+      "UPDATE keyframes SET radius_cells = 7",
+      "UPDATE poses SET x_um = 1",
+      "DELETE FROM poses",
+      "UPDATE sessions SET vehicle = 'car'",
+  };
+  for (const std::string& damage : damages) {
+    SCOPED_TRACE(damage);
+    std::filesystem::remove_all(options_.directory);
+    OpenWithOneTile();
+    Tamper(damage);
+    Open();
+    const auto sources = store_->GatherTile(kA);
+    ASSERT_FALSE(sources.has_value());
+    EXPECT_EQ(sources.error().code(), StatusCode::kInvalidData);
+    EXPECT_TRUE(store_->ReadTile(kA)->has_value());
+    EXPECT_TRUE(Put([] {
+                  NewKeyframe keyframe = MakeKeyframe(9, {});
+                  keyframe.key.session.session = "other";
+                  return keyframe;
+                }())
+                    .has_value());
+    store_.reset();
+  }
+}
+
+TEST_F(DurabilityTest, DamagedBlobsAreDetected) {
+  OpenWithOneTile();
+  Tamper("UPDATE keyframes SET blob = x'070702'; UPDATE tiles SET blob = x'07010204'");
+  Open();
+  EXPECT_EQ(store_->ReadKeyframeBlob(1).error().code(), StatusCode::kInvalidData);
+  const auto tile = store_->ReadTile(kA);
+  ASSERT_FALSE(tile.has_value());
+  EXPECT_EQ(tile.error().code(), StatusCode::kInvalidData);
+  EXPECT_NE(tile.error().message().find("0/0/0"), std::string::npos);
+}
+
+TEST_F(DurabilityTest, ADamagedTileIsHealedByBuildingItAgain) {
+  OpenWithOneTile();
+  Tamper("UPDATE tiles SET cells = 1000000");
+  Open();
+  ASSERT_TRUE(Await<std::uint32_t>([&](auto done) {
+                store_->MarkDirty({kA}, std::move(done));
+              }).has_value());
+  ASSERT_TRUE(Finish(Claim().claims.at(0), Content(7)).has_value());
+  EXPECT_TRUE(store_->ReadTile(kA)->has_value());
+  EXPECT_EQ(store_->ReadCounts()->cells, 10u);
+  EXPECT_EQ(store_->ReadCounts()->tiles, 1u);
+}
+
+// A file system of its own size, for root only.
+class DiskTest : public DurabilityTest {
+ protected:
+  void SetUp() override {
+    mount_ = directory_ / "disk";
+    std::filesystem::create_directories(mount_);
+    if (::geteuid() != 0 || ::mount("none", mount_.c_str(), "tmpfs", 0, "size=1m") != 0) {
+      GTEST_SKIP() << "needs root and a tmpfs mount";
+    }
+    is_mounted_ = true;
+    options_.directory = mount_ / "data";
+  }
+  void TearDown() override {
+    store_.reset();
+    if (is_mounted_) {
+      ::umount2(mount_.c_str(), MNT_DETACH);
+    }
+  }
+  NewKeyframe Big(std::uint32_t sequence) {
+    NewKeyframe keyframe = MakeKeyframe(sequence, {kA});
+    keyframe.blob.resize(50'000, 1);
+    return keyframe;
+  }
+
+  std::filesystem::path mount_;
+  bool is_mounted_ = false;
+};
+
+TEST_F(DiskTest, AFullDiskRefusesWritesKeepsReadsAndRecovers) {
+  Open();
+  std::uint64_t accepted = 0;
+  Status refusal;
+  for (std::uint32_t i = 0; i < 100 && refusal.ok(); ++i) {
+    const auto put = Put(Big(i));
+    accepted += put ? 1u : 0u;
+    refusal = put ? Status() : put.error();
+  }
+  EXPECT_EQ(refusal.code(), StatusCode::kResourceExhausted) << refusal.message();
+  EXPECT_GT(accepted, 0u);
+  EXPECT_EQ(store_->ReadCounts()->keyframes, accepted);
+  EXPECT_EQ(store_->GatherTile(kA)->keyframes.size(), accepted);
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=16m"), 0);
+  const auto after = Put(Big(1000));
+  ASSERT_TRUE(after.has_value()) << after.error().message();
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, accepted + 1);
+}
+
+TEST_F(DiskTest, NoAtlasIsHalfMadeOnAFullDisk) {
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=32k"), 0);
+  EXPECT_EQ(OpenCode(), StatusCode::kResourceExhausted);
+  EXPECT_FALSE(std::filesystem::exists(Database()));
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=16m"), 0);
+  EXPECT_EQ(OpenCode(), StatusCode::kOk);
+}
+
+TEST_F(DiskTest, AReadOnlyDiskIsRefused) {
+  Open();
+  store_.reset();
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, "size=1m"), 0);
+  EXPECT_EQ(OpenCode(), StatusCode::kPermissionDenied);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,97 @@
+// A store in a directory of its own, and short ways to write to it.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/store/atlas_store.h"
+#include "server/store/await.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace atlas {
+
+class StoreTest : public testing::Test {
+ protected:
+  StoreTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "atlas_store_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::runtime_error("cannot make " + name);
+    }
+    directory_ = name;
+    options_.directory = directory_ / "data";
+    options_.new_profile = MapProfile();
+    options_.new_atlas_id = {1, 2, 3};
+  }
+  ~StoreTest() override {
+    store_.reset();
+    std::error_code ignored;
+    std::filesystem::remove_all(directory_, ignored);
+  }
+
+  void Open() {
+    store_.reset();
+    auto store = OpenSqliteStore(options_);
+    ASSERT_TRUE(store.has_value()) << store.error().message();
+    store_ = std::move(*store);
+  }
+  StatusCode OpenCode() {
+    const auto store = OpenSqliteStore(options_);
+    return store ? StatusCode::kOk : store.error().code();
+  }
+
+  static NewKeyframe MakeKeyframe(std::uint32_t sequence, std::vector<TileId> footprint) {
+    NewKeyframe keyframe;
+    keyframe.key = {{"bus", "day"}, sequence};
+    keyframe.time_ms = 1000 + sequence;
+    keyframe.level_quaternion = {1 << 30, 0, 0, 0};
+    keyframe.blob = {7, 7, static_cast<std::uint8_t>(sequence)};
+    keyframe.footprint = std::move(footprint);
+    return keyframe;
+  }
+  static QuantizedPose PoseAt(std::int64_t x_um) {
+    QuantizedPose pose;
+    pose.x_um = x_um;
+    return pose;
+  }
+
+  Result<PutKeyframeResult> Put(NewKeyframe keyframe) {
+    return Await<PutKeyframeResult>(
+        [&](auto done) { store_->PutKeyframe(std::move(keyframe), std::move(done)); });
+  }
+  Result<PoseBatchResult> Update(std::vector<NewPose> poses) {
+    return Await<PoseBatchResult>([&](auto done) {
+      store_->UpdatePoses({std::move(poses), "tester", 0}, std::move(done));
+    });
+  }
+  ClaimResult Claim(std::uint64_t wave = 1u << 30,
+                    std::string owner = "w",
+                    std::int64_t now_ms = 1000) {
+    return Await<ClaimResult>([&](auto done) {
+             store_->ClaimDirty({std::move(owner), now_ms, 60'000, 100, wave}, std::move(done));
+           })
+        .value();
+  }
+  Result<FinishResult> Finish(const TileClaim& claim, std::optional<TileContent> content) {
+    return Await<FinishResult>([&](auto done) {
+      store_->FinishTile({claim, 1, std::move(content)}, std::move(done));
+    });
+  }
+  static TileContent Content(std::uint8_t value) {
+    return {Bytes{value, 1, 2, 3}, value, 10, value};
+  }
+  DirtyState Dirty() { return store_->ReadDirtyState().value(); }
+  std::filesystem::path Database() const { return options_.directory / "atlas.db"; }
+
+  std::filesystem::path directory_;
+  SqliteStoreOptions options_;
+  std::unique_ptr<AtlasStore> store_;
+};
+
+}  // namespace atlas
