@@ -117,7 +117,8 @@ AtlasClient& AtlasClient::operator=(AtlasClient&&) noexcept = default;
 AtlasClient::~AtlasClient() = default;
 
 Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
-  Result<Connection> connection = Connection::Open(options.endpoint, options.connect_timeout);
+  Result<DaemonConnection> connection =
+      DaemonConnection::Open(options.endpoint, options.connect_timeout);
   if (!connection) return Error(connection.error());
   auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
   wire::Envelope request = HelloRequest(options);
