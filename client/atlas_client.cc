@@ -109,15 +109,16 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
 }  // namespace
 
 AtlasClient::AtlasClient(std::unique_ptr<RpcChannel> channel,
-                         MapProfile profile,
+                         const MapProfile& profile,
                          AtlasIdentity atlas)
-    : channel_(std::move(channel)), profile_(std::move(profile)), atlas_(std::move(atlas)) {}
+    : channel_(std::move(channel)), profile_(profile), atlas_(std::move(atlas)) {}
 AtlasClient::AtlasClient(AtlasClient&&) noexcept = default;
 AtlasClient& AtlasClient::operator=(AtlasClient&&) noexcept = default;
 AtlasClient::~AtlasClient() = default;
 
 Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
-  Result<Connection> connection = Connection::Open(options.endpoint, options.connect_timeout);
+  Result<DaemonConnection> connection =
+      DaemonConnection::Open(options.endpoint, options.connect_timeout);
   if (!connection) return Error(connection.error());
   auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
   wire::Envelope request = HelloRequest(options);
@@ -127,9 +128,9 @@ Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
   if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {
     return Error(std::move(status));
   }
-  Result<MapProfile> profile = ProfileFromWire(hello.profile());
+  const Result<MapProfile> profile = ProfileFromWire(hello.profile());
   if (!profile) return Error(profile.error().WithContext("daemon's handshake"));
-  return AtlasClient(std::move(channel), *std::move(profile), IdentityFromWire(hello));
+  return AtlasClient(std::move(channel), *profile, IdentityFromWire(hello));
 }
 
 Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection> corrections,

@@ -35,6 +35,8 @@ class AtlasClient {
   // Connects and shakes hands. kUnsupported when the daemon speaks another protocol version.
   static Result<AtlasClient> Connect(const ConnectionOptions& options);
 
+  AtlasClient(const AtlasClient&) = delete;
+  AtlasClient& operator=(const AtlasClient&) = delete;
   AtlasClient(AtlasClient&&) noexcept;
   AtlasClient& operator=(AtlasClient&&) noexcept;
   ~AtlasClient();
@@ -60,7 +62,7 @@ class AtlasClient {
 
  private:
   friend class KeyframeUploader;
-  AtlasClient(std::unique_ptr<RpcChannel> channel, MapProfile profile, AtlasIdentity atlas);
+  AtlasClient(std::unique_ptr<RpcChannel> channel, const MapProfile& profile, AtlasIdentity atlas);
 
   std::unique_ptr<RpcChannel> channel_;
   MapProfile profile_;

@@ -84,9 +84,9 @@ Result<std::vector<TileId>> TilesInDisc(const Eigen::Vector2d& center_m,
   if (!first) return Error(first.error());
   const auto last = LocateCell(center_m + reach, level, profile);
   if (!last) return Error(last.error());
-  const auto columns = static_cast<std::size_t>(last->tile.x - first->tile.x + 1);
-  const auto rows = static_cast<std::size_t>(last->tile.y - first->tile.y + 1);
-  if (columns > max_tiles || rows > max_tiles || columns * rows > max_tiles) {
+  const std::int64_t columns = std::int64_t{last->tile.x} - first->tile.x + 1;
+  const std::int64_t rows = std::int64_t{last->tile.y} - first->tile.y + 1;
+  if (static_cast<std::uint64_t>(columns * rows) > max_tiles) {
     return Error(StatusCode::kInvalidArgument,
                  StrCat("radius ", radius_m, " m at level ", int{level}, ": more than ", max_tiles,
                         " tiles"));

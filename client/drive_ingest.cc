@@ -131,8 +131,7 @@ class Ingest {
     const CpuTimer timer;
     if (options_.is_deskewed) cloud = Deskew(cloud, MotionAt(drive_, index));
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
-    const Bytes blob =
-        EncodeKeyframe(builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor));
+    Bytes blob = EncodeKeyframe(builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor));
     report_.frontend_s += timer.elapsed_s();
     return blob;
   }

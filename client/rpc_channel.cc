@@ -7,7 +7,7 @@
 
 namespace atlas {
 
-RpcChannel::RpcChannel(Connection connection, Milliseconds frame_timeout)
+RpcChannel::RpcChannel(DaemonConnection connection, Milliseconds frame_timeout)
     : connection_(std::move(connection)), frame_timeout_(frame_timeout) {}
 
 Result<std::uint64_t> RpcChannel::Send(wire::Envelope& request) {

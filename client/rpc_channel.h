@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cstdint>
 
-#include "client/connection.h"
+#include "client/daemon_connection.h"
 #include "core/base/status.h"
 #include "proto/wire/envelope.h"
 
@@ -16,7 +16,7 @@ class RpcChannel {
   using Milliseconds = std::chrono::milliseconds;
 
   // `frame_timeout`: for every frame to be sent or to arrive whole.
-  RpcChannel(Connection connection, Milliseconds frame_timeout);
+  RpcChannel(DaemonConnection connection, Milliseconds frame_timeout);
 
   // Gives the request the next id, which is returned.
   Result<std::uint64_t> Send(wire::Envelope& request);
@@ -34,12 +34,12 @@ class RpcChannel {
                               wire::Envelope::BodyCase expected,
                               Milliseconds extra = Milliseconds(0));
 
-  Connection& connection() { return connection_; }
+  DaemonConnection& connection() { return connection_; }
 
  private:
   Status Unexpected(const wire::Envelope& reply) const;
 
-  Connection connection_;
+  DaemonConnection connection_;
   Milliseconds frame_timeout_;
   std::uint64_t last_id_ = 0;
 };

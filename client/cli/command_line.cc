@@ -103,8 +103,9 @@ Status CheckCommandName(const std::vector<std::string>& arguments, const CLI::Ap
   const auto word =
       std::find_if(arguments.begin(), arguments.end(),
                    [](const std::string& argument) { return !argument.starts_with('-'); });
-  if (word == arguments.end() || (word != arguments.begin() && *(word - 1) == "--server"))
+  if (word == arguments.end() || (word != arguments.begin() && *(word - 1) == "--server")) {
     return {};
+  }
   const auto found = root.get_subcommands(
       [&word](const CLI::App* candidate) { return candidate->get_name() == *word; });
   return found.empty() ? Status(StatusCode::kInvalidArgument,

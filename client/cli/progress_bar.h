@@ -13,6 +13,8 @@ class ProgressBar {
   ~ProgressBar();  // wipes the line
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
+  ProgressBar(ProgressBar&&) = delete;
+  ProgressBar& operator=(ProgressBar&&) = delete;
 
   // Draws when the bar or the percentage moved.
   void Update(std::size_t done);

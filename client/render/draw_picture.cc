@@ -4,6 +4,7 @@
 
 #include "client/render/color_map.h"
 #include "client/render/map_picture.h"
+#include "client/render/scale_bar.h"
 #include "core/geometry/nibble.h"
 
 namespace atlas {
@@ -149,7 +150,8 @@ Image DrawPicture(const MapRaster& raster, const RenderOptions& options, double 
   const std::int64_t margin = options.margin_px;
   Image image;
   image.width = static_cast<std::uint32_t>(box.width() + 2 * margin);
-  image.height = static_cast<std::uint32_t>(box.height() + 2 * margin);
+  const std::int64_t footer = options.has_scale_bar ? kScaleBarHeight_px : 0;
+  image.height = static_cast<std::uint32_t>(box.height() + 2 * margin + footer);
   image.pixels.assign(std::size_t{image.width} * image.height, kBackground);
   const Painter painter(raster, options, metres_per_pixel);
   for (std::int64_t y = box.min_y; y <= box.max_y; ++y) {
@@ -158,6 +160,7 @@ Image DrawPicture(const MapRaster& raster, const RenderOptions& options, double 
                static_cast<std::uint32_t>(box.max_y - y + margin)) = painter.Color(x, y);
     }
   }
+  if (options.has_scale_bar) DrawScaleBar(metres_per_pixel, margin, image);
   return image;
 }
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "client/render/scale_bar.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -30,13 +31,19 @@ bool Fits(const PixelBox& box, std::int64_t side) {
   return box.width() <= side && box.height() <= side;
 }
 
+// What is left of a picture's side for the map itself.
+std::int64_t MapSide(const RenderOptions& options) {
+  return options.max_side_px - 2 * options.margin_px -
+         (options.has_scale_bar ? kScaleBarHeight_px : 0);
+}
+
 class Renderer {
  public:
   Renderer(const LevelReader& read_level, const RenderOptions& options, const MapProfile& profile)
       : read_level_(read_level),
         options_(options),
         profile_(profile),
-        max_side_px_(options.max_side_px - 2 * options.margin_px) {}
+        max_side_px_(MapSide(options)) {}
 
   Result<MapPicture> Run() {
     const auto coarsest = static_cast<std::uint8_t>(profile_.levels - 1);
@@ -110,7 +117,7 @@ Result<MapColor> ParseMapColor(const std::string& text) {
 Result<MapPicture> RenderMap(const LevelReader& read_level,
                              const RenderOptions& options,
                              const MapProfile& profile) {
-  if (options.max_side_px <= 2 * options.margin_px + 2) {
+  if (MapSide(options) < 1) {
     return Error(StatusCode::kInvalidArgument, "picture: no room left between the margins");
   }
   return Renderer(read_level, options, profile).Run();

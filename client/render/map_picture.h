@@ -27,6 +27,7 @@ struct RenderOptions {
   MapColor color = MapColor::kHeight;
   std::int64_t max_side_px = 4096;
   std::int64_t margin_px = 12;
+  bool has_scale_bar = true;
 };
 
 struct MapPicture {
@@ -34,7 +35,7 @@ struct MapPicture {
   double metres_per_pixel = 0.0;
 };
 
-// The part of the raster that is not blank, plus the margin; north up.
+// The part of the raster that is not blank, the margin and the scale bar; north up.
 Image DrawPicture(const MapRaster& raster, const RenderOptions& options, double metres_per_pixel);
 
 // Hands every tile of a level to the callback.

@@ -25,6 +25,7 @@ DriveFolder Along(const std::vector<double>& x_m) {
 
 std::vector<std::size_t> Indices(const std::vector<SelectedScan>& selected) {
   std::vector<std::size_t> indices;
+  indices.reserve(selected.size());
   for (const SelectedScan& scan : selected) {
     indices.push_back(scan.index);
   }

@@ -84,8 +84,8 @@ TEST(TileCacheTest, DropsTheOneUsedLongestAgo) {
 // A daemon with these tiles at level 0; counts what it is asked.
 class TinyAtlas {
  public:
-  explicit TinyAtlas(std::vector<Tile> tiles) : peer_([this](PeerSocket& s) { Serve(s); }) {
-    for (Tile& tile : tiles) {
+  explicit TinyAtlas(const std::vector<Tile>& tiles) : peer_([this](PeerSocket& s) { Serve(s); }) {
+    for (const Tile& tile : tiles) {
       tiles_[tile.id] = EncodeTile(tile, MapProfile()).blob;
     }
     ready_.store(true);

@@ -36,6 +36,8 @@ class TestPeer {
   ~TestPeer();
   TestPeer(const TestPeer&) = delete;
   TestPeer& operator=(const TestPeer&) = delete;
+  TestPeer(TestPeer&&) = delete;
+  TestPeer& operator=(TestPeer&&) = delete;
 
   Endpoint endpoint() const { return {"127.0.0.1", port_}; }
   // Short deadlines, for peers that never answer.

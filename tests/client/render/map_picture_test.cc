@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "client/render/color_map.h"
+#include "client/render/scale_bar.h"
 #include "core/geometry/nibble.h"
 
 namespace atlas {
@@ -75,6 +76,7 @@ std::vector<Tile> TwoCells() {
 RenderOptions NoMargin() {
   RenderOptions options;
   options.margin_px = 0;
+  options.has_scale_bar = false;
   return options;
 }
 
@@ -95,6 +97,7 @@ TEST(MapPictureTest, MarginSurroundsTheMap) {
   const std::vector<Tile> tiles = TwoCells();
   RenderOptions options;
   options.margin_px = 5;
+  options.has_scale_bar = false;
   const auto picture = RenderMap(ReaderOf(tiles), options, SmallProfile());
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->image.width, 13U);
@@ -196,6 +199,26 @@ TEST(ColorMapTest, BrightnessGrowsWithHeight) {
   EXPECT_EQ(HeightColor(7.0), HeightColor(1.0));
 }
 
+TEST(ScaleBarTest, LengthsAreRoundAndFit) {
+  EXPECT_DOUBLE_EQ(RoundBarLength(0.1, 200), 20.0);
+  EXPECT_DOUBLE_EQ(RoundBarLength(0.1, 199), 10.0);
+  EXPECT_DOUBLE_EQ(RoundBarLength(0.2, 60), 10.0);
+  EXPECT_DOUBLE_EQ(RoundBarLength(12.8, 200), 2000.0);
+}
+
+TEST(ScaleBarTest, IsAsLongAsItSays) {
+  Image image{300, 40, std::vector<Rgb>(300 * 40)};
+  DrawScaleBar(0.1, 12, image);
+  std::uint32_t length_px = 0;
+  while (image.at(12 + length_px, 33) != Rgb{}) {
+    ++length_px;
+  }
+  EXPECT_EQ(length_px, 100U);  // 10 m
+  Image tiny{8, 8, std::vector<Rgb>(64)};
+  DrawScaleBar(0.1, 0, tiny);
+  EXPECT_EQ(tiny.pixels, std::vector<Rgb>(64));
+}
+
 class PngTest : public testing::Test {
  protected:
   PngTest() : folder_(std::filesystem::path(testing::TempDir()) / "atlas_png_test") {
@@ -205,6 +228,8 @@ class PngTest : public testing::Test {
   ~PngTest() override { std::filesystem::remove_all(folder_); }
   PngTest(const PngTest&) = delete;
   PngTest& operator=(const PngTest&) = delete;
+  PngTest(PngTest&&) = delete;
+  PngTest& operator=(PngTest&&) = delete;
 
   std::filesystem::path folder_;
 };

@@ -1,4 +1,4 @@
-#include "client/connection.h"
+#include "client/daemon_connection.h"
 
 #include <optional>
 
@@ -22,7 +22,7 @@ constexpr std::size_t kChunkBytes = std::size_t{64} << 10;
 
 }  // namespace
 
-class Connection::Impl {
+class DaemonConnection::Impl {
  public:
   explicit Impl(Endpoint endpoint) : endpoint_(std::move(endpoint)), socket_(io_) {}
 
@@ -56,20 +56,20 @@ class Connection::Impl {
   Status failure_;
 };
 
-Status Connection::Impl::Fail(StatusCode code, const std::string& what) {
+Status DaemonConnection::Impl::Fail(StatusCode code, const std::string& what) {
   error_code ignored;  // closing is all that is left to do
   socket_.close(ignored);
   failure_ = Status(code, StrCat("daemon at ", endpoint_.ToText(), ": ", what));
   return failure_;
 }
 
-Status Connection::Impl::Finish(const std::optional<error_code>& done,
-                                Clock::time_point deadline,
-                                const char* what) {
+Status DaemonConnection::Impl::Finish(const std::optional<error_code>& done,
+                                      Clock::time_point deadline,
+                                      const char* what) {
   io_.restart();
   io_.run_until(deadline);
   if (!done) {
-    const Status status = Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
+    Status status = Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
     io_.restart();
     io_.run();  // the cancelled operation still refers to our buffers
     return status;
@@ -78,7 +78,7 @@ Status Connection::Impl::Finish(const std::optional<error_code>& done,
   return {};
 }
 
-Result<asio::ip::tcp::resolver::results_type> Connection::Impl::Resolve(
+Result<asio::ip::tcp::resolver::results_type> DaemonConnection::Impl::Resolve(
     Clock::time_point deadline) {
   asio::ip::tcp::resolver resolver(io_);
   std::optional<error_code> done;
@@ -95,7 +95,7 @@ Result<asio::ip::tcp::resolver::results_type> Connection::Impl::Resolve(
   return found;
 }
 
-Status Connection::Impl::Open(milliseconds timeout) {
+Status DaemonConnection::Impl::Open(milliseconds timeout) {
   const Clock::time_point deadline = Clock::now() + timeout;
   const auto addresses = Resolve(deadline);
   if (!addresses) return addresses.error();
@@ -108,7 +108,7 @@ Status Connection::Impl::Open(milliseconds timeout) {
   return error ? Fail(StatusCode::kUnavailable, error.message()) : Status();
 }
 
-Status Connection::Impl::Send(ByteSpan frame, milliseconds timeout) {
+Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
   ATLAS_RETURN_IF_ERROR(failure_);
   std::optional<error_code> done;
   asio::async_write(socket_, asio::buffer(frame.data(), frame.size()),
@@ -118,7 +118,7 @@ Status Connection::Impl::Send(ByteSpan frame, milliseconds timeout) {
   return {};
 }
 
-Status Connection::Impl::ReadSome(Clock::time_point deadline) {
+Status DaemonConnection::Impl::ReadSome(Clock::time_point deadline) {
   std::optional<error_code> done;
   std::size_t size = 0;
   socket_.async_read_some(asio::buffer(chunk_), [&](const error_code& error, std::size_t bytes) {
@@ -131,7 +131,7 @@ Status Connection::Impl::ReadSome(Clock::time_point deadline) {
   return {};
 }
 
-Result<Bytes> Connection::Impl::Receive(milliseconds timeout) {
+Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
   if (!failure_.ok()) return Error(failure_);
   const Clock::time_point deadline = Clock::now() + timeout;
   while (true) {
@@ -142,34 +142,34 @@ Result<Bytes> Connection::Impl::Receive(milliseconds timeout) {
   }
 }
 
-Connection::Connection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Connection::Connection(Connection&&) noexcept = default;
-Connection& Connection::operator=(Connection&&) noexcept = default;
-Connection::~Connection() = default;
+DaemonConnection::DaemonConnection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DaemonConnection::DaemonConnection(DaemonConnection&&) noexcept = default;
+DaemonConnection& DaemonConnection::operator=(DaemonConnection&&) noexcept = default;
+DaemonConnection::~DaemonConnection() = default;
 
-Result<Connection> Connection::Open(const Endpoint& endpoint, milliseconds timeout) {
+Result<DaemonConnection> DaemonConnection::Open(const Endpoint& endpoint, milliseconds timeout) {
   auto impl = std::make_unique<Impl>(endpoint);
   if (Status status = impl->Open(timeout); !status.ok()) return Error(std::move(status));
-  return Connection(std::move(impl));
+  return DaemonConnection(std::move(impl));
 }
 
-Status Connection::Send(ByteSpan frame, milliseconds timeout) {
+Status DaemonConnection::Send(ByteSpan frame, milliseconds timeout) {
   return impl_->Send(frame, timeout);
 }
 
-Result<Bytes> Connection::Receive(milliseconds timeout) {
+Result<Bytes> DaemonConnection::Receive(milliseconds timeout) {
   return impl_->Receive(timeout);
 }
 
-const Endpoint& Connection::endpoint() const {
+const Endpoint& DaemonConnection::endpoint() const {
   return impl_->endpoint();
 }
 
-std::uint64_t Connection::bytes_sent() const {
+std::uint64_t DaemonConnection::bytes_sent() const {
   return impl_->bytes_sent();
 }
 
-std::uint64_t Connection::bytes_received() const {
+std::uint64_t DaemonConnection::bytes_received() const {
   return impl_->bytes_received();
 }
 

@@ -12,14 +12,16 @@
 
 namespace atlas {
 
-class Connection {
+class DaemonConnection {
  public:
   // kUnavailable when nobody listens there, kTimeout after `timeout`.
-  static Result<Connection> Open(const Endpoint& endpoint, std::chrono::milliseconds timeout);
+  static Result<DaemonConnection> Open(const Endpoint& endpoint, std::chrono::milliseconds timeout);
 
-  Connection(Connection&&) noexcept;
-  Connection& operator=(Connection&&) noexcept;
-  ~Connection();
+  DaemonConnection(const DaemonConnection&) = delete;
+  DaemonConnection& operator=(const DaemonConnection&) = delete;
+  DaemonConnection(DaemonConnection&&) noexcept;
+  DaemonConnection& operator=(DaemonConnection&&) noexcept;
+  ~DaemonConnection();
 
   // A whole frame, header included. After a failure the connection is closed and every further call
   // returns that failure.
@@ -34,7 +36,7 @@ class Connection {
 
  private:
   class Impl;
-  explicit Connection(std::unique_ptr<Impl> impl);
+  explicit DaemonConnection(std::unique_ptr<Impl> impl);
 
   std::unique_ptr<Impl> impl_;
 };
