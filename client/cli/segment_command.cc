@@ -97,7 +97,7 @@ class SegmentCommand : public Command {
                        "velodyne/NNNNNN.bin, poses.txt, optional labels/NNNNNN.label");
     arguments.Optional("--rings", "N", rings_, "Use about so many of the rings [all]");
     arguments.Optional("--threshold", "T", threshold_m_,
-                       "Distance from a plane that is still ground, metres [0.1]");
+                       "Distance from a plane that is still ground, metres [0.12]");
     arguments.Choice("--mode", {"paper", "atlas"}, mode_, "The paper's rules, or ours");
   }
 
@@ -140,7 +140,7 @@ class SegmentCommand : public Command {
 
   std::string directory_;
   std::optional<std::uint32_t> rings_;
-  double threshold_m_ = 0.1;
+  double threshold_m_ = SegmenterOptions().threshold_m;
   std::string mode_ = "atlas";
 };
 

@@ -118,8 +118,10 @@ std::vector<std::uint8_t> Segmenter::Segment(const RangeImage& image,
   std::vector<std::uint8_t> is_ground(image.size());
   for (std::size_t i = 0; i < image.size(); ++i) {
     const Votes& votes = pass.votes()[i];
-    is_ground[i] = static_cast<std::uint8_t>(votes.ground > 0 &&
-                                             (is_paper || 2 * votes.ground >= votes.windows));
+    const float least =
+        is_paper ? 1.0F : options_.min_vote_ratio * static_cast<float>(votes.windows);
+    is_ground[i] =
+        static_cast<std::uint8_t>(votes.ground > 0 && static_cast<float>(votes.ground) >= least);
   }
   return is_ground;
 }

@@ -17,6 +17,7 @@ Tile OneCellTile(const TileId& id, std::size_t cell, std::int32_t altitude_mm) {
   Tile tile = EmptyTile(id, {});
   tile.contributors = {{"car", "monday"}};
   TileLayer layer;
+  layer.sigma_100um = 1'000;
   layer.altitude_mm = altitude_mm;
   layer.observations = 3;
   tile.layers.push_back(layer);

@@ -1,0 +1,152 @@
+#!/usr/bin/python3
+"""The main path on recorded drives, through the command line only. Usage: drives_test.py BIN_DIR TEST.
+
+Each TEST prints its figures; exit 77 with a reason where its drives are not in $ATLAS_DATA.
+"""
+
+import json
+import math
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+
+SKIPPED = 77
+
+
+class Atlas:
+    """A daemon on a free port with its data in a folder, and the command line speaking to it."""
+
+    def __init__(self, bin_dir, folder, *flags):
+        self.bin = bin_dir
+        self.flags = flags
+        self.folder = folder
+        self.start()
+
+    def start(self):
+        self.process = subprocess.Popen(
+            [self.bin / "atlasd", "--data", self.folder + "/atlas", "--listen", "127.0.0.1:0",
+             "--log-level", "error", *self.flags], stdout=subprocess.PIPE, text=True)
+        self.server = self.process.stdout.readline().split()[1]
+
+    def stop(self, how=signal.SIGTERM):
+        self.process.send_signal(how)
+        return self.process.wait(timeout=60)
+
+    def call(self, *args):
+        return subprocess.run([self.bin / "atlas", *map(str, args), "--server", self.server, "--json"],
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+
+    def run(self, *args):
+        done = self.call(*args)
+        assert done.returncode == 0, f"{args}: exit {done.returncode}: {done.stderr}"
+        return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def drive(name):
+    data = os.environ.get("ATLAS_DATA")
+    if not data or not (pathlib.Path(data) / name).is_dir():
+        print(f"skipped: {name} is not in $ATLAS_DATA (docs/data.md)")
+        sys.exit(SKIPPED)
+    return pathlib.Path(data) / name
+
+
+def positions(folder):
+    rows = [list(map(float, line.split())) for line in (folder / "poses.txt").read_text().splitlines()]
+    return [(row[3], row[7], row[11]) for row in rows]
+
+
+def overpass(atlas):
+    atlas.run("ingest", drive("sim_overpass_A"))
+    atlas.run("wait")
+    heights = [layer["z_m"] for layer in atlas.run("point", 0, -3)["layers"]]
+    print("layers at (0, -3):", heights)
+    assert len(heights) == 2
+    assert abs(heights[0] - 0.0) <= 0.03 and abs(heights[1] - 5.49) <= 0.03
+
+
+def garage(atlas):
+    folder = drive("sim_garage_A")
+    atlas.run("ingest", folder)
+    atlas.run("wait")
+    poses = positions(folder)
+    found = sum(any(abs(layer["z_m"] - (z - 1.8)) <= 0.10 for layer in atlas.run("point", x, y)["layers"])
+                for x, y, z in poses)
+    print(f"floor found at {found} of {len(poses)} poses")
+    assert found >= 0.95 * len(poses)
+    ends = ["--from", ",".join(map(str, poses[0])), "--to", ",".join(map(str, poses[-1]))]
+    route = atlas.run("plan", *ends)
+    steps = [abs(b[2] - a[2]) for a, b in zip(route["waypoints"], route["waypoints"][1:])]
+    print(f"route of {route['length_m']} m, largest step {max(steps):.3f} m, {route['ms']} ms")
+    assert route["found"] and max(steps) <= 0.2
+    refused = atlas.call("plan", *ends, "--max-slope-deg", 5)
+    assert refused.returncode == 3 and json.loads(refused.stdout)["found"] is False
+
+
+def localization(bin_dir):
+    squares, angles, hits, shots, failures = 0.0, 0.0, 0, 0, 0
+    for piece in ("00", "02", "04", "08"):
+        folder = drive(f"semantickitti_mini/{piece}")
+        with tempfile.TemporaryDirectory() as work:
+            atlas = Atlas(bin_dir, work, "--cell-size", "0.2", "--segments", "8", "--segment-height", "1")
+            atlas.run("ingest", folder, "--scans", "even", "--every", 0, "--rings", 16, "--max-range", 40)
+            atlas.run("wait")
+            result = atlas.run("localize", folder, "--scans", "odd", "--rings", 16, "--max-range", 40,
+                               "--perturb", "0.4,1.5")
+            assert atlas.stop() == 0
+        good = result["shots"] - result["failures"]
+        squares += good * result["translation_rmse_m"] ** 2
+        angles += good * result["rotation_rmse_deg"] ** 2
+        hits, shots, failures = hits + good, shots + result["shots"], failures + result["failures"]
+    translation, rotation = math.sqrt(squares / hits), math.sqrt(angles / hits)
+    print(f"{shots} shots: {translation:.4f} m, {rotation:.4f} deg, {failures} failures")
+    assert failures == 0 and translation <= 0.06 and rotation <= 0.15
+
+
+def segmentation(bin_dir):
+    for rings in (16, 64):
+        scores = []
+        for piece in ("00", "02", "04", "08"):
+            out = subprocess.run([bin_dir / "atlas", "segment", drive(f"semantickitti_mini/{piece}"),
+                                  "--rings", str(rings), "--json"], stdout=subprocess.PIPE, check=True)
+            scores.append(json.loads(out.stdout)["f1"])
+        print(f"{rings} rings: F1 {sum(scores) / len(scores):.4f}")
+        assert sum(scores) / len(scores) >= 0.972
+
+
+def order(bin_dir):
+    folder = drive("sim_overpass_A")
+    digests = []
+    for variant in (["--batch", 64], ["--shuffle", 1, "--batch", 1], ["--shuffle", 2, "--batch", 7]):
+        with tempfile.TemporaryDirectory() as work:
+            atlas = Atlas(bin_dir, work)
+            atlas.run("ingest", folder, "--range", "0:60", *variant)
+            assert atlas.stop(signal.SIGKILL if "--shuffle" in variant else signal.SIGTERM) is not None
+            atlas.start()
+            again = atlas.run("ingest", folder, "--range", "0:60")
+            assert again["duplicates"] == again["acked"] == again["keyframes"]
+            digests.append(atlas.run("digest")["digest"])
+            report = atlas.run("verify", "--rebuild")
+            assert report["mismatched"] == 0 and report["damaged"] == 0 and report["checked"] > 0
+            assert atlas.stop() == 0
+    print("digests:", sorted(set(digests)))
+    assert len(set(digests)) == 1
+
+
+def main():
+    bin_dir, name = pathlib.Path(sys.argv[1]), sys.argv[2]
+    if name in ("overpass", "garage"):
+        with tempfile.TemporaryDirectory() as work:
+            atlas = Atlas(bin_dir, work)
+            try:
+                {"overpass": overpass, "garage": garage}[name](atlas)
+            finally:
+                assert atlas.stop() == 0
+    else:
+        {"localization": localization, "segmentation": segmentation, "order": order}[name](bin_dir)
+
+
+if __name__ == "__main__":
+    main()
