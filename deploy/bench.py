@@ -1,0 +1,137 @@
+#!/usr/bin/python3
+"""The benchmarks behind deploy/bench.sh. Each prints JSON lines; times are CPU time of one thread,
+the median of five runs."""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+
+PIECES = ["00", "02", "04", "08"]  # labelled real scans, docs/data.md
+RUNS = 5
+
+
+def emit(name, value, unit, against, reference):
+    ratio = value / reference if reference else None
+    print(json.dumps({"name": name, "value": round(value, 5), "unit": unit,
+                      "against": against, "ratio": ratio and round(ratio, 4)}), flush=True)
+
+
+class Atlas:
+    """A daemon in a directory of its own, and the command line speaking to it."""
+
+    def __init__(self, bin_dir, *profile):
+        self.bin = bin_dir
+        self.folder = tempfile.TemporaryDirectory()
+        self.process = subprocess.Popen(
+            [bin_dir / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
+             "--log-level", "error", *profile], stdout=subprocess.PIPE, text=True)
+        self.server = self.process.stdout.readline().split()[1]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.wait()
+        self.folder.cleanup()
+
+    def run(self, *args):
+        out = subprocess.run([self.bin / "atlas", *map(str, args), "--server", self.server, "--json"],
+                             check=True, stdout=subprocess.PIPE, text=True).stdout
+        return json.loads(out.strip().splitlines()[-1])
+
+
+def drive(name):
+    data = os.environ.get("ATLAS_DATA")
+    if not data or not (pathlib.Path(data) / name).is_dir():
+        sys.exit(f"{name}: not in $ATLAS_DATA; docs/data.md says where the drives come from")
+    return pathlib.Path(data) / name
+
+
+def segment(bin_dir, folder, rings, mode):
+    out = subprocess.run([bin_dir / "atlas", "segment", folder, "--rings", str(rings), "--mode", mode,
+                          "--json"], check=True, stdout=subprocess.PIPE, text=True).stdout
+    return json.loads(out)
+
+
+def bench_segmentation(bin_dir):
+    folders = [drive(f"semantickitti_mini/{piece}") for piece in PIECES]
+    for rings, paper_f1 in ((16, 0.965), (64, 0.917)):
+        for mode in ("atlas", "paper"):
+            results = [segment(bin_dir, folder, rings, mode) for folder in folders]
+            f1 = statistics.mean(result["f1"] for result in results)
+            emit(f"segmentation.f1.{mode}.{rings}", f1, "1", "the paper's literal mode elsewhere",
+                 paper_f1)
+            time_ms = statistics.median(result["ms_per_scan"] for result in results)
+            emit(f"segmentation.time.{mode}.{rings}", time_ms, "ms", "the paper, 16 rings", 13.7)
+
+
+def bench_frontend(bin_dir):
+    times = []
+    for _ in range(RUNS):
+        with Atlas(bin_dir) as atlas:
+            times.append(atlas.run("ingest", drive("semantickitti_mini/00"), "--rings", 16, "--every", 0,
+                                   "--max-range", 20)["frontend_ms_per_scan"])
+    emit("frontend.scan_to_blob", statistics.median(times), "ms", "the paper, 16 rings, 20 m", 46.2)
+
+
+def bench_localization(bin_dir):
+    squares = {"translation": 0.0, "rotation": 0.0}
+    shots = failures = 0
+    rates = []
+    for piece in PIECES:
+        folder = drive(f"semantickitti_mini/{piece}")
+        with Atlas(bin_dir, "--cell-size", "0.2", "--segments", "8", "--segment-height", "1") as atlas:
+            atlas.run("ingest", folder, "--scans", "even", "--every", 0, "--rings", 16, "--max-range", 40)
+            atlas.run("wait")
+            result = atlas.run("localize", folder, "--scans", "odd", "--rings", 16, "--max-range", 40,
+                               "--perturb", "0.4,1.5")
+        hits = result["shots"] - result["failures"]
+        squares["translation"] += hits * result["translation_rmse_m"] ** 2
+        squares["rotation"] += hits * result["rotation_rmse_deg"] ** 2
+        shots += result["shots"]
+        failures += result["failures"]
+        rates.append(result["hz"])
+    hits = shots - failures
+    emit("localization.translation_rmse", math.sqrt(squares["translation"] / hits), "m",
+         "the paper's encode-decode-ICP", 0.108)
+    emit("localization.rotation_rmse", math.sqrt(squares["rotation"] / hits), "deg",
+         "the paper's encode-decode-ICP", 0.36)
+    emit("localization.failures", failures, f"of {shots}", "none", None)
+    emit("localization.rate", statistics.median(rates), "scans/CPU s", "the paper", 10.0)
+
+
+def bench_fusion(bin_dir):
+    out = subprocess.run([bin_dir / "fusion_bench", "--benchmark_format=json",
+                          f"--benchmark_repetitions={RUNS}", "--benchmark_report_aggregates_only=true"],
+                         check=True, stdout=subprocess.PIPE, text=True).stdout
+    for row in json.loads(out)["benchmarks"]:
+        if row.get("aggregate_name") == "median" and "items_per_second" in row:
+            emit("fusion." + row["run_name"], row["items_per_second"] / 1e6, "M cell-observations/s",
+                 "a straightforward version", 18.0)
+
+
+BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
+              "localization": bench_localization, "fusion": bench_fusion}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bin", type=pathlib.Path, required=True)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
+    args = parser.parse_args()
+    unknown = [name for name in args.names if name not in BENCHMARKS]
+    if unknown:
+        parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
+    for name in args.names or BENCHMARKS:
+        BENCHMARKS[name](args.bin)
+
+
+if __name__ == "__main__":
+    main()

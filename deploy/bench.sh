@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# Runs the benchmarks named (all, if none) and prints one JSON line a figure:
+# {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion]
+# The first three need the drives of docs/data.md in $ATLAS_DATA.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+. deploy/packages.sh
+. deploy/data.sh
+install_packages "${BUILD_PACKAGES[@]}" "${BENCH_PACKAGES[@]}" python3 xz-utils >&2
+find_data "$root"
+cmake --preset bench >/dev/null
+cmake --build build/bench >&2
+exec /usr/bin/python3 deploy/bench.py --bin build/bench/bin "$@"
