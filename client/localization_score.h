@@ -22,7 +22,9 @@ class LocalizationScore {
 
   std::uint64_t shots() const { return shots_; }
   std::uint64_t failures() const { return failures_; }
+  std::uint64_t successes() const { return translations_m_.size(); }
   std::uint64_t lost() const { return lost_; }
+  // 0 without a success.
   double translation_rmse_m() const;
   double rotation_rmse_deg() const;
   // The smallest error that at least 95 % of the shots without failure do not exceed.

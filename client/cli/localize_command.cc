@@ -25,12 +25,17 @@ boost::json::object ScanJson(const LocalizedScan& scan) {
           {"error_deg", Rounded(scan.error.rotation_deg, 5)}};
 }
 
+// An error over no shot at all is no error of 0.
+boost::json::value ErrorJson(const LocalizationScore& score, double error) {
+  return score.successes() == 0 ? boost::json::value(nullptr) : Rounded(error, 5);
+}
+
 boost::json::object SummaryJson(const DriveLocalizationReport& report,
                                 std::uint64_t bytes_received) {
   return {{"type", "summary"},
-          {"translation_rmse_m", Rounded(report.score.translation_rmse_m(), 5)},
-          {"rotation_rmse_deg", Rounded(report.score.rotation_rmse_deg(), 5)},
-          {"translation_p95_m", Rounded(report.score.translation_p95_m(), 5)},
+          {"translation_rmse_m", ErrorJson(report.score, report.score.translation_rmse_m())},
+          {"rotation_rmse_deg", ErrorJson(report.score, report.score.rotation_rmse_deg())},
+          {"translation_p95_m", ErrorJson(report.score, report.score.translation_p95_m())},
           {"failures", report.score.failures()},
           {"lost", report.score.lost()},
           {"restarts", report.restarts},
@@ -47,9 +52,11 @@ void PrintSummary(const DriveLocalizationReport& report,
   FactList facts;
   facts.Add("scans", StrCat(report.scans, ", ", score.shots(), " localizations, ", report.restarts,
                             " restarts"));
-  facts.Add("error", StrCat(FixedText(score.translation_rmse_m(), 3), " m, ",
-                            FixedText(score.rotation_rmse_deg(), 3), " deg RMSE; ",
-                            FixedText(score.translation_p95_m(), 3), " m at 95 %"));
+  facts.Add("error", score.successes() == 0
+                         ? std::string("no localization succeeded")
+                         : StrCat(FixedText(score.translation_rmse_m(), 3), " m, ",
+                                  FixedText(score.rotation_rmse_deg(), 3), " deg RMSE; ",
+                                  FixedText(score.translation_p95_m(), 3), " m at 95 %"));
   facts.Add("failures", StrCat(score.failures(), ", of them ", score.lost(), " lost"));
   facts.Add("speed", FixedText(report.hz(), 1) + " scans a CPU second");
   facts.Add("received", BytesText(bytes_received));

@@ -25,7 +25,7 @@ class PosesApplyCommand : public Command {
     if (!corrections) return corrections.error().WithContext(file_);
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const Result<PoseBatchSummary> done = client->UpdatePoses(*corrections, "atlas");
+    const Result<PoseBatchSummary> done = client->UpdatePoses(*corrections, "atlas-poses-apply");
     if (!done) return done.error();
     Print(*done, context);
     return {};
