@@ -116,6 +116,20 @@ void MarkReturns(const LeveledScan& scan,
   }
 }
 
+// Obstacles are where they are to within a cell: poses, the vehicle's motion during a scan and the
+// grid itself blur them, and a ray that grazes a wall passes the cells beside its own. So a segment
+// next to a hit one is not missed either.
+void ProtectNeighbours(const GridGeometry& grid, std::vector<CellMasks>& masks) {
+  const auto side = static_cast<std::size_t>(grid.side());
+  std::vector<SegmentMask> widened(masks.size(), 0);
+  for (std::size_t i = 1; i + 1 < masks.size(); ++i) {
+    widened[i] = masks[i - 1].hit | masks[i].hit | masks[i + 1].hit;
+  }
+  for (std::size_t i = side; i + side < masks.size(); ++i) {
+    masks[i].surface |= widened[i - side] | widened[i] | widened[i + side];
+  }
+}
+
 std::vector<std::int16_t> PlaceAnchors(const GridGeometry& grid,
                                        std::span<const KeyframeCell> cells,
                                        const ColumnOptions& options) {
@@ -185,6 +199,7 @@ LocalColumns TraceColumns(const LeveledScan& scan,
   std::vector<CellMasks> masks(cells.size());
   misses.ForEach([&masks](std::uint32_t cell, SegmentMask mask) { masks[cell].miss |= mask; });
   MarkReturns(scan, rays, cells, options, masks);
+  ProtectNeighbours(rays.grid(), masks);
 
   const GridGeometry& grid = rays.grid();
   LocalColumns result;
