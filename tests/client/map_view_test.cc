@@ -19,6 +19,7 @@ Tile OneCellTile(const TileId& id, std::size_t cell, std::int32_t altitude_mm) {
   TileLayer layer;
   layer.sigma_100um = 1'000;
   layer.altitude_mm = altitude_mm;
+  layer.sigma_100um = 1000;
   layer.observations = 3;
   tile.layers.push_back(layer);
   for (std::size_t i = cell + 1; i < tile.cell_begin.size(); ++i) {
@@ -163,8 +164,11 @@ TEST(MapViewTest, TileTooLargeForTheCacheIsStillHandedOut) {
   auto client = AtlasClient::Connect(atlas.options());
   ASSERT_TRUE(client);
   MapView view(*client, {.max_cache_bytes = 10});
-  EXPECT_NE(*view.Get({0, 0, 0}), nullptr);
-  EXPECT_NE(*view.Get({0, 0, 0}), nullptr);
+  for (int i = 0; i < 2; ++i) {
+    const auto tile = view.Get({0, 0, 0});
+    ASSERT_TRUE(tile) << tile.error().message();
+    EXPECT_NE(*tile, nullptr);
+  }
   EXPECT_EQ(atlas.queries(), 2);
 }
 

@@ -34,19 +34,19 @@ void WriteOverpass(const fs::path& folder) {
 class EndToEndTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    root_ = fs::path(testing::TempDir()) / ("atlas_end_to_end." + std::to_string(getpid()));
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-    WriteOverpass(drive_ = root_ / "overpass");
+    shared_root = fs::path(testing::TempDir()) / ("atlas_end_to_end." + std::to_string(getpid()));
+    fs::remove_all(shared_root);
+    fs::create_directories(shared_root);
+    WriteOverpass(shared_drive = shared_root / "overpass");
   }
-  static void TearDownTestSuite() { fs::remove_all(root_); }
+  static void TearDownTestSuite() { fs::remove_all(shared_root); }
 
   // A data directory that no other test of this run uses.
-  static fs::path NewData() { return root_ / ("data" + std::to_string(++data_)); }
+  static fs::path NewData() { return shared_root / ("data" + std::to_string(++shared_data)); }
 
   static CommandRun Ingest(const DaemonProcess& daemon, std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"ingest", drive_.string(), "--max-range",
-                                          "12",     "--every",       "0"};
+    std::vector<std::string> arguments = {
+        "ingest", shared_drive.string(), "--max-range", "12", "--every", "0"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunAtlas(daemon.address(), arguments);
   }
@@ -57,9 +57,9 @@ class EndToEndTest : public testing::Test {
   }
 
   static const std::vector<std::string> kSmall;
-  static inline fs::path root_;
-  static inline fs::path drive_;
-  static inline int data_ = 0;
+  static inline fs::path shared_root;
+  static inline fs::path shared_drive;
+  static inline int shared_data = 0;
 };
 
 const std::vector<std::string> EndToEndTest::kSmall = {"--cell-size", "0.2"};
@@ -150,7 +150,7 @@ TEST_F(EndToEndTest, QueriesKeepTheirBudgetAndComeCoarseFirst) {
   DaemonProcess daemon(NewData(), kSmall);
   ASSERT_EQ(Ingest(daemon).exit_code, 0);
   ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
-  const fs::path tiles = root_ / "tiles";
+  const fs::path tiles = shared_root / "tiles";
   const CommandRun query = RunAtlas(
       daemon.address(), {"query", "--center", "-3,-4", "--radius", "30", "-o", tiles.string()});
   ASSERT_EQ(query.exit_code, 0) << query.err;
@@ -213,16 +213,16 @@ TEST_F(EndToEndTest, PosesThereAndBackLeaveTheSameAtlas) {
   DaemonProcess daemon(NewData(), kSmall);
   ASSERT_EQ(Ingest(daemon).exit_code, 0);
   const std::string digest = Digest(daemon);
-  const fs::path file = root_ / "corrections.txt";
+  const fs::path file = shared_root / "corrections.txt";
 
-  WritePoses(drive_ / "poses.txt", file, 3, 0.5);
+  WritePoses(shared_drive / "poses.txt", file, 3, 0.5);
   const CommandRun there = RunAtlas(daemon.address(), {"poses", "apply", file.string()});
   ASSERT_EQ(there.exit_code, 0) << there.err;
   EXPECT_EQ(there.Get<int>("updated"), 1);
   EXPECT_GT(there.Get<int>("tiles_marked"), 0);
   EXPECT_NE(Digest(daemon), digest);
 
-  WritePoses(drive_ / "poses.txt", file, 3, 0.0);
+  WritePoses(shared_drive / "poses.txt", file, 3, 0.0);
   ASSERT_EQ(RunAtlas(daemon.address(), {"poses", "apply", file.string()}).exit_code, 0);
   EXPECT_EQ(Digest(daemon), digest);
   const CommandRun same = RunAtlas(daemon.address(), {"poses", "apply", file.string()});
@@ -241,7 +241,7 @@ TEST_F(EndToEndTest, TheMapIsDrawnPlannedAndLocalizedIn) {
   ASSERT_EQ(Ingest(daemon).exit_code, 0);
   ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
 
-  const fs::path picture = root_ / "map.png";
+  const fs::path picture = shared_root / "map.png";
   const CommandRun render = RunAtlas(daemon.address(), {"render", "-o", picture.string()});
   ASSERT_EQ(render.exit_code, 0) << render.err;
   EXPECT_DOUBLE_EQ(render.Get<double>("metres_per_pixel"), 0.2);
@@ -257,9 +257,9 @@ TEST_F(EndToEndTest, TheMapIsDrawnPlannedAndLocalizedIn) {
   EXPECT_EQ(up.exit_code, 3);
   EXPECT_FALSE(up.json().at("found").as_bool());
 
-  const CommandRun localize = RunAtlas(
-      daemon.address(),
-      {"localize", drive_.string(), "--perturb", "0.3,1", "--trials", "2", "--max-range", "25"});
+  const CommandRun localize =
+      RunAtlas(daemon.address(), {"localize", shared_drive.string(), "--perturb", "0.3,1",
+                                  "--trials", "2", "--max-range", "25"});
   ASSERT_EQ(localize.exit_code, 0) << localize.err;
   EXPECT_EQ(localize.lines.size(), 2 * localize.Get<std::size_t>("scans") + 1);
   EXPECT_EQ(localize.lines.front().at("pose").as_array().size(), 12U);
