@@ -55,6 +55,7 @@ bool WriteQueue::Enqueue(Operation& operation, std::size_t max_queued) {
 void WriteQueue::Loop() {
   for (std::vector<Operation> group = TakeGroup(); !group.empty(); group = TakeGroup()) {
     RunGroup(group);
+    group.clear();  // what the callbacks hold must not live until the next write
   }
 }
 
