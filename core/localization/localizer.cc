@@ -38,6 +38,7 @@ void Localizer::Start(const Pose& T_world_sensor) {
   last_ = T_world_sensor;
   motion_.reset();
   is_first_ = true;
+  usual_fit_ = 0.0;
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
@@ -55,6 +56,10 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
       result.registration.T_world_level.linear() * R_level_sensor.toRotationMatrix();
   if (result.health == LocalizationHealth::kLost) {
     result.T_world_sensor.translation() = predicted.translation();
+  }
+  if (result.health == LocalizationHealth::kGood) {
+    const double fit = result.registration.fit;
+    usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;
   }
   if (!is_first_ && (motion_ || result.health == LocalizationHealth::kGood)) {
     motion_ = last_.inverse() * result.T_world_sensor;
@@ -84,7 +89,7 @@ Status Localizer::RenewWindow(const Eigen::Vector3d& center) {
   return {};
 }
 
-std::vector<Pose> Localizer::Hypotheses(const Pose& T_world_level) const {
+std::vector<Pose> Localizer::AheadHypotheses(const Pose& T_world_level) const {
   std::vector<Pose> starts{T_world_level};
   if (!is_first_ && !motion_) {
     const Eigen::Vector3d ahead = T_world_level.linear().col(0);
@@ -97,18 +102,38 @@ std::vector<Pose> Localizer::Hypotheses(const Pose& T_world_level) const {
   return starts;
 }
 
+std::vector<Pose> Localizer::TurnHypotheses(const Pose& T_world_level) const {
+  std::vector<Pose> starts;
+  for (double yaw = options_.search_yaw_step_rad; yaw <= options_.search_yaw_rad;
+       yaw += options_.search_yaw_step_rad) {
+    for (const double turn : {yaw, -yaw}) {
+      starts.push_back(T_world_level);
+      starts.back().linear() =
+          Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
+          T_world_level.linear();
+    }
+  }
+  return starts;
+}
+
 RegistrationResult Localizer::Best(const ScanFeatures& features, const Pose& T_world_level) const {
-  std::optional<RegistrationResult> best;
   RegistrationOptions options = options_.registration;
   if (!is_first_) {
     options.start_sigma_m = options_.predicted_sigma_m;
     options.start_sigma_rad = options_.predicted_sigma_rad;
   }
-  for (const Pose& start : Hypotheses(T_world_level)) {
-    RegistrationResult result = Register(*window_, features, start, options);
-    if (!best || result.fit > best->fit) {
-      best = std::move(result);
+  std::optional<RegistrationResult> best;
+  const auto try_all = [&](const std::vector<Pose>& starts) {
+    for (const Pose& start : starts) {
+      RegistrationResult result = Register(*window_, features, start, options);
+      if (!best || result.fit > best->fit) {
+        best = std::move(result);
+      }
     }
+  };
+  try_all(AheadHypotheses(T_world_level));
+  if (!is_first_ && best->fit < options_.doubtful_fit * usual_fit_) {
+    try_all(TurnHypotheses(T_world_level));
   }
   return *best;
 }

@@ -40,6 +40,11 @@ struct LocalizerOptions {
   // While the speed is unknown, starts are tried this far ahead of the last pose.
   double search_ahead_m = 4.0;
   double search_step_m = 0.5;
+  // A fit below this share of the usual one: the vehicle may have turned, so other headings are
+  // tried.
+  double doubtful_fit = 0.85;
+  double search_yaw_rad = 0.56;       // either way
+  double search_yaw_step_rad = 0.14;  // 8 degrees: within the reach of a registration
 };
 
 struct LocalizationResult {
@@ -62,7 +67,8 @@ class Localizer {
 
  private:
   Status RenewWindow(const Eigen::Vector3d& center);
-  std::vector<Pose> Hypotheses(const Pose& T_world_level) const;
+  std::vector<Pose> AheadHypotheses(const Pose& T_world_level) const;
+  std::vector<Pose> TurnHypotheses(const Pose& T_world_level) const;
   RegistrationResult Best(const ScanFeatures& features, const Pose& T_world_level) const;
   LocalizationHealth Judge(const RegistrationResult& result) const;
 
@@ -74,6 +80,7 @@ class Localizer {
   Pose last_ = Pose::Identity();  // T_world_sensor
   std::optional<Pose> motion_;    // from one scan to the next, sensor frame
   bool is_first_ = true;
+  double usual_fit_ = 0.0;  // of good results, exponentially forgotten
 };
 
 }  // namespace atlas
