@@ -17,7 +17,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
-#include "server/net/connection.h"
+#include "server/net/peer_connection.h"
 #include "server/net/request_handler.h"
 
 namespace atlas {
@@ -113,7 +113,7 @@ class TcpServer::Impl {
     }
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
-    const auto connection = std::make_shared<Connection>(std::move(socket), handler_, options_);
+    const auto connection = std::make_shared<PeerConnection>(std::move(socket), handler_, options_);
     connections_.push_back(connection);
     connection->Start();
   }
@@ -153,7 +153,7 @@ class TcpServer::Impl {
   RequestHandler handler_;
   tcp::acceptor acceptor_;
   asio::signal_set signals_;
-  std::vector<std::weak_ptr<Connection>> connections_;
+  std::vector<std::weak_ptr<PeerConnection>> connections_;
   std::unique_ptr<asio::steady_timer> drain_limit_;
 };
 

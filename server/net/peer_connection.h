@@ -17,11 +17,11 @@
 
 namespace atlas {
 
-class Connection : public std::enable_shared_from_this<Connection> {
+class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
  public:
-  Connection(boost::asio::ip::tcp::socket socket,
-             RequestHandler& handler,
-             const NetOptions& options);
+  PeerConnection(boost::asio::ip::tcp::socket socket,
+                 RequestHandler& handler,
+                 const NetOptions& options);
 
   // Spawns the coroutines; they keep the connection alive until the peer or Drain() ends it.
   void Start();

@@ -1,4 +1,4 @@
-#include "server/net/connection.h"
+#include "server/net/peer_connection.h"
 
 #include <array>
 #include <exception>
@@ -29,7 +29,7 @@ std::string PeerName(const asio::ip::tcp::socket& socket) {
 // The one place where what escapes a coroutine is caught. It keeps the connection alive until then.
 class Completion {
  public:
-  Completion(std::shared_ptr<Connection> connection, const char* what)
+  Completion(std::shared_ptr<PeerConnection> connection, const char* what)
       : connection_(std::move(connection)), what_(what) {}
 
   void operator()(std::exception_ptr failure) const {
@@ -45,15 +45,15 @@ class Completion {
   }
 
  private:
-  std::shared_ptr<Connection> connection_;
+  std::shared_ptr<PeerConnection> connection_;
   const char* what_;
 };
 
 }  // namespace
 
-Connection::Connection(asio::ip::tcp::socket socket,
-                       RequestHandler& handler,
-                       const NetOptions& options)
+PeerConnection::PeerConnection(asio::ip::tcp::socket socket,
+                               RequestHandler& handler,
+                               const NetOptions& options)
     : socket_(std::move(socket)),
       handler_(handler),
       options_(options),
@@ -63,7 +63,7 @@ Connection::Connection(asio::ip::tcp::socket socket,
       deadline_(socket_.get_executor()),
       changed_(socket_.get_executor(), asio::steady_timer::time_point::max()) {}
 
-void Connection::Start() {
+void PeerConnection::Start() {
   deadline_.expires_after(options_.handshake);
   const auto self = shared_from_this();
   asio::co_spawn(socket_.get_executor(), writer_.Run(), Completion(self, "writing"));
@@ -71,7 +71,7 @@ void Connection::Start() {
   asio::co_spawn(socket_.get_executor(), Read(), Completion(self, "reading"));
 }
 
-void Connection::Drain() {
+void PeerConnection::Drain() {
   is_draining_ = true;
   error_code ignored;  // already closed
   socket_.cancel(ignored);
@@ -79,7 +79,7 @@ void Connection::Drain() {
   Finish();
 }
 
-asio::awaitable<void> Connection::Read() {
+asio::awaitable<void> PeerConnection::Read() {
   bool is_greeted = false;
   while (!is_draining_ && !writer_.is_closed()) {
     Result<std::optional<wire::Envelope>> request = co_await NextRequest();
@@ -108,7 +108,7 @@ asio::awaitable<void> Connection::Read() {
   Finish();
 }
 
-asio::awaitable<Result<std::optional<wire::Envelope>>> Connection::NextRequest() {
+asio::awaitable<Result<std::optional<wire::Envelope>>> PeerConnection::NextRequest() {
   std::array<std::uint8_t, kReadBytes> chunk;  // NOLINT(cppcoreguidelines-pro-type-member-init)
   bool is_mid_frame = false;
   while (true) {
@@ -139,7 +139,7 @@ asio::awaitable<Result<std::optional<wire::Envelope>>> Connection::NextRequest()
   }
 }
 
-asio::awaitable<void> Connection::Serve(wire::Envelope request, std::size_t bytes) {
+asio::awaitable<void> PeerConnection::Serve(wire::Envelope request, std::size_t bytes) {
   co_await handler_.Handle(std::move(request), writer_);
   requests_ -= 1;
   request_bytes_ -= bytes;
@@ -147,7 +147,7 @@ asio::awaitable<void> Connection::Serve(wire::Envelope request, std::size_t byte
   Finish();
 }
 
-asio::awaitable<void> Connection::WaitForRoom() {
+asio::awaitable<void> PeerConnection::WaitForRoom() {
   while (!writer_.is_closed() && (requests_ >= options_.max_requests_in_flight ||
                                   request_bytes_ > options_.max_received_bytes)) {
     error_code ignored;  // woken by cancelling
@@ -156,7 +156,7 @@ asio::awaitable<void> Connection::WaitForRoom() {
   deadline_.expires_after(options_.idle);
 }
 
-asio::awaitable<void> Connection::WatchDeadline() {
+asio::awaitable<void> PeerConnection::WatchDeadline() {
   while (!writer_.is_closed()) {
     error_code cancelled;  // the deadline moved, or the connection is done
     co_await deadline_.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
@@ -169,7 +169,7 @@ asio::awaitable<void> Connection::WatchDeadline() {
   }
 }
 
-void Connection::Finish() {
+void PeerConnection::Finish() {
   if (!is_reading_ && requests_ == 0) {
     writer_.CloseWhenEmpty();
     deadline_.cancel();
