@@ -15,7 +15,7 @@ namespace atlas {
 namespace {
 
 constexpr double kScanInterval_s = 0.1;  // where times.txt is missing
-constexpr double kMaxTime_s = 1e12;
+constexpr double kMaxTime_s = 1e12;      // fits a message; the daemon knows what time it is
 
 // From one scan to the next, as the sensor moves; still when it has no neighbour before a jump.
 Pose MotionAt(const DriveFolder& drive, std::size_t index) {
@@ -33,17 +33,23 @@ Pose MotionAt(const DriveFolder& drive, std::size_t index) {
   return found.value_or(Pose::Identity());
 }
 
+SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
+  SurveyOptions survey;
+  survey.rings = options.rings;
+  survey.sensor_height_m = options.sensor_height_m;
+  return survey;
+}
+
 class Ingest {
  public:
   Ingest(const DriveFolder& drive, const IngestOptions& options, AtlasClient& client)
       : drive_(drive), options_(options), uploader_(client, options.upload) {}
 
   Status Prepare(const MapProfile& profile) {
-    ATLAS_RETURN_IF_ERROR(CheckOptions());
-    SurveyOptions survey_options;
-    survey_options.rings = options_.rings;
-    survey_options.sensor_height_m = options_.sensor_height_m;
-    const Result<DriveSurvey> survey = SurveyDrive(drive_, survey_options);
+    ATLAS_RETURN_IF_ERROR(options_.Validate());
+    ATLAS_RETURN_IF_ERROR(Select());
+    ATLAS_RETURN_IF_ERROR(CheckScans());
+    const Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
     if (!survey) return survey.error();
     KeyframeBuilderOptions builder_options;
     builder_options.max_range_m = options_.max_range_m;
@@ -52,7 +58,8 @@ class Ingest {
     ATLAS_RETURN_IF_ERROR(builder_options.Validate(profile));
     builder_.emplace(profile, survey->layout, builder_options);
     report_.sensor_height_m = survey->sensor_height_m;
-    return Select();
+    if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
+    return {};
   }
 
   Status Run(const std::function<void(std::size_t, std::size_t)>& progress) {
@@ -72,18 +79,6 @@ class Ingest {
   }
 
  private:
-  Status CheckOptions() const {
-    ATLAS_RETURN_IF_ERROR(options_.session.Validate());
-    if (!(options_.selection.every_m >= 0.0)) {
-      return {StatusCode::kInvalidArgument,
-              StrCat("every ", options_.selection.every_m, " m: expected 0 or more")};
-    }
-    if (options_.upload.max_in_flight < 1) {
-      return {StatusCode::kInvalidArgument, "batch 0: expected at least one keyframe"};
-    }
-    return {};
-  }
-
   Status Select() {
     selected_ = SelectScans(drive_, options_.selection);
     report_.keyframes = selected_.size();
@@ -94,7 +89,16 @@ class Ingest {
       ATLAS_RETURN_IF_ERROR(KeyOf(scan).Validate());  // "S.12" may be too long a name
     }
     report_.sessions = parts.size();
-    if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
+    return {};
+  }
+
+  // Reads every scan once before the first is uploaded: a drive with a bad one leaves no trace.
+  Status CheckScans() const {
+    for (const SelectedScan& selected : selected_) {
+      const DriveScan& scan = drive_.scans[selected.index];
+      if (const auto cloud = ReadScan(scan.scan); !cloud) return cloud.error();
+      if (const auto time_ms = TimeOf(scan); !time_ms) return time_ms.error();
+    }
     return {};
   }
 
@@ -106,9 +110,9 @@ class Ingest {
 
   Result<std::int64_t> TimeOf(const DriveScan& scan) const {
     const double time_s = options_.start_s + scan.time_s.value_or(kScanInterval_s * scan.number);
-    if (!(std::abs(time_s) <= kMaxTime_s)) {
+    if (!(time_s >= 0.0 && time_s <= kMaxTime_s)) {
       return Error(StatusCode::kInvalidData,
-                   StrCat("scan ", scan.number, ": time ", time_s, " s is no time"));
+                   StrCat("scan ", scan.number, ": time ", time_s, " s: expected 0 or more"));
     }
     return std::llround(time_s * 1e3);
   }
@@ -153,6 +157,19 @@ class Ingest {
 };
 
 }  // namespace
+
+Status IngestOptions::Validate() const {
+  ATLAS_RETURN_IF_ERROR(session.Validate());
+  ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  if (!(selection.every_m >= 0.0)) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("every ", selection.every_m, " m: expected 0 or more")};
+  }
+  if (upload.max_in_flight < 1) {
+    return {StatusCode::kInvalidArgument, "batch 0: expected at least one keyframe"};
+  }
+  return {};
+}
 
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,

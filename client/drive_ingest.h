@@ -24,6 +24,9 @@ struct IngestOptions {
   double start_s = 0.0;  // added to the scans' times
   std::optional<std::uint64_t> shuffle_seed;
   UploadOptions upload;
+
+  // kInvalidArgument naming the first option out of range, those aside that depend on the atlas.
+  Status Validate() const;
 };
 
 struct IngestReport {
@@ -35,8 +38,9 @@ struct IngestReport {
   std::uint64_t sessions = 0;
 };
 
-// `progress` (may be empty) is called with the number of keyframes sent. Fails at the first scan
-// that is bad or keyframe that is refused, naming it; what was acknowledged until then stays.
+// `progress` (may be empty) is called with the number of keyframes sent. A scan that is bad is
+// named and nothing is uploaded. Fails at the first keyframe that the daemon refuses, naming it;
+// what was acknowledged until then stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
                                  AtlasClient& client,

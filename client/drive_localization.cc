@@ -123,28 +123,33 @@ class DriveLocalization {
   DriveLocalizationReport report_;
 };
 
-Status Validate(const DriveLocalizationOptions& options) {
-  if (!(options.max_range_m >= 1.0 && options.max_range_m <= 200.0)) {
+SurveyOptions SurveyOptionsFor(const DriveLocalizationOptions& options) {
+  SurveyOptions survey;
+  survey.rings = options.rings;
+  return survey;
+}
+
+}  // namespace
+
+Status DriveLocalizationOptions::Validate() const {
+  ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  if (!(max_range_m >= 1.0 && max_range_m <= 200.0)) {
     return {StatusCode::kInvalidArgument,
-            StrCat("maximum range ", options.max_range_m, " m: expected 1 to 200")};
+            StrCat("maximum range ", max_range_m, " m: expected 1 to 200")};
   }
-  if (options.shots && options.shots->trials < 1) {
+  if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
   }
   return {};
 }
-
-}  // namespace
 
 Result<DriveLocalizationReport> LocalizeDrive(
     const DriveFolder& drive,
     const DriveLocalizationOptions& options,
     MapView& view,
     const std::function<void(const LocalizedScan&)>& on_scan) {
-  if (Status status = Validate(options); !status.ok()) return Error(std::move(status));
-  SurveyOptions survey_options;
-  survey_options.rings = options.rings;
-  Result<DriveSurvey> survey = SurveySensor(drive, survey_options);
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
+  Result<DriveSurvey> survey = SurveySensor(drive, SurveyOptionsFor(options));
   if (!survey) return Error(survey.error());
   return DriveLocalization(drive, options, *std::move(survey), view, on_scan).Run();
 }

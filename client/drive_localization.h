@@ -30,6 +30,9 @@ struct DriveLocalizationOptions {
   std::optional<Shots> shots;  // tracking, if not given
   std::uint64_t seed = 0;
   double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;  // a cheap IMU's
+
+  // kInvalidArgument naming the first option out of range.
+  Status Validate() const;
 };
 
 struct LocalizedScan {

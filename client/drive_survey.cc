@@ -48,11 +48,14 @@ Result<double> SurveyHeight(const DriveFolder& drive,
 
 }  // namespace
 
+Status SurveyOptions::Validate() const {
+  return rings && (*rings < 1 || *rings > 64)
+             ? Status(StatusCode::kInvalidArgument, StrCat("rings ", *rings, ": expected 1 to 64"))
+             : Status();
+}
+
 Result<DriveSurvey> SurveySensor(const DriveFolder& drive, const SurveyOptions& options) {
-  if (options.rings && (*options.rings < 1 || *options.rings > 64)) {
-    return Error(StatusCode::kInvalidArgument,
-                 StrCat("rings ", *options.rings, ": expected 1 to 64"));
-  }
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
   SensorLayoutEstimator estimator;
   const Status status =
       ForSomeScans(drive, options.max_layout_scans,

@@ -18,6 +18,9 @@ struct SurveyOptions {
   SegmenterOptions segmenter;
   std::size_t max_layout_scans = 200;  // read for the layout, evenly spread over the drive
   std::size_t max_height_scans = 24;   // segmented for the height, likewise
+
+  // kInvalidArgument for rings outside of 1 to 64.
+  Status Validate() const;
 };
 
 struct DriveSurvey {

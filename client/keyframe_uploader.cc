@@ -19,6 +19,14 @@ wire::Envelope UploadRequest(const KeyframeUpload& upload) {
   return request;
 }
 
+// The daemon names the keyframe where the fault is its own.
+Status Named(const Status& refusal, const KeyframeKey& key) {
+  const std::string name = StrCat("keyframe ", key);
+  const std::string& message = refusal.message();
+  const bool is_named = message.starts_with(name + ":") || message.starts_with(name + " ");
+  return is_named ? refusal : refusal.WithContext(name);
+}
+
 }  // namespace
 
 KeyframeUploader::KeyframeUploader(AtlasClient& client, const UploadOptions& options)
@@ -54,8 +62,7 @@ Status KeyframeUploader::ReceiveOne() {
   if (entry == in_flight_.end()) return {};  // of a request that was given up
   if (reply->has_error()) {
     if (first_refusal_.ok()) {
-      first_refusal_ =
-          ErrorFromWire(reply->error()).status.WithContext(StrCat("keyframe ", entry->key));
+      first_refusal_ = Named(ErrorFromWire(reply->error()).status, entry->key);
     }
   } else if (!reply->has_upload_reply()) {
     return {StatusCode::kInvalidData,

@@ -39,20 +39,24 @@ std::vector<std::string> Prepared(const std::vector<std::string>& arguments) {
 }
 
 void AddCommonFlags(CLI::App& app, CommonFlags& common) {
-  app.add_flag("--json", common.is_json, "Print JSON");
+  app.add_flag("--json", common.is_json, "Print JSON")->disable_flag_override();
   app.add_option("--server", common.server, "The daemon [ATLAS_SERVER, else 127.0.0.1:7447]")
       ->type_name("HOST:PORT");
 }
 
 void AddArgument(CLI::App& app, const Argument& argument) {
   const auto set = [argument](const std::string& text) {
+    if (text.starts_with("--")) {  // "-o --json": the parser would write a file of that name
+      throw CLI::ValidationError(argument.name, "has no value before " + text.substr(0, 80));
+    }
     if (const Status status = argument.set(text); !status.ok()) {
       throw CLI::ValidationError(argument.name, status.message());
     }
   };
   if (argument.value_name.empty()) {
     app.add_flag_function(
-        argument.name, [set](std::int64_t) { set(""); }, argument.help);
+           argument.name, [set](std::int64_t) { set(""); }, argument.help)
+        ->disable_flag_override();
     return;
   }
   CLI::Option* option = app.add_option_function<std::string>(argument.name, set, argument.help);
@@ -76,18 +80,6 @@ CLI::App& SubcommandFor(CLI::App& root, const Command& command) {
   }
   app->description(command.Summary());
   return *app;
-}
-
-void PrintFailure(const Status& status, bool is_json, std::ostream& err) {
-  if (is_json) {
-    const boost::json::object error = {
-        {"code", StatusCodeName(status.code())},
-        {"message", status.message()},
-    };
-    err << JsonText(boost::json::object{{"error", error}}) << '\n';
-  } else {
-    err << "atlas: " << status.message() << '\n';
-  }
 }
 
 Result<Endpoint> ServerEndpoint(const CommonFlags& common, const CommandLineIo& io) {
@@ -167,6 +159,22 @@ class Parser {
 
 }  // namespace
 
+bool IsJsonAskedFor(const std::vector<std::string>& arguments) {
+  return std::find(arguments.begin(), arguments.end(), "--json") != arguments.end();
+}
+
+void PrintFailure(const Status& status, bool is_json, std::ostream& err) {
+  if (is_json) {
+    const boost::json::object error = {
+        {"code", StatusCodeName(status.code())},
+        {"message", status.message()},
+    };
+    err << JsonText(boost::json::object{{"error", error}}) << '\n';
+  } else {
+    err << "atlas: " << status.message() << '\n';
+  }
+}
+
 ExitCode RunCommandLine(const std::vector<std::string>& arguments,
                         std::span<const std::unique_ptr<Command>> commands,
                         const CommandLineIo& io) {
@@ -174,7 +182,7 @@ ExitCode RunCommandLine(const std::vector<std::string>& arguments,
   Parser parser(commands, common);
   const Result<Command*> command = parser.Parse(arguments, io.out);
   if (!command) {
-    const bool is_json = std::count(arguments.begin(), arguments.end(), "--json") > 0;
+    const bool is_json = IsJsonAskedFor(arguments);
     PrintFailure(command.error(), is_json, io.err);
     if (!is_json) io.err << "Run with --help for more information.\n";
     return ExitCode::kUsage;

@@ -20,6 +20,12 @@ struct CommandLineIo {
   std::optional<std::string> server_from_environment;  // ATLAS_SERVER
 };
 
+// `arguments` ask for JSON, well-formed or not.
+bool IsJsonAskedFor(const std::vector<std::string>& arguments);
+
+// One line: "atlas: MESSAGE", or {"error":{"code","message"}}.
+void PrintFailure(const Status& status, bool is_json, std::ostream& err);
+
 // `arguments` without the program's name. Prints failures to `err`, as JSON after --json.
 ExitCode RunCommandLine(const std::vector<std::string>& arguments,
                         std::span<const std::unique_ptr<Command>> commands,

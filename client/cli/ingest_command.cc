@@ -96,8 +96,8 @@ class IngestCommand : public Command {
     options_.selection.end = range_.end;
     options_.is_deskewed = deskew_ == "on";
     options_.upload.max_in_flight = batch_;
-    options_.session = {vehicle_, session_.empty() ? FolderName() : session_};
-    return options_.session.Validate();
+    options_.session = {vehicle_, session_.value_or(FolderName())};
+    return options_.Validate();
   }
 
   std::string FolderName() const {
@@ -117,7 +117,7 @@ class IngestCommand : public Command {
 
   std::string directory_;
   std::string vehicle_ = "vehicle";
-  std::string session_;
+  std::optional<std::string> session_;
   std::string scans_ = "all";
   std::string deskew_ = "off";
   NumberRange range_;

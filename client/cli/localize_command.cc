@@ -111,7 +111,7 @@ class LocalizeCommand : public Command {
                         perturbation_->rotation_deg * std::numbers::pi / 180.0,
                         trials_.value_or(10)};
     }
-    return {};
+    return options_.Validate();
   }
 
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,

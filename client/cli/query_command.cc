@@ -27,6 +27,7 @@ class QueryCommand : public Command {
   }
 
   Status Run(CommandContext& context) override {
+    ATLAS_RETURN_IF_ERROR(CheckArguments());
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
     const Result<RegionQuery> query = Query(client->profile());
@@ -45,17 +46,20 @@ class QueryCommand : public Command {
   }
 
  private:
-  Result<RegionQuery> Query(const MapProfile& profile) const {
+  Status CheckArguments() const {
     if (!(radius_m_ >= 0.0)) {
-      return Error(StatusCode::kInvalidArgument,
-                   StrCat("radius ", radius_m_, " m: expected 0 or more"));
+      return {StatusCode::kInvalidArgument, StrCat("radius ", radius_m_, " m: expected 0 or more")};
     }
+    if (budget_bytes_ && *budget_bytes_ == 0) {
+      return {StatusCode::kInvalidArgument, "budget 0: expected at least one byte"};
+    }
+    return {};
+  }
+
+  Result<RegionQuery> Query(const MapProfile& profile) const {
     if (level_ >= profile.levels) {
       return Error(StatusCode::kInvalidArgument,
                    StrCat("level ", level_, ": this atlas has levels 0 to ", profile.levels - 1));
-    }
-    if (budget_bytes_ && *budget_bytes_ == 0) {
-      return Error(StatusCode::kInvalidArgument, "budget 0: expected at least one byte");
     }
     RegionQuery query;
     query.disc = {center_m_, radius_m_};

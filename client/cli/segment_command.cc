@@ -29,7 +29,7 @@ Status ScoreScan(const DriveScan& scan,
                  const std::vector<std::uint8_t>& is_ground,
                  SegmentationRun& run) {
   if (!scan.label) return {};
-  const auto labels = ReadLabels(*scan.label, cloud.size());
+  const auto labels = ReadLabels(*scan.label, cloud);
   if (!labels) return labels.error();
   SegmentationCounts counts;
   for (std::size_t i = 0; i < image.size(); ++i) {

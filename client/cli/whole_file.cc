@@ -54,6 +54,9 @@ Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
 Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes) {
   std::error_code error;
   const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error == std::errc::is_a_directory) {
+    return Error(StatusCode::kInvalidData, StrCat(path.string(), ": a folder, expected a file"));
+  }
   if (error) return Error(SystemError("cannot read", path, error.value()));
   if (size > max_bytes) {
     return Error(StatusCode::kResourceExhausted,

@@ -106,6 +106,21 @@ TEST(KeyframeUploaderTest, RefusalNamesItsKeyframeAndTheOthersAreCounted) {
   EXPECT_EQ(uploader.totals().acked, 2U);
 }
 
+TEST(KeyframeUploaderTest, RefusalThatNamesItsKeyframeIsNotNamedTwice) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    wire::Envelope reply;
+    *reply.mutable_error() =
+        ErrorToWire({StatusCode::kInvalidData, "keyframe car/monday/0: of another profile"});
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(reply));
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client);
+  ASSERT_TRUE(uploader.Upload(Upload(0, Bytes(10))).ok());
+  EXPECT_EQ(uploader.Finish().message(), "keyframe car/monday/0: of another profile");
+}
+
 TEST(KeyframeUploaderTest, LostConnectionIsNotAnAcknowledgement) {
   TestPeer peer([](PeerSocket& socket) {
     AnswerHello(socket, {});

@@ -137,6 +137,9 @@ TEST(CommandLineTest, UsageErrorsAreTwo) {
       {"point", "1", "2", "--server", "nowhere"},
       {"point", "1", "2", "--server", "host:0"},
       {"point", "1", "2", "--server", "host:70000"},
+      {"point", "1", "2", "--height", "--json"},
+      {"point", "1", "2", "--rebuild=often"},
+      {"point", "1", "2", "--json=0"},
       {"poses"},
   };
   for (const auto& arguments : wrong) {
