@@ -6,7 +6,8 @@
 
 #include <unistd.h>
 
-#include "client/cli/command_line.h"
+#include "client/cli/command_line/command_line.h"
+#include "client/cli/commands/commands.h"
 
 namespace {
 
