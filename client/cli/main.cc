@@ -25,7 +25,7 @@ int Fail(const std::string& message, const std::vector<std::string>& arguments) 
 int Run(const std::vector<std::string>& arguments) {
   const std::vector<std::unique_ptr<atlas::Command>> commands = atlas::MakeCommands();
   const atlas::CommandLineIo io{std::cout, std::cerr, isatty(STDERR_FILENO) == 1,
-                                FromEnvironment("ATLAS_SERVER")};
+                                FromEnvironment("ATLAS_SERVER"), isatty(STDOUT_FILENO) == 1};
   const atlas::ExitCode code = atlas::RunCommandLine(arguments, commands, io);
   if (!std::cout.flush()) return Fail("cannot write to standard output", arguments);
   return static_cast<int>(code);

@@ -19,6 +19,7 @@ struct CommandContext {
   std::ostream& err;
   bool is_json = false;
   bool is_err_terminal = false;
+  bool is_out_terminal = false;
   Endpoint server;
 
   Result<AtlasClient> Connect() const;

@@ -108,7 +108,8 @@ Status CheckCommandName(const std::vector<std::string>& arguments, const CLI::Ap
 Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
   const Result<Endpoint> server = ServerEndpoint(common, io);
   if (!server) return server.error();
-  CommandContext context{io.out, io.err, common.is_json, io.is_err_terminal, *server};
+  CommandContext context{io.out, io.err, common.is_json, io.is_err_terminal, io.is_out_terminal,
+                         *server};
   return command.Run(context);
 }
 

@@ -18,6 +18,7 @@ struct CommandLineIo {
   std::ostream& err;
   bool is_err_terminal = false;
   std::optional<std::string> server_from_environment;  // ATLAS_SERVER
+  bool is_out_terminal = false;
 };
 
 // `arguments` ask for JSON, well-formed or not.

@@ -6,6 +6,8 @@ import pathlib
 import sys
 import tempfile
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+
 import atlas_cases
 import daemon_cases
 import drive_cases

@@ -118,11 +118,14 @@ class LocalizeCommand : public Command {
                                            AtlasClient& client,
                                            const CommandContext& context) const {
     MapView view(client);
-    ProgressBar bar(context.err, context.is_err_terminal && !context.is_json, "localize",
-                    drive.scans.size());
+    // Lines of a stream would run into the bar on the same terminal.
+    const bool is_stream_seen = context.is_json && context.is_out_terminal;
+    const std::uint32_t first = drive.scans.front().number;
+    ProgressBar bar(context.err, context.is_err_terminal && !is_stream_seen, "localize",
+                    drive.scans.back().number - first + 1);
     return LocalizeDrive(drive, options_, view, [&](const LocalizedScan& scan) {
       if (context.is_json) context.PrintJson(ScanJson(scan));
-      bar.Update(scan.scan - drive.scans.front().number + 1);
+      bar.Update(scan.scan - first + 1);
     });
   }
 
