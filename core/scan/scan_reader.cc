@@ -18,13 +18,23 @@ bool IsPlausible(float value) {
   return std::isfinite(value) && std::abs(value) <= kMaxCoordinate_m;
 }
 
+Status FileError(const std::filesystem::path& path, const std::error_code& error) {
+  StatusCode code = StatusCode::kInvalidData;  // a folder, a pipe
+  if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) {
+    code = StatusCode::kNotFound;
+  } else if (error == std::errc::permission_denied) {
+    code = StatusCode::kPermissionDenied;
+  }
+  return {code, StrCat(path.string(), ": ", error.message())};
+}
+
 }  // namespace
 
 Result<Bytes> ReadFileBytes(const std::filesystem::path& path, std::size_t max_bytes) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error) {
-    return Error(StatusCode::kNotFound, StrCat(path.string(), ": ", error.message()));
+    return Error(FileError(path, error));
   }
   if (size > max_bytes) {
     return Error(StatusCode::kResourceExhausted,
@@ -50,17 +60,24 @@ Result<PointCloud> ParseScan(ByteSpan bytes) {
   PointCloud cloud;
   cloud.points.reserve(bytes.size() / kPointBytes);
   ByteReader in(bytes);
-  while (in.remaining() > 0) {
+  for (std::uint32_t slot = 0; in.remaining() > 0; ++slot) {
     const auto x = std::bit_cast<float>(in.U32());
     const auto y = std::bit_cast<float>(in.U32());
     const auto z = std::bit_cast<float>(in.U32());
     in.U32();  // intensity
+    if (std::isnan(x) && std::isnan(y) && std::isnan(z)) {
+      cloud.empty_slots.push_back(slot);
+      continue;
+    }
     if (!IsPlausible(x) || !IsPlausible(y) || !IsPlausible(z)) {
       return Error(StatusCode::kInvalidData,
-                   StrCat("return ", cloud.size(), " at (", x, ", ", y, ", ", z,
+                   StrCat("return ", slot, " at (", x, ", ", y, ", ", z,
                           ") m: expected finite coordinates within 1000 m"));
     }
     cloud.points.emplace_back(x, y, z);
+  }
+  if (cloud.points.empty()) {
+    return Error(StatusCode::kInvalidData, "the scan has no return: every coordinate is NaN");
   }
   return cloud;
 }
@@ -75,19 +92,27 @@ Result<PointCloud> ReadScan(const std::filesystem::path& path) {
 }
 
 Result<std::vector<std::uint32_t>> ReadLabels(const std::filesystem::path& path,
-                                              std::size_t points) {
+                                              const PointCloud& cloud) {
   Result<Bytes> bytes = ReadFileBytes(path, kMaxScanBytes);
   if (!bytes) {
     return Error(bytes.error());
   }
-  if (bytes->size() != 4 * points) {
+  const std::size_t slots = cloud.size() + cloud.empty_slots.size();
+  if (bytes->size() != 4 * slots) {
     return Error(StatusCode::kInvalidData, StrCat(path.string(), ": ", bytes->size(), " bytes for ",
-                                                  points, " returns, expected 4 each"));
+                                                  slots, " returns, expected 4 each"));
   }
-  std::vector<std::uint32_t> labels(points);
+  std::vector<std::uint32_t> labels;
+  labels.reserve(cloud.size());
   ByteReader in(*bytes);
-  for (std::uint32_t& label : labels) {
-    label = in.U32();
+  auto empty = cloud.empty_slots.begin();
+  for (std::uint32_t slot = 0; slot < slots; ++slot) {
+    const std::uint32_t label = in.U32();
+    if (empty != cloud.empty_slots.end() && *empty == slot) {
+      ++empty;
+    } else {
+      labels.push_back(label);
+    }
   }
   return labels;
 }
