@@ -1,7 +1,6 @@
 // One LiDAR revolution: returns in the sensor frame (x forward, z up), metres.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,7 +10,6 @@ namespace atlas {
 // In the order of the file or the driver: ring after ring. Returns only, no empty slots.
 struct PointCloud {
   std::vector<Eigen::Vector3f> points;
-  std::vector<std::uint32_t> empty_slots;  // ascending places in the file that held no return
 
   std::size_t size() const { return points.size(); }
 };

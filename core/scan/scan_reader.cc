@@ -60,24 +60,17 @@ Result<PointCloud> ParseScan(ByteSpan bytes) {
   PointCloud cloud;
   cloud.points.reserve(bytes.size() / kPointBytes);
   ByteReader in(bytes);
-  for (std::uint32_t slot = 0; in.remaining() > 0; ++slot) {
+  while (in.remaining() > 0) {
     const auto x = std::bit_cast<float>(in.U32());
     const auto y = std::bit_cast<float>(in.U32());
     const auto z = std::bit_cast<float>(in.U32());
     in.U32();  // intensity
-    if (std::isnan(x) && std::isnan(y) && std::isnan(z)) {
-      cloud.empty_slots.push_back(slot);
-      continue;
-    }
     if (!IsPlausible(x) || !IsPlausible(y) || !IsPlausible(z)) {
       return Error(StatusCode::kInvalidData,
-                   StrCat("return ", slot, " at (", x, ", ", y, ", ", z,
+                   StrCat("return ", cloud.size(), " at (", x, ", ", y, ", ", z,
                           ") m: expected finite coordinates within 1000 m"));
     }
     cloud.points.emplace_back(x, y, z);
-  }
-  if (cloud.points.empty()) {
-    return Error(StatusCode::kInvalidData, "the scan has no return: every coordinate is NaN");
   }
   return cloud;
 }
@@ -97,22 +90,14 @@ Result<std::vector<std::uint32_t>> ReadLabels(const std::filesystem::path& path,
   if (!bytes) {
     return Error(bytes.error());
   }
-  const std::size_t slots = cloud.size() + cloud.empty_slots.size();
-  if (bytes->size() != 4 * slots) {
+  if (bytes->size() != 4 * cloud.size()) {
     return Error(StatusCode::kInvalidData, StrCat(path.string(), ": ", bytes->size(), " bytes for ",
-                                                  slots, " returns, expected 4 each"));
+                                                  cloud.size(), " returns, expected 4 each"));
   }
-  std::vector<std::uint32_t> labels;
-  labels.reserve(cloud.size());
+  std::vector<std::uint32_t> labels(cloud.size());
   ByteReader in(*bytes);
-  auto empty = cloud.empty_slots.begin();
-  for (std::uint32_t slot = 0; slot < slots; ++slot) {
-    const std::uint32_t label = in.U32();
-    if (empty != cloud.empty_slots.end() && *empty == slot) {
-      ++empty;
-    } else {
-      labels.push_back(label);
-    }
+  for (std::uint32_t& label : labels) {
+    label = in.U32();
   }
   return labels;
 }

@@ -15,15 +15,14 @@ namespace atlas {
 // kResourceExhausted above `max_bytes`.
 Result<Bytes> ReadFileBytes(const std::filesystem::path& path, std::size_t max_bytes);
 
-// velodyne/NNNNNN.bin: float32 x y z intensity a return. Intensity is not believed or kept. Drivers
-// write NaN for x, y and z where the sensor got nothing back: such a slot is no return.
-// kInvalidData: no return, not a multiple of 16 bytes, any other coordinate that is not finite or
-// is beyond 1 km.
+// velodyne/NNNNNN.bin: float32 x y z intensity a return. Intensity is not believed or kept.
+// kInvalidData: empty, not a multiple of 16 bytes, a coordinate that is not finite or is beyond 1
+// km.
 Result<PointCloud> ReadScan(const std::filesystem::path& path);
 Result<PointCloud> ParseScan(ByteSpan bytes);
 
-// labels/NNNNNN.label: uint32 a slot of the scan, SemanticKITTI class in the low 16 bits. The
-// labels of the cloud's returns; kInvalidData unless there is one for each slot.
+// labels/NNNNNN.label: uint32 a return, SemanticKITTI class in the low 16 bits. kInvalidData unless
+// there is one for each return of the cloud.
 Result<std::vector<std::uint32_t>> ReadLabels(const std::filesystem::path& path,
                                               const PointCloud& cloud);
 

@@ -102,21 +102,6 @@ TEST_F(DriveFolderTest, BadScansAreRefused) {
   EXPECT_TRUE(ReadScan(folder_ / "velodyne/000000.bin").has_value());
 }
 
-TEST_F(DriveFolderTest, SlotsOfNaNAreNoReturns) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  Write("velodyne/000000.bin", Returns({nan, nan, nan, 0, 1, 2, 3, 0, nan, nan, nan, 0}));
-  const Result<PointCloud> cloud = ReadScan(folder_ / "velodyne/000000.bin");
-  ASSERT_TRUE(cloud.has_value()) << cloud.error().message();
-  ASSERT_EQ(cloud->size(), 1U);
-  EXPECT_EQ(cloud->points[0], Eigen::Vector3f(1, 2, 3));
-  EXPECT_EQ(cloud->empty_slots, (std::vector<std::uint32_t>{0, 2}));
-  Write("labels/000000.label", std::string("\1\0\0\0\2\0\0\0\3\0\0\0", 12));
-  EXPECT_EQ(ReadLabels(folder_ / "labels/000000.label", *cloud), (std::vector<std::uint32_t>{2}));
-
-  Write("velodyne/000000.bin", Returns({nan, nan, nan, 0}));
-  EXPECT_EQ(ReadScan(folder_ / "velodyne/000000.bin").error().code(), StatusCode::kInvalidData);
-}
-
 TEST_F(DriveFolderTest, TwoScansOfOneNumberAreRefused) {
   Write("velodyne/000000.bin", Returns({1, 2, 3, 0}));
   Write("velodyne/0.bin", Returns({1, 2, 3, 0}));
