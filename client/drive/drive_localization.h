@@ -26,7 +26,7 @@ struct DriveLocalizationOptions {
 
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
-  double max_range_m = 40.0;
+  double max_range_m = 100.0;
   std::optional<Shots> shots;  // tracking, if not given
   std::uint64_t seed = 0;
   double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;  // a cheap IMU's
