@@ -12,7 +12,7 @@ namespace atlas {
 struct PlanOptions {
   // Limits of the vehicle.
   double max_slope_deg = 25.0;   // of the surface in any direction
-  double max_step_m = 0.2;       // between neighbouring cells
+  double max_step_m = 0.195;     // between neighbouring cells: 0.2 less what rounding adds
   double vehicle_width_m = 1.8;  // a small car; half of it and the margin inflate obstacles
   double safety_margin_m = 0.1;
   double headroom_m = 2.0;        // free height above the surface
