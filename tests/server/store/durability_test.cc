@@ -65,13 +65,13 @@ TEST_F(DurabilityTest, AnAcknowledgedWriteSurvivesAKilledProcess) {
     [[maybe_unused]] const auto written = ::write(pipe_ends[1], &ok, 1);
     ::pause();
   }
+  ::close(pipe_ends[1]);  // so that the read below ends when the child does
   char ok = 0;
   ASSERT_EQ(::read(pipe_ends[0], &ok, 1), 1);
   EXPECT_EQ(OpenCode(), StatusCode::kConflict);  // the child holds the directory
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
   ::close(pipe_ends[0]);
-  ::close(pipe_ends[1]);
   ASSERT_EQ(ok, 1);
   Open();
   EXPECT_EQ(store_->ReadCounts()->keyframes, 1u);
