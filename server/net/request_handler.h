@@ -1,9 +1,6 @@
 // One request in, its replies out: the wire's side of every use case of AtlasService.
 #pragma once
 
-#include <chrono>
-#include <functional>
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/thread_pool.hpp>
 
@@ -38,12 +35,6 @@ class RequestHandler {
   boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
-
-  // Asks again and again, so that no thread waits with the client. kTimeout says how many tiles are
-  // still dirty.
-  boost::asio::awaitable<Result<WaitOutcome>> WaitUntilClean(std::chrono::milliseconds timeout);
-  boost::asio::awaitable<Status> WaitForRevision(std::uint64_t revision,
-                                                 std::chrono::milliseconds timeout);
 
   AtlasService& service_;
   boost::asio::thread_pool& pool_;
