@@ -15,8 +15,7 @@ namespace {
 
 namespace asio = boost::asio;
 
-constexpr std::chrono::milliseconds kDefaultTimeout{60'000};
-constexpr std::chrono::milliseconds kLongestTimeout{3'600'000};
+constexpr std::chrono::milliseconds kLongestTimeout{86'400'000};
 
 // Pauses between two looks at what is still dirty.
 class Pauses {
@@ -42,38 +41,49 @@ class Pauses {
 }  // namespace
 
 std::chrono::milliseconds TimeoutFromWire(std::uint32_t timeout_ms) {
-  const std::chrono::milliseconds asked{timeout_ms};
-  return timeout_ms == 0 ? kDefaultTimeout : std::min(asked, kLongestTimeout);
+  return std::min(std::chrono::milliseconds(timeout_ms), kLongestTimeout);
 }
 
 asio::awaitable<Result<WaitOutcome>> WaitUntilClean(AtlasService& service,
                                                     asio::thread_pool& pool,
-                                                    std::chrono::milliseconds timeout) {
-  Pauses pauses(co_await asio::this_coro::executor, timeout);
-  const Blocking<WaitOutcome> look = [&service] {
-    return service.WaitUntilClean(Patience());
+                                                    Patience patience) {
+  Pauses pauses(co_await asio::this_coro::executor, patience.timeout);
+  const Patience no_wait{std::chrono::milliseconds(0), patience.stop};
+  const Blocking<WaitOutcome> look = [&service, no_wait] {
+    return service.WaitUntilClean(no_wait);
   };
   while (true) {
     Result<WaitOutcome> outcome = co_await OnPool(pool, look);
-    if (!outcome || !outcome->is_timed_out) {
+    if (!outcome || !outcome->is_timed_out || pauses.is_over()) {
       co_return outcome;
-    }
-    if (pauses.is_over()) {
-      co_return Error(StatusCode::kTimeout,
-                      StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
-                             timeout.count(), " ms"));
     }
     co_await pauses.Next();
   }
 }
 
+asio::awaitable<Status> RequireClean(AtlasService& service,
+                                     asio::thread_pool& pool,
+                                     Patience patience) {
+  const Result<WaitOutcome> outcome = co_await WaitUntilClean(service, pool, patience);
+  if (!outcome) {
+    co_return outcome.error();
+  }
+  if (outcome->is_timed_out) {
+    co_return Status(StatusCode::kTimeout,
+                     StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
+                            patience.timeout.count(), " ms"));
+  }
+  co_return Status();
+}
+
 asio::awaitable<Status> WaitForRevision(AtlasService& service,
                                         asio::thread_pool& pool,
                                         std::uint64_t revision,
-                                        std::chrono::milliseconds timeout) {
-  Pauses pauses(co_await asio::this_coro::executor, timeout);
-  const Blocking<bool> look = [&service, revision]() -> Result<bool> {
-    const Status status = service.WaitForRevision(revision, Patience());
+                                        Patience patience) {
+  Pauses pauses(co_await asio::this_coro::executor, patience.timeout);
+  const Patience no_wait{std::chrono::milliseconds(0), patience.stop};
+  const Blocking<bool> look = [&service, no_wait, revision]() -> Result<bool> {
+    const Status status = service.WaitForRevision(revision, no_wait);
     if (status.ok() || status.code() == StatusCode::kTimeout) {
       return status.ok();
     }
@@ -89,7 +99,7 @@ asio::awaitable<Status> WaitForRevision(AtlasService& service,
     }
     if (pauses.is_over()) {
       co_return Status(StatusCode::kTimeout, StrCat("the tiles do not reflect revision ", revision,
-                                                    " after ", timeout.count(), " ms"));
+                                                    " after ", patience.timeout.count(), " ms"));
     }
     co_await pauses.Next();
   }

@@ -123,6 +123,12 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
   out.set_rss_bytes(status.rss_bytes);
 }
 
+void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {
+  out.set_revision(outcome.revision);
+  out.set_dirty_tiles(outcome.dirty_tiles);
+  out.set_timed_out(outcome.is_timed_out);
+}
+
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
   out.set_vehicle(record.key.vehicle);
   out.set_session(record.key.session);

@@ -20,6 +20,7 @@ Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message);
 void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out);
 void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out);
 void StatusToWire(const ServiceStatus& status, wire::StatusReply& out);
+void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out);
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out);
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out);
 void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out);

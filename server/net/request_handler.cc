@@ -1,6 +1,5 @@
 #include "server/net/request_handler.h"
 
-#include <chrono>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -86,13 +85,11 @@ asio::awaitable<Status> RequestHandler::Upload(const Envelope& request, ReplyWri
   if (!upload) {
     co_return upload.error();
   }
-  const auto done =
-      std::make_shared<OneShot<PutKeyframeResult>>(co_await asio::this_coro::executor);
-  asio::post(pool_, [this, done, upload = std::move(*upload)]() mutable {
-    service_.Upload(std::move(upload),
-                    [done](Result<PutKeyframeResult> result) { done->Set(std::move(result)); });
-  });
-  const Result<PutKeyframeResult> result = co_await done->Take();
+  const auto owned = std::make_shared<UploadRequest>(std::move(*upload));
+  Starting<PutKeyframeResult> start = [this, owned](auto done) {
+    service_.Upload(std::move(*owned), std::move(done));
+  };
+  const Result<PutKeyframeResult> result = co_await StartOnPool(pool_, std::move(start));
   if (!result) {
     co_return result.error();
   }
@@ -107,12 +104,11 @@ asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, Rep
   if (!update) {
     co_return update.error();
   }
-  const auto done = std::make_shared<OneShot<PoseBatchResult>>(co_await asio::this_coro::executor);
-  asio::post(pool_, [this, done, update = std::move(*update)]() mutable {
-    service_.UpdatePoses(std::move(update),
-                         [done](Result<PoseBatchResult> result) { done->Set(std::move(result)); });
-  });
-  const Result<PoseBatchResult> result = co_await done->Take();
+  const auto owned = std::make_shared<PoseBatchRequest>(std::move(*update));
+  Starting<PoseBatchResult> start = [this, owned](auto done) {
+    service_.UpdatePoses(std::move(*owned), std::move(done));
+  };
+  const Result<PoseBatchResult> result = co_await StartOnPool(pool_, std::move(start));
   if (!result) {
     co_return result.error();
   }
@@ -129,8 +125,12 @@ asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWrit
     co_return region.error();
   }
   if (query.wait_revision() != 0) {
-    Status status = co_await WaitForRevision(service_, pool_, query.wait_revision(),
-                                             TimeoutFromWire(query.timeout_ms()));
+    const Result<WaitPlaces::Place> place = places_.Take();
+    if (!place) {
+      co_return place.error();
+    }
+    const Patience patience{TimeoutFromWire(query.timeout_ms()), out.peer_left()};
+    Status status = co_await WaitForRevision(service_, pool_, query.wait_revision(), patience);
     if (!status.ok()) {
       co_return status;
     }
@@ -153,14 +153,17 @@ asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, Repl
 }
 
 asio::awaitable<Status> RequestHandler::Wait(const Envelope& request, ReplyWriter& out) {
-  const Result<WaitOutcome> outcome = co_await WaitUntilClean(
-      service_, pool_, TimeoutFromWire(request.wait_request().timeout_ms()));
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const Patience patience{TimeoutFromWire(request.wait_request().timeout_ms()), out.peer_left()};
+  const Result<WaitOutcome> outcome = co_await WaitUntilClean(service_, pool_, patience);
   if (!outcome) {
     co_return outcome.error();
   }
   Envelope reply = ReplyTo(request);
-  reply.mutable_wait_reply()->set_revision(outcome->revision);
-  reply.mutable_wait_reply()->set_dirty_tiles(outcome->dirty_tiles);
+  WaitToWire(*outcome, *reply.mutable_wait_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }
@@ -183,15 +186,19 @@ asio::awaitable<Status> RequestHandler::ListSessions(const Envelope& request, Re
 }
 
 asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWriter& out) {
-  const std::chrono::milliseconds timeout = TimeoutFromWire(request.digest_request().timeout_ms());
-  const Result<WaitOutcome> clean = co_await WaitUntilClean(service_, pool_, timeout);
-  if (!clean) {
-    co_return clean.error();
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
   }
-  const Blocking<AtlasDigest> compute = [this, timeout] {
-    return service_.Digest(Patience{timeout, {}});
+  const Patience patience{TimeoutFromWire(request.digest_request().timeout_ms()), out.peer_left()};
+  Status clean = co_await RequireClean(service_, pool_, patience);
+  if (!clean.ok()) {
+    co_return clean;
+  }
+  const Blocking<AtlasDigest> compute = [this, patience] {
+    return service_.Digest(patience);
   };
-  const Result<AtlasDigest> digest = co_await OnPool(pool_, compute);
+  const Result<AtlasDigest> digest = co_await OnPool(reading_pool_, compute);
   if (!digest) {
     co_return digest.error();
   }
@@ -202,18 +209,22 @@ asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWri
 }
 
 asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWriter& out) {
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
   const bool is_rebuild = request.verify_request().rebuild();
-  const std::chrono::milliseconds timeout = TimeoutFromWire(request.verify_request().timeout_ms());
+  const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
   if (is_rebuild) {
-    const Result<WaitOutcome> clean = co_await WaitUntilClean(service_, pool_, timeout);
-    if (!clean) {
-      co_return clean.error();
+    Status clean = co_await RequireClean(service_, pool_, patience);
+    if (!clean.ok()) {
+      co_return clean;
     }
   }
-  const Blocking<VerifyReport> check = [this, is_rebuild, timeout] {
-    return service_.Verify(is_rebuild, Patience{timeout, {}});
+  const Blocking<VerifyReport> check = [this, is_rebuild, patience] {
+    return service_.Verify(is_rebuild, patience);
   };
-  const Result<VerifyReport> result = co_await OnPool(pool_, check);
+  const Result<VerifyReport> result = co_await OnPool(reading_pool_, check);
   if (!result) {
     co_return result.error();
   }

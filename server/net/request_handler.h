@@ -7,15 +7,24 @@
 #include "proto/wire/envelope.h"
 #include "server/net/net_options.h"
 #include "server/net/reply_writer.h"
+#include "server/net/wait_places.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {
 
-// Shared by all connections; used on the network thread only. What may block runs on `pool`.
+// Shared by all connections; used on the network thread only. What may block runs on `pool`, what
+// reads the whole store on `reading_pool`. All arguments outlive this.
 class RequestHandler {
  public:
-  RequestHandler(AtlasService& service, boost::asio::thread_pool& pool, const NetOptions& options)
-      : service_(service), pool_(pool), options_(options) {}
+  RequestHandler(AtlasService& service,
+                 boost::asio::thread_pool& pool,
+                 boost::asio::thread_pool& reading_pool,
+                 const NetOptions& options)
+      : service_(service),
+        pool_(pool),
+        reading_pool_(reading_pool),
+        options_(options),
+        places_(options.max_waits) {}
 
   // The first frame of a connection. False when it ends the connection; the error was then sent.
   boost::asio::awaitable<bool> Greet(wire::Envelope request, ReplyWriter& out);
@@ -38,7 +47,9 @@ class RequestHandler {
 
   AtlasService& service_;
   boost::asio::thread_pool& pool_;
+  boost::asio::thread_pool& reading_pool_;
   const NetOptions& options_;
+  WaitPlaces places_;
 };
 
 }  // namespace atlas

@@ -36,11 +36,11 @@ AtlasService::AtlasService(AtlasStore& store,
 
 AtlasService::~AtlasService() {
   Stop();
-  store_.Flush();  // queued writes report to this
+  Flush();  // queued writes report to this
 }
 
 void AtlasService::Stop() {
-  changes_.Close();
+  EndWaits();
   fusion_.Stop();
 }
 
@@ -215,7 +215,7 @@ Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
     if (Status status = RequireClean(deadline, patience.stop, before); !status.ok()) {
       return Error(std::move(status));
     }
-    auto digest = ComputeDigest(store_);
+    auto digest = ComputeDigest(store_, [&] { return CheckRunning(patience.stop); });
     if (!digest) {
       return Error(digest.error());
     }

@@ -86,7 +86,12 @@ class AtlasService {
   // `rebuild` waits until clean like Digest; a plain check does not wait.
   Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
 
-  // Ends every wait and the workers, which finish the tiles at hand. Calls after it fail.
+  // Ends every wait, verification and digest, now and from now on, with kUnavailable. The workers
+  // go on, and uploads are still taken.
+  void EndWaits() { changes_.Close(); }
+  // Returns when every upload and pose batch handed over before was reported to its `done`.
+  void Flush() { store_.Flush(); }
+  // EndWaits(), and the workers finish the tiles at hand and end.
   void Stop();
 
  private:

@@ -46,6 +46,12 @@ TEST_F(BrokenFrameTest, GarbageAfterTheHandshake) {
   EXPECT_EQ(LastWords(*peer), StatusCode::kInvalidData);
 }
 
+TEST_F(BrokenFrameTest, ARefusedPeerReadsWhyAlthoughItStillSends) {
+  const auto peer = Connect();
+  peer->SendBytes(Bytes(4'000'000, 0xAB));
+  EXPECT_EQ(LastWords(*peer), StatusCode::kInvalidData);
+}
+
 TEST_F(BrokenFrameTest, AWrongMagicBehindAGoodFrame) {
   const auto peer = Connect();
   Bytes bytes = EncodeEnvelopeFrame(StatusOf(5)).value();

@@ -1,9 +1,10 @@
 // A served atlas on a free port of loopback, and the requests that tests send to it.
 #pragma once
 
+#include <chrono>
+#include <future>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "proto/wire/convert.h"
 #include "server/net/tcp_server.h"
@@ -17,23 +18,27 @@ class NetTest : public ServiceTest {
   ~NetTest() override { StopServer(); }
 
   void Serve(unsigned workers = 1) {
+    Listen(workers);
+    Run();
+  }
+  void Listen(unsigned workers) {
     Open(workers);
     server_ = std::make_unique<TcpServer>(*service_, net_);
     const Result<std::string> address = server_->Listen("127.0.0.1", 0);
     ASSERT_TRUE(address.has_value()) << address.error().message();
     port_ = static_cast<std::uint16_t>(std::stoi(address->substr(address->rfind(':') + 1)));
-    thread_ = std::thread([this] { server_->Run(); });
   }
-  // Returns when the server has drained.
-  void JoinServer() {
-    if (thread_.joinable()) {
-      thread_.join();
-    }
+  void Run() {
+    run_ = std::async(std::launch::async, [this] { server_->Run(); });
+  }
+  // The server, told to stop, has drained in time.
+  bool HasDrained() const {
+    return run_.wait_for(std::chrono::seconds(30)) == std::future_status::ready;
   }
   void StopServer() {
     if (server_) {
       server_->Stop();
-      JoinServer();
+      run_.get();
     }
     server_.reset();
   }
@@ -51,6 +56,18 @@ class NetTest : public ServiceTest {
     ASSERT_TRUE(reply.has_value());
     EXPECT_EQ(reply->request_id(), 77u);
     EXPECT_EQ(reply->body_case(), wire::Envelope::kStatusReply);
+  }
+  // `count` queries, padded with a field that the daemon does not know: few of them fill a socket.
+  static Bytes PaddedQueries(std::uint64_t count) {
+    Bytes bytes;
+    for (std::uint64_t id = 1; id <= count; ++id) {
+      wire::Envelope query = QueryOf(id);
+      auto* const unknown = query.GetReflection()->MutableUnknownFields(&query);
+      unknown->AddLengthDelimited(1'000)->assign(2'000, 'x');
+      const Bytes frame = EncodeEnvelopeFrame(query).value();
+      bytes.insert(bytes.end(), frame.begin(), frame.end());
+    }
+    return bytes;
   }
   // kOk for a reply that is no error, or none.
   static StatusCode CodeOf(const std::optional<wire::Envelope>& reply) {
@@ -95,7 +112,7 @@ class NetTest : public ServiceTest {
   std::uint16_t port_ = 0;
 
  private:
-  std::thread thread_;
+  std::future<void> run_;
 };
 
 }  // namespace atlas

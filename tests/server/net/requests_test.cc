@@ -171,14 +171,23 @@ TEST_F(RequestTest, ErrorsAreTypedAndTheConnectionGoesOn) {
   EXPECT_TRUE(peer->Receive()->has_status_reply());
 }
 
-TEST_F(RequestTest, AWaitThatRunsOutIsATimeout) {
+TEST_F(RequestTest, AWaitThatRunsOutSaysSo) {
   Serve(0);  // nothing is ever fused
   UploadDrive(1);
   const auto peer = Connect();
-  peer->Send(WaitOf(1, 1));
-  const auto reply = peer->Receive();
-  EXPECT_EQ(CodeOf(reply), StatusCode::kTimeout);
-  EXPECT_TRUE(reply->error().retry());
+  for (const std::uint32_t timeout_ms : {0u, 1u}) {
+    peer->Send(WaitOf(1, timeout_ms));
+    const auto reply = peer->Receive();
+    ASSERT_TRUE(reply->has_wait_reply()) << reply->ShortDebugString();
+    EXPECT_TRUE(reply->wait_reply().timed_out());
+    EXPECT_GT(reply->wait_reply().dirty_tiles(), 0u);
+    wire::Envelope digest;
+    digest.mutable_digest_request()->set_timeout_ms(timeout_ms);
+    peer->Send(digest);
+    const auto error = peer->Receive();
+    EXPECT_EQ(CodeOf(error), StatusCode::kTimeout);
+    EXPECT_TRUE(error->error().retry());
+  }
 }
 
 TEST_F(RequestTest, WaitDigestVerifySessions) {

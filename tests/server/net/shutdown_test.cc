@@ -10,6 +10,8 @@ namespace {
 
 class ShutdownTest : public NetTest {
  protected:
+  ShutdownTest() { net_.drain = std::chrono::minutes(2); }  // longer than any test waits
+
   // Reads to the end; how many replies of this kind came.
   static int CountToTheEnd(BlockingPeer& peer, wire::Envelope::BodyCase kind) {
     int count = 0;
@@ -20,17 +22,24 @@ class ShutdownTest : public NetTest {
   }
 };
 
-TEST_F(ShutdownTest, AReplyThatIsUnderWayIsFinishedAndNothingNewIsTaken) {
+TEST_F(ShutdownTest, RepliesToASlowReaderAreFinishedAndNothingNewIsTaken) {
   net_.max_queued_bytes = 1'024;
+  net_.max_requests_in_flight = 4;
   Serve();
   UploadDrive(12);
   Digest();
-  const auto peer = Connect(4'096);
-  peer->Send(QueryOf(5));
-  ASSERT_TRUE(peer->Receive()->has_tile());
+  auto peer = Connect(4'096);
+  peer->SendUntilStuck(PaddedQueries(3'000), std::chrono::milliseconds(500));
   server_->Stop();
-  EXPECT_EQ(CountToTheEnd(*peer, wire::Envelope::kQueryEnd), 1);
-  JoinServer();
+  std::set<std::uint64_t> begun;
+  std::set<std::uint64_t> ended;
+  while (const auto reply = peer->Receive()) {
+    (reply->has_query_end() ? ended : begun).insert(reply->request_id());
+  }
+  EXPECT_GT(begun.size(), 1u);
+  EXPECT_EQ(begun, ended);
+  peer.reset();
+  EXPECT_TRUE(HasDrained());
   EXPECT_FALSE(BlockingPeer(port_).is_connected());
 }
 
@@ -48,31 +57,58 @@ TEST_F(ShutdownTest, UploadsThatWereReadAreAcknowledgedAndDurable) {
   EXPECT_EQ(service_->ReadStatus()->counts.keyframes, static_cast<std::uint64_t>(acknowledged));
 }
 
-TEST_F(ShutdownTest, SigtermDrains) {
-  Serve();
-  const auto peer = Connect();
-  ASSERT_EQ(::kill(::getpid(), SIGTERM), 0);
-  JoinServer();
-  EXPECT_TRUE(peer->IsClosed());
-  EXPECT_FALSE(BlockingPeer(port_).is_connected());
-}
-
-TEST_F(ShutdownTest, ARequestThatDoesNotEndIsCutAfterTheDrainTime) {
-  net_.drain = std::chrono::milliseconds(200);
+TEST_F(ShutdownTest, WaitsEndWithTheDaemon) {
   Serve(0);  // nothing is ever fused
   UploadDrive(1);
   const auto peer = Connect();
   peer->Send(WaitOf(1, 3'600'000));
-  peer->Send(UploadOf(1, 2));
-  ASSERT_TRUE(peer->Receive()->has_upload_reply());  // both were read by now
+  wire::Envelope digest;
+  digest.set_request_id(2);
+  digest.mutable_digest_request()->set_timeout_ms(3'600'000);
+  peer->Send(digest);
+  peer->Send(UploadOf(1, 3));
+  ASSERT_TRUE(peer->Receive()->has_upload_reply());  // all were read by now
   server_->Stop();
-  JoinServer();
-  server_.reset();
+  for (int i = 0; i < 2; ++i) {
+    const auto reply = peer->Receive();
+    EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
+    EXPECT_NE(reply->error().message().find("shutting down"), std::string::npos);
+  }
   EXPECT_TRUE(peer->IsClosed());
+  EXPECT_TRUE(HasDrained());
 }
 
-TEST_F(ShutdownTest, StoppingBeforeAnyConnectionEnds) {
+TEST_F(ShutdownTest, AReaderThatDoesNotReadIsCutAfterTheDrainTime) {
+  net_.drain = std::chrono::milliseconds(200);
   Serve();
+  UploadDrive(12);
+  Digest();
+  const auto peer = Connect(4'096);
+  peer->SendUntilStuck(PaddedQueries(3'000), std::chrono::milliseconds(500));
+  server_->Stop();
+  EXPECT_TRUE(HasDrained());
+  server_.reset();
+}
+
+TEST_F(ShutdownTest, SigtermDrains) {
+  Serve();
+  const auto peer = Connect();
+  ASSERT_EQ(::kill(::getpid(), SIGTERM), 0);
+  EXPECT_TRUE(HasDrained());
+  EXPECT_TRUE(peer->IsClosed());
+  EXPECT_FALSE(BlockingPeer(port_).is_connected());
+}
+
+TEST_F(ShutdownTest, ASignalBetweenListeningAndServingIsNotLost) {
+  Listen(1);
+  ASSERT_EQ(::kill(::getpid(), SIGTERM), 0);
+  Run();
+  EXPECT_TRUE(HasDrained());
+}
+
+TEST_F(ShutdownTest, StoppingTwiceOrWithoutConnectionsEnds) {
+  Serve();
+  server_->Stop();
   StopServer();
   Serve();
   ExpectServes();
