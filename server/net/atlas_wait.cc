@@ -61,19 +61,16 @@ asio::awaitable<Result<WaitOutcome>> WaitUntilClean(AtlasService& service,
   }
 }
 
-asio::awaitable<Status> RequireClean(AtlasService& service,
-                                     asio::thread_pool& pool,
-                                     Patience patience) {
-  const Result<WaitOutcome> outcome = co_await WaitUntilClean(service, pool, patience);
-  if (!outcome) {
-    co_return outcome.error();
+asio::awaitable<Result<WaitOutcome>> RequireSettled(AtlasService& service,
+                                                    asio::thread_pool& pool,
+                                                    Patience patience) {
+  Result<WaitOutcome> outcome = co_await WaitUntilClean(service, pool, patience);
+  if (outcome && outcome->is_timed_out) {
+    co_return Error(StatusCode::kTimeout,
+                    StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
+                           patience.timeout.count(), " ms"));
   }
-  if (outcome->is_timed_out) {
-    co_return Status(StatusCode::kTimeout,
-                     StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
-                            patience.timeout.count(), " ms"));
-  }
-  co_return Status();
+  co_return outcome;
 }
 
 asio::awaitable<Status> WaitForRevision(AtlasService& service,

@@ -121,6 +121,7 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
   out.set_cells(counts.cells);
   out.set_multilayer_cells(counts.multilayer_cells);
   out.set_rss_bytes(status.rss_bytes);
+  out.set_damaged_tiles(status.damaged_tiles);
 }
 
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {

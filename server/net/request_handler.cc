@@ -162,6 +162,9 @@ asio::awaitable<Status> RequestHandler::Wait(const Envelope& request, ReplyWrite
   if (!outcome) {
     co_return outcome.error();
   }
+  if (!outcome->damage.ok()) {
+    co_return outcome->damage;
+  }
   Envelope reply = ReplyTo(request);
   WaitToWire(*outcome, *reply.mutable_wait_reply());
   co_await out.Send(std::move(reply));
@@ -191,9 +194,12 @@ asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWri
     co_return place.error();
   }
   const Patience patience{TimeoutFromWire(request.digest_request().timeout_ms()), out.peer_left()};
-  Status clean = co_await RequireClean(service_, pool_, patience);
-  if (!clean.ok()) {
-    co_return clean;
+  const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
+  if (!settled) {
+    co_return settled.error();
+  }
+  if (!settled->damage.ok()) {
+    co_return settled->damage;
   }
   const Blocking<AtlasDigest> compute = [this, patience] {
     return service_.Digest(patience);
@@ -216,9 +222,9 @@ asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWri
   const bool is_rebuild = request.verify_request().rebuild();
   const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
   if (is_rebuild) {
-    Status clean = co_await RequireClean(service_, pool_, patience);
-    if (!clean.ok()) {
-      co_return clean;
+    const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
+    if (!settled) {
+      co_return settled.error();
     }
   }
   const Blocking<VerifyReport> check = [this, is_rebuild, patience] {
