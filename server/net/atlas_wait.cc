@@ -20,8 +20,8 @@ constexpr std::chrono::milliseconds kLongestTimeout{86'400'000};
 // Pauses between two looks at what is still dirty.
 class Pauses {
  public:
-  Pauses(asio::any_io_executor executor, std::chrono::milliseconds timeout)
-      : timer_(std::move(executor)), deadline_(std::chrono::steady_clock::now() + timeout) {}
+  Pauses(const asio::any_io_executor& executor, std::chrono::milliseconds timeout)
+      : timer_(executor), deadline_(std::chrono::steady_clock::now() + timeout) {}
 
   bool is_over() const { return std::chrono::steady_clock::now() >= deadline_; }
   asio::awaitable<void> Next() {

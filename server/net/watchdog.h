@@ -14,11 +14,10 @@ namespace atlas {
 
 class Watchdog {
  public:
-  Watchdog(boost::asio::any_io_executor executor,
+  Watchdog(const boost::asio::any_io_executor& executor,
            std::chrono::milliseconds time,
            std::function<void()> bite)
-      : timer_(std::move(executor), time),
-        bite_(std::make_shared<std::function<void()>>(std::move(bite))) {
+      : timer_(executor, time), bite_(std::make_shared<std::function<void()>>(std::move(bite))) {
     timer_.async_wait([weak = std::weak_ptr(bite_)](const boost::system::error_code& cancelled) {
       if (const auto call = weak.lock(); call && !cancelled) {
         (*call)();

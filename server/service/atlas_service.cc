@@ -214,7 +214,7 @@ Result<std::uint64_t> AtlasService::ReadRevision() {
 Result<AtlasService::WaitEnd> AtlasService::WaitForWorkers(TimePoint deadline,
                                                            const std::stop_token& stop,
                                                            DirtyState& state) {
-  const auto end = WaitFor(&IsClean, deadline, stop, state);
+  auto end = WaitFor(&IsClean, deadline, stop, state);
   if (end && *end == WaitEnd::kTimedOut) {
     return Error(StatusCode::kTimeout,
                  StrCat("the atlas is not clean: ", state.dirty_tiles, " tiles are to be fused"));

@@ -45,13 +45,14 @@ TEST_F(ShutdownTest, RepliesToASlowReaderAreFinishedAndNothingNewIsTaken) {
 
 TEST_F(ShutdownTest, UploadsThatWereReadAreAcknowledgedAndDurable) {
   Serve();
-  const auto peer = Connect();
+  auto peer = Connect();
   for (std::uint32_t i = 0; i < 20; ++i) {
     ASSERT_TRUE(peer->Send(UploadOf(i, 100 + i)));
   }
   ASSERT_TRUE(peer->Receive()->has_upload_reply());
   server_->Stop();
   const int acknowledged = 1 + CountToTheEnd(*peer, wire::Envelope::kUploadReply);
+  peer.reset();  // until then the daemon would wait for it
   StopServer();
   Open(0);
   EXPECT_EQ(service_->ReadStatus()->counts.keyframes, static_cast<std::uint64_t>(acknowledged));
