@@ -6,7 +6,8 @@
 
 #include <unistd.h>
 
-#include "client/cli/command_line.h"
+#include "client/cli/command_line/command_line.h"
+#include "client/cli/commands/commands.h"
 
 namespace {
 
@@ -15,26 +16,28 @@ std::optional<std::string> FromEnvironment(const char* name) {
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
 }
 
-int Run(int argc, char** argv) {
+int Fail(const std::string& message, const std::vector<std::string>& arguments) {
+  atlas::PrintFailure({atlas::StatusCode::kInternal, message}, atlas::IsJsonAskedFor(arguments),
+                      std::cerr);
+  return static_cast<int>(atlas::ExitCode::kFailure);
+}
+
+int Run(const std::vector<std::string>& arguments) {
   const std::vector<std::unique_ptr<atlas::Command>> commands = atlas::MakeCommands();
   const atlas::CommandLineIo io{std::cout, std::cerr, isatty(STDERR_FILENO) == 1,
-                                FromEnvironment("ATLAS_SERVER")};
-  const std::vector<std::string> arguments(argv + std::min(1, argc), argv + argc);
+                                FromEnvironment("ATLAS_SERVER"), isatty(STDOUT_FILENO) == 1};
   const atlas::ExitCode code = atlas::RunCommandLine(arguments, commands, io);
-  if (!std::cout.flush()) {
-    std::cerr << "atlas: cannot write to standard output\n";
-    return static_cast<int>(atlas::ExitCode::kFailure);
-  }
+  if (!std::cout.flush()) return Fail("cannot write to standard output", arguments);
   return static_cast<int>(code);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv + std::min(1, argc), argv + argc);
   try {
-    return Run(argc, argv);
+    return Run(arguments);
   } catch (const std::exception& error) {
-    std::cerr << "atlas: unexpected failure: " << error.what() << '\n';
-    return static_cast<int>(atlas::ExitCode::kFailure);
+    return Fail(std::string("unexpected failure: ") + error.what(), arguments);
   }
 }

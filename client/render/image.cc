@@ -16,7 +16,8 @@ static_assert(sizeof(Rgb) == 3);
 Status SystemError(const std::filesystem::path& path, int error) {
   StatusCode code = StatusCode::kInternal;
   if (error == ENOENT || error == ENOTDIR) code = StatusCode::kNotFound;
-  if (error == EACCES || error == EROFS || error == EISDIR) code = StatusCode::kPermissionDenied;
+  if (error == EACCES || error == EPERM || error == EROFS) code = StatusCode::kPermissionDenied;
+  if (error == EISDIR) code = StatusCode::kConflict;
   if (error == ENOSPC || error == EDQUOT) code = StatusCode::kResourceExhausted;
   return {code,
           StrCat("cannot write ", path.string(), ": ", std::generic_category().message(error))};

@@ -30,7 +30,7 @@ struct Image {
 };
 
 // Whole or not at all: written beside `path` and renamed. kPermissionDenied, kNotFound (no such
-// folder) or kResourceExhausted (disk full).
+// folder), kConflict (a folder has the name) or kResourceExhausted (disk full).
 Status WritePng(const Image& image, const std::filesystem::path& path);
 
 }  // namespace atlas

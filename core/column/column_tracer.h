@@ -19,18 +19,30 @@ struct LocalColumns {
   std::vector<std::int16_t> anchors;
 };
 
+// Where the vehicle itself is, nothing else can be: the surest evidence against what once moved
+// there. A box around the sensor, levelled frame, from the ground to the sensor's height. Default:
+// a car with its mirrors; shorter than it is, for the sensor may stand at either end.
+struct VehicleBody {
+  float half_length_m = 1.5F;
+  float half_width_m = 1.1F;
+};
+
 struct ColumnOptions {
   int segments = 8;
   float segment_height_m = 1.0F;
   float base_offset_m = 0.3F;  // obstacle returns lower than this above ground make no hit
   std::int32_t block_cells = 8;
+  // How far from where it was measured an obstacle may be: kitti_0005, not corrected for motion.
+  float blur_m = 0.2F;
+  VehicleBody body;
 
   static ColumnOptions FromProfile(const MapProfile& profile, std::int32_t block_cells);
 };
 
 // `cells`: the ground below (LocalGrid); columns stand only where it is known. Ground returns are
-// traced too: that is what clears a parked car with nothing behind it. A segment in which anything
-// was measured, ground included, is never missed.
+// traced too: that is what clears a parked car with nothing behind it. A segment is missed where
+// rays passed both its halves, and never where anything was measured in it, ground included, nor
+// within `blur_m` of an obstacle in it.
 LocalColumns TraceColumns(const LeveledScan& scan,
                           const RayTable& rays,
                           std::span<const KeyframeCell> cells,

@@ -39,21 +39,33 @@ Lanes LanesOf(std::uint32_t nibbles) {
   return std::bit_cast<Lanes>(halves);
 }
 
-// Sums stay within 16 bits: each is at most 127 + 127.
-void AddLanes(Lanes added, std::int16_t clamp, std::int16_t* evidence) {
-  Lanes sum;
-  std::memcpy(&sum, evidence, sizeof(sum));
-  sum += added;
-  const Lanes high = Lanes{} + clamp;
-  const Lanes low = -high;
-  sum = sum > high ? high : sum;
-  sum = sum < low ? low : sum;
-  std::memcpy(evidence, &sum, sizeof(sum));
+Lanes Load(const std::int16_t* evidence) {
+  Lanes lanes;
+  std::memcpy(&lanes, evidence, sizeof(lanes));
+  return lanes;
+}
+
+void Store(Lanes lanes, std::int16_t* evidence) {
+  std::memcpy(evidence, &lanes, sizeof(lanes));
+}
+
+Lanes Clamped(Lanes lanes, Lanes low, Lanes high) {
+  lanes = lanes > high ? high : lanes;
+  return lanes < low ? low : lanes;
+}
+
+// Sums stay within 16 bits: |evidence| <= 16384, |added| <= 64.
+void AddLanes(Lanes added, const ColumnEvidence::Clamp& clamp, std::int16_t* evidence) {
+  const Lanes before = Load(evidence);
+  const Lanes usual = Lanes{} - clamp.usual;
+  const Lanes reached = before < usual ? before : usual;  // a mere miss goes no deeper
+  const Lanes sum = Clamped(before + added, reached, Lanes{} + clamp.usual);
+  Store(added == Lanes{} + EvidenceOfState(kNibbleFree) ? Lanes{} - clamp.driven : sum, evidence);
 }
 
 }  // namespace
 
-void ColumnEvidence::AddNibbles(std::uint64_t nibbles, std::int16_t clamp) {
+void ColumnEvidence::AddNibbles(std::uint64_t nibbles, const Clamp& clamp) {
   seen |= nibbles;
   AddLanes(LanesOf(static_cast<std::uint32_t>(nibbles)), clamp, evidence.data());
   if ((nibbles >> 32) != 0) {
@@ -61,12 +73,14 @@ void ColumnEvidence::AddNibbles(std::uint64_t nibbles, std::int16_t clamp) {
   }
 }
 
-void ColumnEvidence::Add(const ColumnEvidence& other, std::int16_t clamp) {
+void ColumnEvidence::Add(const ColumnEvidence& other, std::int16_t say, std::int16_t clamp) {
   seen |= other.seen;
+  const Lanes all_say = Lanes{} + say;
+  const Lanes all_clamp = Lanes{} + clamp;
   for (std::size_t half = 0; half < kSegments; half += kLanes) {
-    Lanes added;
-    std::memcpy(&added, other.evidence.data() + half, sizeof(added));
-    AddLanes(added, clamp, evidence.data() + half);
+    const Lanes added = Clamped(Load(other.evidence.data() + half), -all_say, all_say);
+    Store(Clamped(Load(evidence.data() + half) + added, -all_clamp, all_clamp),
+          evidence.data() + half);
   }
 }
 

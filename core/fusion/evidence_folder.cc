@@ -110,7 +110,7 @@ void EvidenceFolder::FoldObservation(const Observation& observation, std::uint32
       FitColumn(observation.column, observation.column_base, spans_[layer]);
   if (nibbles != 0) {
     increment.has_column = true;
-    increment.column.AddNibbles(nibbles, profile_.session_clamp);
+    increment.column.AddNibbles(nibbles, {profile_.session_clamp, profile_.driven_clamp});
   }
 }
 
@@ -129,7 +129,7 @@ void EvidenceFolder::Publish(std::span<const CellLayer> layers, std::vector<Tile
       occupancy = AddSaturating(occupancy, increment.occupancy, profile_.evidence_clamp);
       if (increment.has_column) {
         has_column = true;
-        column.Add(increment.column, profile_.evidence_clamp);
+        column.Add(increment.column, profile_.session_clamp, profile_.evidence_clamp);
       }
     }
     const CellLayer& layer = layers[i];

@@ -69,6 +69,9 @@ Status ValidateFusion(const MapProfile& profile) {
   if (profile.evidence_clamp < 1 || profile.evidence_clamp > 127) {
     return OutOfRange("evidence clamp", profile.evidence_clamp, "1 to 127");
   }
+  if (profile.driven_clamp < profile.session_clamp || profile.driven_clamp > 16'384) {
+    return OutOfRange("driven clamp", profile.driven_clamp, "the session clamp to 16384");
+  }
   return {};
 }
 
@@ -124,6 +127,7 @@ Bytes MapProfile::Encode() const {
   out.I16(miss_units);
   out.I16(session_clamp);
   out.I16(evidence_clamp);
+  out.I16(driven_clamp);
   EncodeOrigin(origin, out);
   return out.Take();
 }
@@ -157,6 +161,7 @@ Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
   profile.miss_units = in.I16();
   profile.session_clamp = in.I16();
   profile.evidence_clamp = in.I16();
+  profile.driven_clamp = in.I16();
   profile.origin = DecodeOrigin(in);
   if (!in.ok() || in.remaining() != 0) {
     return Error(StatusCode::kInvalidData, "map profile: truncated or has trailing bytes");

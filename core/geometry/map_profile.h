@@ -60,6 +60,9 @@ struct MapProfile {
   std::int16_t miss_units = -12;     // p = 0.4
   std::int16_t session_clamp = 64;   // one session's say in a cell
   std::int16_t evidence_clamp = 64;  // all sessions together
+  // Where the vehicle itself was (kNibbleFree) its session's evidence falls to minus this: seven
+  // hits more than misses fill it again, so that what merely follows the vehicle does not.
+  std::int16_t driven_clamp = 192;
 
   std::optional<GeodeticOrigin> origin;
 

@@ -15,6 +15,8 @@ inline constexpr std::uint8_t kNibbleHit = 12;  // one return in a segment: p = 
 inline constexpr std::uint8_t kNibbleMiss =
     6;  // rays passed and none returned: p = 0.39 (paper: 0.4)
 
+inline constexpr std::uint8_t kNibbleFree = 1;  // the vehicle itself was there: p = 0.1
+
 inline constexpr int kEvidenceLimit = 64;
 
 constexpr double NibbleProbability(std::uint8_t state) {

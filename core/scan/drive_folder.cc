@@ -52,7 +52,8 @@ std::optional<std::vector<double>> ParseNumbers(std::string_view line) {
     }
     double value = 0.0;
     const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || numbers.size() > 64) {
+    const bool is_whole_word = next == end || *next == ' ' || *next == '\t';
+    if (error != std::errc() || !is_whole_word || numbers.size() > 64) {
       return std::nullopt;
     }
     numbers.push_back(value);
@@ -88,26 +89,39 @@ std::optional<std::uint32_t> ScanNumber(const fs::path& path) {
   return number;
 }
 
-Result<std::vector<DriveScan>> ListScans(const fs::path& folder) {
-  std::error_code error;
-  fs::directory_iterator files(folder / "velodyne", error);
-  if (error) {
-    return Error(StatusCode::kNotFound,
-                 StrCat((folder / "velodyne").string(), ": ", error.message()));
+Status CheckNumbers(const fs::path& velodyne, const std::vector<DriveScan>& sorted) {
+  if (sorted.empty()) {
+    return {StatusCode::kInvalidData, StrCat(velodyne.string(), ": no NNNNNN.bin in it")};
   }
+  const auto twice = std::adjacent_find(
+      sorted.begin(), sorted.end(),
+      [](const DriveScan& a, const DriveScan& b) { return a.number == b.number; });
+  return twice == sorted.end()
+             ? Status()
+             : Status(StatusCode::kInvalidData,
+                      StrCat(velodyne.string(), ": two scans have the number ", twice->number));
+}
+
+Result<std::vector<DriveScan>> ListScans(const fs::path& folder) {
+  const fs::path velodyne = folder / "velodyne";
   std::vector<DriveScan> scans;
-  for (const fs::directory_entry& file : files) {
-    const auto number = ScanNumber(file.path());
+  std::error_code error;
+  for (fs::directory_iterator it(velodyne, error), end; !error && it != end; it.increment(error)) {
+    const auto number = ScanNumber(it->path());
     if (number && scans.size() < kMaxScans) {
-      scans.push_back({*number, file.path(), std::nullopt, Pose::Identity(), std::nullopt});
+      scans.push_back({*number, it->path(), std::nullopt, Pose::Identity(), std::nullopt});
     }
   }
-  if (scans.empty()) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat((folder / "velodyne").string(), ": no NNNNNN.bin in it"));
+  if (error) {
+    const bool is_forbidden = error == std::errc::permission_denied;
+    return Error(is_forbidden ? StatusCode::kPermissionDenied : StatusCode::kNotFound,
+                 StrCat(velodyne.string(), ": ", error.message()));
   }
   std::sort(scans.begin(), scans.end(),
             [](const DriveScan& a, const DriveScan& b) { return a.number < b.number; });
+  if (Status status = CheckNumbers(velodyne, scans); !status.ok()) {
+    return Error(std::move(status));
+  }
   return scans;
 }
 

@@ -25,7 +25,8 @@ struct DriveFolder {
 };
 
 // Line `number` (from 0) of poses.txt and times.txt belongs to scan NNNNNN. kNotFound without the
-// folder, velodyne/ or poses.txt; kInvalidData for a bad line, more scans than lines, or no scan.
+// folder, velodyne/ or poses.txt; kPermissionDenied; kInvalidData for a bad line, more scans than
+// lines, no scan, or two of one number. The scans themselves are not opened.
 Result<DriveFolder> OpenDriveFolder(const std::filesystem::path& path);
 
 // Lines of 12 numbers (3x4 row-major); errors name the line.

@@ -18,13 +18,23 @@ bool IsPlausible(float value) {
   return std::isfinite(value) && std::abs(value) <= kMaxCoordinate_m;
 }
 
+Status FileError(const std::filesystem::path& path, const std::error_code& error) {
+  StatusCode code = StatusCode::kInvalidData;  // a folder, a pipe
+  if (error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory) {
+    code = StatusCode::kNotFound;
+  } else if (error == std::errc::permission_denied) {
+    code = StatusCode::kPermissionDenied;
+  }
+  return {code, StrCat(path.string(), ": ", error.message())};
+}
+
 }  // namespace
 
 Result<Bytes> ReadFileBytes(const std::filesystem::path& path, std::size_t max_bytes) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error) {
-    return Error(StatusCode::kNotFound, StrCat(path.string(), ": ", error.message()));
+    return Error(FileError(path, error));
   }
   if (size > max_bytes) {
     return Error(StatusCode::kResourceExhausted,
@@ -75,16 +85,16 @@ Result<PointCloud> ReadScan(const std::filesystem::path& path) {
 }
 
 Result<std::vector<std::uint32_t>> ReadLabels(const std::filesystem::path& path,
-                                              std::size_t points) {
+                                              const PointCloud& cloud) {
   Result<Bytes> bytes = ReadFileBytes(path, kMaxScanBytes);
   if (!bytes) {
     return Error(bytes.error());
   }
-  if (bytes->size() != 4 * points) {
+  if (bytes->size() != 4 * cloud.size()) {
     return Error(StatusCode::kInvalidData, StrCat(path.string(), ": ", bytes->size(), " bytes for ",
-                                                  points, " returns, expected 4 each"));
+                                                  cloud.size(), " returns, expected 4 each"));
   }
-  std::vector<std::uint32_t> labels(points);
+  std::vector<std::uint32_t> labels(cloud.size());
   ByteReader in(*bytes);
   for (std::uint32_t& label : labels) {
     label = in.U32();

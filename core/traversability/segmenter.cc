@@ -24,16 +24,26 @@ class WindowPass {
 
   void Visit(int row, int row_stride, int sector) {
     Gather(row, row_stride, sector);
-    if (window_.size() < options_.min_returns || window_.FilledRings() < 2) {
+    if (!IsEnough()) {
       return;
     }
-    const std::optional<PlaneFit> fit = FitPlane(window_, options_.threshold_m);
+    const std::optional<PlaneFit> fit =
+        FitPlane(window_, options_.threshold_m,
+                 IsPaper() ? TripleChoice::kAnywhere : TripleChoice::kOneInARing);
     Vote(fit && IsGround(*fit) ? &fit->plane : nullptr);
   }
 
   const std::vector<Votes>& votes() const { return votes_; }
 
  private:
+  bool IsPaper() const { return options_.mode == SegmentMode::kPaper; }
+
+  // Whether the window's returns can make a plane: in the paper any three do.
+  bool IsEnough() const {
+    return IsPaper() ? window_.size() >= 3
+                     : window_.size() >= options_.min_returns && window_.FilledRings() >= 2;
+  }
+
   void Gather(int row, int row_stride, int sector) {
     members_.clear();
     for (std::size_t ring = 0; ring < 3; ++ring) {
@@ -77,7 +87,7 @@ class WindowPass {
     }
     // Floors are seen from above, ceilings from below: where the plane meets the sensor's vertical.
     const float height_of_sensor_m = fit.plane.offset_m / along_up;
-    return options_.mode == SegmentMode::kPaper || height_of_sensor_m > 0.0F;
+    return IsPaper() || height_of_sensor_m > 0.0F;
   }
 
   // `plane` is null when the window found no ground.

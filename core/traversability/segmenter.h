@@ -12,9 +12,10 @@
 namespace atlas {
 
 enum class SegmentMode : std::uint8_t {
-  kPaper,  // windows of neighbouring rings; a return is ground when any window says so
-  kAtlas,  // windows of a fixed angle; a third of the windows must say so; floors lie below the
-           // sensor
+  kPaper,  // windows of neighbouring rings, triples from anywhere in them; a return is ground when
+           // any window says so
+  kAtlas,  // windows of a fixed angle, triples across their rings; half of the windows over a
+           // return must say so; floors lie below the sensor
 };
 
 struct SegmenterOptions {
@@ -24,7 +25,7 @@ struct SegmenterOptions {
   float threshold_m = 0.12F;
   float max_slope_rad = 0.4F;     // paper III-A, check_normal
   float min_inlier_ratio = 0.5F;  // paper algorithm 1
-  std::uint32_t min_returns = 9;  // fewer make no plane
+  std::uint32_t min_returns = 9;  // fewer make no plane (kAtlas)
   // Share of the windows over a return that must call it ground. A third of them scores higher on
   // streets (F1 0.978) but reads the sloped ceilings of a garage as floors.
   float min_vote_ratio = 0.5F;

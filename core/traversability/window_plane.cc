@@ -10,8 +10,8 @@ namespace {
 constexpr int kTriples = 32;
 constexpr std::uint32_t kLanes = 16;
 
-// Where in its ring each corner of a triple lies, 0..1: the additive recurrence of the golden ratio
-// and its relatives fills the unit cube evenly.
+// Where in its ring (or in the window) each corner of a triple lies, 0..1: the additive recurrence
+// of the golden ratio and its relatives fills the unit cube evenly.
 struct Triple {
   std::array<float, 3> at;
 };
@@ -88,12 +88,19 @@ int WindowReturns::FilledRings() const {
   return filled;
 }
 
-std::optional<PlaneFit> FitPlane(const WindowReturns& window, float threshold_m) {
+std::optional<PlaneFit> FitPlane(const WindowReturns& window,
+                                 float threshold_m,
+                                 TripleChoice choice) {
+  const auto corner = [&](const Triple& triple, std::size_t k) {
+    const std::uint32_t i =
+        choice == TripleChoice::kOneInARing
+            ? Corner(window, k, triple.at[k])
+            : static_cast<std::uint32_t>(triple.at[k] * static_cast<float>(window.size()));
+    return window.Point(i);
+  };
   std::optional<PlaneFit> best;
   for (const Triple& triple : kTable) {
-    const auto plane = ThroughPoints(window.Point(Corner(window, 0, triple.at[0])),
-                                     window.Point(Corner(window, 1, triple.at[1])),
-                                     window.Point(Corner(window, 2, triple.at[2])));
+    const auto plane = ThroughPoints(corner(triple, 0), corner(triple, 1), corner(triple, 2));
     if (!plane) {
       continue;
     }

@@ -32,8 +32,15 @@ struct PlaneFit {
   std::uint32_t inliers = 0;
 };
 
-// Best of a fixed table of 32 triples, each spread over the rings; nullopt when every triple is
-// degenerate. Returns beyond size() must be padding far from any plane.
-std::optional<PlaneFit> FitPlane(const WindowReturns& window, float threshold_m);
+enum class TripleChoice : std::uint8_t {
+  kAnywhere,    // like RANSAC: three returns of one ring make poor planes
+  kOneInARing,  // spread over the rings
+};
+
+// Best of a fixed table of 32 triples; nullopt when every triple is degenerate. Requires at least
+// one return; those beyond size() must be padding far from any plane.
+std::optional<PlaneFit> FitPlane(const WindowReturns& window,
+                                 float threshold_m,
+                                 TripleChoice choice);
 
 }  // namespace atlas

@@ -16,6 +16,7 @@ FLOOR_3 = FLOOR_2 + ["core/traversability", "core/grid", "core/column"]
 FLOOR_4 = FLOOR_3 + ["core/keyframe", "core/tile"]
 CORE = FLOOR_4 + ["core/fusion", "core/localization", "core/planning", "core/simulation"]
 WIRE = ["proto/wire", "proto/roadatlas/v1"]
+COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/output", "client/connection"]
 ALLOWED = {
     "core/base": [],
     "core/geometry": ["core/base"],
@@ -33,21 +34,32 @@ ALLOWED = {
     "proto/wire": FLOOR_1 + ["proto/roadatlas/v1"],
     "server/store": FLOOR_1,
     "server/store/sqlite": FLOOR_1 + ["server/store"],
-    "client": CORE + WIRE,
-    "client/render": CORE,
+    "client/connection": FLOOR_1 + WIRE,
+    "client/score": FLOOR_1,
+    "client/map": FLOOR_4 + ["client/connection"],
+    "client/drive": CORE + ["client/connection", "client/map", "client/score"],
+    "client/render": FLOOR_4,
     "server/service": CORE + ["server/store"],
     "server/net": FLOOR_1 + WIRE + ["server/service", "server/store"],
     "server/config": FLOOR_1,
     "server": FLOOR_1 + ["server/config", "server/net", "server/service", "server/store",
                          "server/store/sqlite"],
-    "client/cli": CORE + ["client", "client/render"],
+    "client/cli/output": FLOOR_4,
+    "client/cli/files": FLOOR_1 + ["client/connection"],
+    "client/cli/command_line": FLOOR_1 + ["client/cli/output", "client/connection"],
+    "client/cli/commands/atlas": FLOOR_1 + COMMAND_ROOMS,
+    "client/cli/commands/map": CORE + COMMAND_ROOMS + ["client/map", "client/render", "client/score"],
+    "client/cli/commands/drive": CORE + COMMAND_ROOMS + ["client/drive", "client/map", "client/score"],
+    "client/cli/commands": ["client/cli/command_line", "client/cli/commands/atlas", "client/cli/commands/drive",
+                            "client/cli/commands/map"],
+    "client/cli": FLOOR_1 + ["client/cli/command_line", "client/cli/commands"],
 }
 # Libraries that stay behind a few doors: pattern -> folders that may include it.
 FENCED = {
-    r"<boost/asio|<boost/beast": ["server/net", "server", "client"],
-    r"\.pb\.h\"": ["proto/wire", "server/net", "client"],
+    r"<boost/asio|<boost/beast": ["server/net", "server", "client/connection"],
+    r"\.pb\.h\"": ["proto/wire", "server/net", "client/connection"],
     r"<SQLiteCpp|<sqlite3": ["server/store/sqlite"],
-    r"<CLI/": ["client/cli", "server/config"],
+    r"<CLI/": ["client/cli/command_line", "server/config"],
     r"<toml\+\+": ["server/config"],
     r"<spdlog": ["server", "server/config", "server/net", "server/service", "server/store",
                  "server/store/sqlite"],

@@ -22,8 +22,10 @@ Status DiskError(const std::string& what, const fs::path& path, int error) {
     code = StatusCode::kPermissionDenied;
   } else if (error == ENOSPC || error == EDQUOT) {
     code = StatusCode::kResourceExhausted;
-  } else if (error == ENOENT || error == ENOTDIR || error == EEXIST) {
+  } else if (error == ENOENT) {
     code = StatusCode::kNotFound;
+  } else if (error == ENOTDIR || error == EEXIST) {
+    code = StatusCode::kConflict;
   }
   return Status(code,
                 StrCat(what, " ", path.string(), ": ", std::generic_category().message(error)));

@@ -10,9 +10,9 @@ namespace atlas {
 
 class DataDirectory {
  public:
-  // Makes the directory if it is missing. kConflict names the process that holds it,
-  // kPermissionDenied and kUnavailable say what the disk refused, kInvalidArgument when the
-  // directory holds other files but no atlas.
+  // Makes the directory if it is missing. kConflict names the process that holds it, or the file
+  // that has its name; kPermissionDenied and kUnavailable say what the disk refused,
+  // kInvalidArgument when the directory holds other files but no atlas.
   static Result<DataDirectory> Lock(const std::filesystem::path& directory);
 
   DataDirectory(DataDirectory&& other) noexcept;

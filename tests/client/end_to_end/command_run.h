@@ -7,7 +7,8 @@
 
 #include <boost/json/parse.hpp>
 
-#include "client/cli/command_line.h"
+#include "client/cli/command_line/command_line.h"
+#include "client/cli/commands/commands.h"
 
 namespace atlas {
 

@@ -9,8 +9,10 @@
 namespace atlas::testing {
 namespace {
 
+constexpr int kDriven = -1000;  // the vehicle itself was there
+
 int EvidenceOfState(int state) {
-  return kNibbleEvidence[static_cast<std::size_t>(state)];
+  return state == kNibbleFree ? kDriven : kNibbleEvidence[static_cast<std::size_t>(state)];
 }
 
 }  // namespace
@@ -31,10 +33,13 @@ std::int64_t CellReference::FoldSessions(std::size_t layer,
     int sum = 0;
     for (const Word* word : words) {
       const auto found = evidence.find(word);
-      sum = std::clamp<int>(sum + (found == evidence.end() ? 0 : found->second),
-                            -profile_.session_clamp, profile_.session_clamp);
+      const int added = found == evidence.end() ? 0 : found->second;
+      const int floor = std::min<int>(sum, -profile_.session_clamp);
+      sum = added == kDriven ? -profile_.driven_clamp
+                             : std::clamp<int>(sum + added, floor, profile_.session_clamp);
     }
-    increments.emplace_back(words.back(), sum);
+    increments.emplace_back(words.back(),
+                            std::clamp<int>(sum, -profile_.session_clamp, profile_.session_clamp));
   }
   std::sort(increments.begin(), increments.end(), [](const auto& a, const auto& b) {
     return a.first->time_order() < b.first->time_order();

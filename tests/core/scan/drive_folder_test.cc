@@ -75,8 +75,9 @@ TEST_F(DriveFolderTest, MissingAndShortFilesAreNamed) {
 
 TEST_F(DriveFolderTest, BadPoseLinesAreNamed) {
   for (const char* line :
-       {"1 0 0 0 0 1 0 0 0 0 1", "1 0 0 0 0 1 0 0 0 0 1 x", "1 0 0 0 0 1 0 0 0 0 1 nan",
-        "2 0 0 0 0 2 0 0 0 0 2 0", "1 0 0 0 0 1 0 0 0 0 -1 0", "1 0 0 1e12 0 1 0 0 0 0 1 0"}) {
+       {"1 0 0 0 0 1 0 0 0 0 1", "1 0 0-5 0 1 0 0 0 0 1 0", "1 0 0 0 0 1 0 0 0 0 1 x",
+        "1 0 0 0 0 1 0 0 0 0 1 nan", "2 0 0 0 0 2 0 0 0 0 2 0", "1 0 0 0 0 1 0 0 0 0 -1 0",
+        "1 0 0 1e12 0 1 0 0 0 0 1 0"}) {
     Write("poses.txt", std::string(kIdentity) + line + "\n");
     const Result<std::vector<Pose>> poses = ReadPoses(folder_ / "poses.txt");
     ASSERT_FALSE(poses.has_value()) << line;
@@ -101,10 +102,28 @@ TEST_F(DriveFolderTest, BadScansAreRefused) {
   EXPECT_TRUE(ReadScan(folder_ / "velodyne/000000.bin").has_value());
 }
 
+TEST_F(DriveFolderTest, TwoScansOfOneNumberAreRefused) {
+  Write("velodyne/000000.bin", Returns({1, 2, 3, 0}));
+  Write("velodyne/0.bin", Returns({1, 2, 3, 0}));
+  Write("poses.txt", kIdentity);
+  const Result<DriveFolder> drive = OpenDriveFolder(folder_);
+  ASSERT_FALSE(drive.has_value());
+  EXPECT_EQ(drive.error().code(), StatusCode::kInvalidData);
+}
+
+TEST_F(DriveFolderTest, AFolderInPlaceOfAFileIsInvalidData) {
+  fs::create_directories(folder_ / "velodyne/000000.bin");
+  EXPECT_EQ(ReadScan(folder_ / "velodyne/000000.bin").error().code(), StatusCode::kInvalidData);
+  EXPECT_EQ(ReadScan(folder_ / "velodyne/000001.bin").error().code(), StatusCode::kNotFound);
+}
+
 TEST_F(DriveFolderTest, LabelsMustCoverEveryReturn) {
   Write("labels/000000.label", std::string(8, '\0'));
-  EXPECT_TRUE(ReadLabels(folder_ / "labels/000000.label", 2).has_value());
-  EXPECT_EQ(ReadLabels(folder_ / "labels/000000.label", 3).error().code(),
+  PointCloud cloud;
+  cloud.points.resize(2);
+  EXPECT_TRUE(ReadLabels(folder_ / "labels/000000.label", cloud).has_value());
+  cloud.points.resize(3);
+  EXPECT_EQ(ReadLabels(folder_ / "labels/000000.label", cloud).error().code(),
             StatusCode::kInvalidData);
 }
 

@@ -29,6 +29,7 @@ inline MapProfile GoldenProfile() {
   profile.miss_units = -12;
   profile.session_clamp = 64;
   profile.evidence_clamp = 64;
+  profile.driven_clamp = 192;
   profile.origin = GeodeticOrigin{49'013'000'000, -8'400'000'000, 115'000};
   return profile;
 }

@@ -1,0 +1,197 @@
+#include "client/cli/command_line/command_line.h"
+
+#include <algorithm>
+#include <cctype>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "client/cli/output/json_text.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+constexpr const char* kDescription =
+    "The command line of Road Atlas: data on stdout, everything else on stderr.";
+constexpr const char* kFooter =
+    "Exit codes: 0 ok, 1 failure, 2 usage, 3 not found, 4 conflict, 5 unavailable or timeout, 6 "
+    "invalid data.";
+
+struct CommonFlags {
+  bool is_json = false;
+  std::string server;
+};
+
+// CLI11 takes "-3" for a number but "-.5" for an option "-.".
+std::string WithLeadingZero(const std::string& argument) {
+  const bool is_bare_fraction = argument.size() > 2 && argument[0] == '-' && argument[1] == '.' &&
+                                std::isdigit(static_cast<unsigned char>(argument[2])) != 0;
+  return is_bare_fraction ? "-0" + argument.substr(1) : argument;
+}
+
+// The parser consumes from the back.
+std::vector<std::string> Prepared(const std::vector<std::string>& arguments) {
+  std::vector<std::string> prepared;
+  std::transform(arguments.rbegin(), arguments.rend(), std::back_inserter(prepared),
+                 WithLeadingZero);
+  return prepared;
+}
+
+void AddCommonFlags(CLI::App& app, CommonFlags& common) {
+  app.add_flag("--json", common.is_json, "Print JSON")->disable_flag_override();
+  app.add_option("--server", common.server, "The daemon [ATLAS_SERVER, else 127.0.0.1:7447]")
+      ->type_name("HOST:PORT");
+}
+
+void AddArgument(CLI::App& app, const Argument& argument) {
+  const auto set = [argument](const std::string& text) {
+    if (text.starts_with("--")) {  // "-o --json": the parser would write a file of that name
+      throw CLI::ValidationError(argument.name, "has no value before " + text.substr(0, 80));
+    }
+    if (const Status status = argument.set(text); !status.ok()) {
+      throw CLI::ValidationError(argument.name, status.message());
+    }
+  };
+  if (argument.value_name.empty()) {
+    app.add_flag_function(
+           argument.name, [set](std::int64_t) { set(""); }, argument.help)
+        ->disable_flag_override();
+    return;
+  }
+  CLI::Option* option = app.add_option_function<std::string>(argument.name, set, argument.help);
+  option->required(argument.is_required)->type_name(argument.value_name);
+}
+
+// "poses apply" is `apply` below `poses`, which is made when it is first needed.
+CLI::App& SubcommandFor(CLI::App& root, const Command& command) {
+  std::istringstream words(command.Name());
+  CLI::App* app = &root;
+  std::string word;
+  while (words >> word) {
+    const auto found = app->get_subcommands(
+        [&word](const CLI::App* candidate) { return candidate->get_name() == word; });
+    app = found.empty() ? app->add_subcommand(word) : found.front();
+  }
+  for (CLI::App* group = app->get_parent(); group != nullptr && group != &root;
+       group = group->get_parent()) {
+    group->require_subcommand(1);
+    group->description(command.Summary());
+  }
+  app->description(command.Summary());
+  return *app;
+}
+
+Result<Endpoint> ServerEndpoint(const CommonFlags& common, const CommandLineIo& io) {
+  if (!common.server.empty()) return Endpoint::Parse(common.server);
+  if (io.server_from_environment && !io.server_from_environment->empty()) {
+    return Endpoint::Parse(*io.server_from_environment);
+  }
+  return Endpoint{};
+}
+
+// The parser asks for a missing command before it minds an unknown one.
+Status CheckCommandName(const std::vector<std::string>& arguments, const CLI::App& root) {
+  const auto word =
+      std::find_if(arguments.begin(), arguments.end(),
+                   [](const std::string& argument) { return !argument.starts_with('-'); });
+  if (word == arguments.end() || (word != arguments.begin() && *(word - 1) == "--server")) {
+    return {};
+  }
+  const auto found = root.get_subcommands(
+      [&word](const CLI::App* candidate) { return candidate->get_name() == *word; });
+  return found.empty() ? Status(StatusCode::kInvalidArgument,
+                                StrCat("unknown command '", word->substr(0, 80), "'"))
+                       : Status();
+}
+
+Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
+  const Result<Endpoint> server = ServerEndpoint(common, io);
+  if (!server) return server.error();
+  CommandContext context{io.out, io.err, common.is_json, io.is_err_terminal, io.is_out_terminal,
+                         *server};
+  return command.Run(context);
+}
+
+class Parser {
+ public:
+  Parser(std::span<const std::unique_ptr<Command>> commands, CommonFlags& common)
+      : root_(kDescription, "atlas") {
+    root_.set_version_flag("--version", "atlas " ATLAS_VERSION);
+    root_.footer(kFooter);
+    root_.require_subcommand(1);
+    AddCommonFlags(root_, common);
+    for (const auto& command : commands) {
+      CLI::App& app = SubcommandFor(root_, *command);
+      AddCommonFlags(app, common);
+      ArgumentSet arguments;
+      command->Declare(arguments);
+      for (const Argument& argument : arguments.arguments()) {
+        AddArgument(app, argument);
+      }
+      apps_.emplace_back(&app, command.get());
+    }
+  }
+
+  // The command asked for; nullptr when help or the version was printed.
+  Result<Command*> Parse(const std::vector<std::string>& arguments, std::ostream& out) {
+    if (Status status = CheckCommandName(arguments, root_); !status.ok()) {
+      return Error(std::move(status));
+    }
+    try {
+      root_.parse(Prepared(arguments));
+    } catch (const CLI::ParseError& error) {
+      if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
+        std::ostringstream unused;
+        root_.exit(error, out, unused);
+        return nullptr;
+      }
+      return Error(StatusCode::kInvalidArgument, error.what());
+    }
+    const auto parsed = std::find_if(apps_.begin(), apps_.end(),
+                                     [](const auto& entry) { return entry.first->parsed(); });
+    return parsed->second;
+  }
+
+ private:
+  CLI::App root_;
+  std::vector<std::pair<CLI::App*, Command*>> apps_;
+};
+
+}  // namespace
+
+bool IsJsonAskedFor(const std::vector<std::string>& arguments) {
+  return std::find(arguments.begin(), arguments.end(), "--json") != arguments.end();
+}
+
+void PrintFailure(const Status& status, bool is_json, std::ostream& err) {
+  if (is_json) {
+    const boost::json::object error = {
+        {"code", StatusCodeName(status.code())},
+        {"message", status.message()},
+    };
+    err << JsonText(boost::json::object{{"error", error}}) << '\n';
+  } else {
+    err << "atlas: " << status.message() << '\n';
+  }
+}
+
+ExitCode RunCommandLine(const std::vector<std::string>& arguments,
+                        std::span<const std::unique_ptr<Command>> commands,
+                        const CommandLineIo& io) {
+  CommonFlags common;
+  Parser parser(commands, common);
+  const Result<Command*> command = parser.Parse(arguments, io.out);
+  if (!command) {
+    const bool is_json = IsJsonAskedFor(arguments);
+    PrintFailure(command.error(), is_json, io.err);
+    if (!is_json) io.err << "Run with --help for more information.\n";
+    return ExitCode::kUsage;
+  }
+  if (*command == nullptr) return ExitCode::kSuccess;
+  const Status status = RunCommand(**command, common, io);
+  if (!status.ok()) PrintFailure(status, common.is_json, io.err);
+  return ExitCodeFor(status.code());
+}
+
+}  // namespace atlas

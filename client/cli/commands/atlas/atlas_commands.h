@@ -1,0 +1,17 @@
+// Commands about the atlas as a whole: what it holds, whether it is fused and sound, its poses.
+#pragma once
+
+#include <memory>
+
+#include "client/cli/command_line/command.h"
+
+namespace atlas {
+
+std::unique_ptr<Command> MakeDigestCommand();
+std::unique_ptr<Command> MakePosesApplyCommand();
+std::unique_ptr<Command> MakeSessionsCommand();
+std::unique_ptr<Command> MakeStatusCommand();
+std::unique_ptr<Command> MakeVerifyCommand();
+std::unique_ptr<Command> MakeWaitCommand();
+
+}  // namespace atlas

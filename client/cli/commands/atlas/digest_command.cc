@@ -1,0 +1,53 @@
+// `atlas digest`: one number for the whole atlas; equal atlases, equal digests.
+#include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/timeout_flag.h"
+
+namespace atlas {
+namespace {
+
+std::string Hex(ByteSpan bytes) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : bytes) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 0xF];
+  }
+  return text;
+}
+
+class DigestCommand : public Command {
+ public:
+  std::string Name() const override { return "digest"; }
+  std::string Summary() const override {
+    return "SHA-256 over all tiles, once everything is fused";
+  }
+
+  void Declare(ArgumentSet& arguments) override { DeclareTimeout(arguments, timeout_); }
+
+  Status Run(CommandContext& context) override {
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const Result<DigestSummary> digest = client->Digest(timeout_);
+    if (!digest) return digest.error();
+    if (context.is_json) {
+      context.PrintJson({{"digest", Hex(digest->sha256)},
+                         {"tiles", digest->tiles},
+                         {"revision", digest->revision}});
+    } else {
+      context.out << Hex(digest->sha256) << "  " << digest->tiles << " tiles, revision "
+                  << digest->revision << '\n';
+    }
+    return {};
+  }
+
+ private:
+  std::chrono::milliseconds timeout_{600'000};
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeDigestCommand() {
+  return std::make_unique<DigestCommand>();
+}
+
+}  // namespace atlas

@@ -1,0 +1,67 @@
+// `atlas status`: how much is in the atlas and in the daemon.
+#include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/output/text_table.h"
+
+namespace atlas {
+namespace {
+
+boost::json::object StatusJson(const AtlasStatus& status) {
+  return {{"revision", status.revision},
+          {"keyframes", status.keyframes},
+          {"sessions", status.sessions},
+          {"tiles", status.tiles},
+          {"dirty_tiles", status.dirty_tiles},
+          {"damaged_tiles", status.damaged_tiles},
+          {"store_bytes", status.store_bytes},
+          {"tile_bytes", status.tile_bytes},
+          {"keyframe_bytes", status.keyframe_bytes},
+          {"cells", status.cells},
+          {"multilayer_cells", status.multilayer_cells},
+          {"rss_bytes", status.rss_bytes}};
+}
+
+void PrintStatus(const AtlasStatus& status, std::ostream& out) {
+  FactList facts;
+  facts.Add("revision", std::to_string(status.revision));
+  facts.Add("sessions", std::to_string(status.sessions));
+  facts.Add("keyframes",
+            std::to_string(status.keyframes) + ", " + BytesText(status.keyframe_bytes));
+  facts.Add("tiles", std::to_string(status.tiles) + ", " + BytesText(status.tile_bytes));
+  facts.Add("to be fused", std::to_string(status.dirty_tiles) + " tiles");
+  if (status.damaged_tiles != 0) {
+    facts.Add("damaged", std::to_string(status.damaged_tiles) + " of them; see atlas verify");
+  }
+  facts.Add("cells", std::to_string(status.cells) + ", of them " +
+                         std::to_string(status.multilayer_cells) + " with several surfaces");
+  facts.Add("store", BytesText(status.store_bytes));
+  facts.Add("daemon memory", BytesText(status.rss_bytes));
+  facts.Print(out);
+}
+
+class StatusCommand : public Command {
+ public:
+  std::string Name() const override { return "status"; }
+  std::string Summary() const override { return "What the atlas holds"; }
+  void Declare(ArgumentSet&) override {}
+
+  Status Run(CommandContext& context) override {
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const Result<AtlasStatus> status = client->ReadStatus();
+    if (!status) return status.error();
+    if (context.is_json) {
+      context.PrintJson(StatusJson(*status));
+    } else {
+      PrintStatus(*status, context.out);
+    }
+    return {};
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeStatusCommand() {
+  return std::make_unique<StatusCommand>();
+}
+
+}  // namespace atlas

@@ -1,0 +1,28 @@
+#include "client/cli/commands/commands.h"
+
+#include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/drive/drive_commands.h"
+#include "client/cli/commands/map/map_commands.h"
+
+namespace atlas {
+
+std::vector<std::unique_ptr<Command>> MakeCommands() {
+  std::vector<std::unique_ptr<Command>> commands;
+  commands.push_back(MakeIngestCommand());
+  commands.push_back(MakeWaitCommand());
+  commands.push_back(MakeStatusCommand());
+  commands.push_back(MakePointCommand());
+  commands.push_back(MakeQueryCommand());
+  commands.push_back(MakePosesApplyCommand());
+  commands.push_back(MakeSessionsCommand());
+  commands.push_back(MakeDigestCommand());
+  commands.push_back(MakeVerifyCommand());
+  commands.push_back(MakeSegmentCommand());
+  commands.push_back(MakeLocalizeCommand());
+  commands.push_back(MakePlanCommand());
+  commands.push_back(MakeRenderCommand());
+  commands.push_back(MakeSimulateCommand());
+  return commands;
+}
+
+}  // namespace atlas

@@ -1,0 +1,139 @@
+// `atlas ingest DIR`: a recorded drive into the atlas.
+#include <chrono>
+#include <filesystem>
+
+#include "client/cli/commands/drive/drive_commands.h"
+#include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/output/json_text.h"
+#include "client/cli/output/progress_bar.h"
+#include "client/cli/output/text_table.h"
+#include "client/drive/drive_ingest.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+double FrontendMsPerScan(const IngestReport& report) {
+  return report.totals.sent == 0
+             ? 0.0
+             : 1e3 * report.frontend_s / static_cast<double>(report.totals.sent);
+}
+
+boost::json::object ReportJson(const IngestReport& report, double wall_s) {
+  return {{"keyframes", report.keyframes},
+          {"acked", report.totals.acked},
+          {"duplicates", report.totals.duplicates},
+          {"metres", Rounded(report.metres, 3)},
+          {"bytes_sent", report.totals.bytes_sent},
+          {"frontend_ms_per_scan", Rounded(FrontendMsPerScan(report), 3)},
+          {"sensor_height_m", Rounded(report.sensor_height_m, 3)},
+          {"sessions", report.sessions},
+          {"wall_s", Rounded(wall_s, 3)}};
+}
+
+void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
+  FactList facts;
+  facts.Add("keyframes", StrCat(report.keyframes, " along ", FixedText(report.metres, 1), " m, ",
+                                report.sessions, " session(s)"));
+  facts.Add("acknowledged", StrCat(report.totals.acked, ", of them ", report.totals.duplicates,
+                                   " were there already"));
+  facts.Add("sent", BytesText(report.totals.bytes_sent));
+  facts.Add("sensor height", FixedText(report.sensor_height_m, 3) + " m");
+  facts.Add("front end", FixedText(FrontendMsPerScan(report), 1) + " ms CPU a scan");
+  facts.Add("time", FixedText(wall_s, 1) + " s");
+  facts.Print(out);
+}
+
+class IngestCommand : public Command {
+ public:
+  std::string Name() const override { return "ingest"; }
+  std::string Summary() const override {
+    return "Make keyframes of a recorded drive and upload them";
+  }
+
+  void Declare(ArgumentSet& arguments) override {
+    drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt, optional times.txt");
+    arguments.Optional("--vehicle", "V", vehicle_, "Name of the vehicle [vehicle]");
+    arguments.Optional("--session", "S", session_, "Name of the session [the folder's]");
+    arguments.Optional("--every", "M", options_.selection.every_m,
+                       "Metres between keyframes; 0 keeps all [1]");
+    drive_.DeclareSelection(arguments, options_.max_range_m, "a keyframe");
+    arguments.Optional("--range", "A:B", range_, "Scan numbers from A to before B");
+    arguments.Optional("--shuffle", "SEED", options_.shuffle_seed, "Upload in another order");
+    arguments.Optional("--batch", "N", batch_, "Keyframes on their way at a time [64]");
+    arguments.Optional("--sensor-height", "M", options_.sensor_height_m,
+                       "Above the ground [estimated]");
+    arguments.Choice("--deskew", {"on", "off"}, deskew_, "Undo the vehicle's motion during a scan");
+    arguments.Optional("--start", "T", options_.start_s, "Seconds added to the scans' times [0]");
+  }
+
+  Status Run(CommandContext& context) override {
+    ATLAS_RETURN_IF_ERROR(CompleteOptions());
+    const auto start = std::chrono::steady_clock::now();
+    const Result<DriveFolder> drive = OpenDriveFolder(drive_.directory());
+    if (!drive) return drive.error();
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const Result<IngestReport> report = Ingest(*drive, *client, context);
+    if (!report) return report.error();
+    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+    if (context.is_json) {
+      context.PrintJson(ReportJson(*report, wall.count()));
+    } else {
+      PrintReport(*report, wall.count(), context.out);
+    }
+    return {};
+  }
+
+ private:
+  Status CompleteOptions() {
+    const Result<ScanParity> parity = drive_.parity();
+    if (!parity) return parity.error();
+    options_.rings = drive_.rings();
+    options_.selection.parity = *parity;
+    options_.selection.begin = range_.begin;
+    options_.selection.end = range_.end;
+    options_.is_deskewed = deskew_ == "on";
+    options_.upload.max_in_flight = batch_;
+    options_.session = {vehicle_, session_.value_or(FolderName())};
+    return options_.Validate();
+  }
+
+  std::string FolderName() const {
+    std::error_code error;
+    const std::filesystem::path given = drive_.directory();
+    const std::filesystem::path absolute = std::filesystem::weakly_canonical(given, error);
+    return (error ? given : absolute).filename().string();
+  }
+
+  Result<IngestReport> Ingest(const DriveFolder& drive,
+                              AtlasClient& client,
+                              const CommandContext& context) const {
+    ProgressBar bar(context.err, context.is_err_terminal, "ingest", drive.scans.size());
+    return IngestDrive(drive, options_, client, [&](std::size_t done, std::size_t total) {
+      bar.Update(done * drive.scans.size() / total);
+    });
+  }
+
+  DriveFlags drive_;
+  std::string vehicle_ = "vehicle";
+  std::optional<std::string> session_;
+  std::string deskew_ = "off";
+  NumberRange range_;
+  std::uint32_t batch_ = 64;
+  IngestOptions options_ = DefaultOptions();
+
+  static IngestOptions DefaultOptions() {
+    IngestOptions options;
+    options.selection.every_m = 1.0;
+    return options;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeIngestCommand() {
+  return std::make_unique<IngestCommand>();
+}
+
+}  // namespace atlas

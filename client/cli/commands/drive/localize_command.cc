@@ -1,0 +1,145 @@
+// `atlas localize DIR`: where a drive's scans lie in the map, scored against the drive's poses.
+#include <numbers>
+
+#include "client/cli/commands/drive/drive_commands.h"
+#include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/output/json_text.h"
+#include "client/cli/output/progress_bar.h"
+#include "client/cli/output/text_table.h"
+#include "client/drive/drive_localization.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+boost::json::object ScanJson(const LocalizedScan& scan) {
+  boost::json::array pose;
+  for (const double number : PoseToRowMajor(scan.T_world_sensor)) {
+    pose.emplace_back(number);
+  }
+  return {{"type", "scan"},
+          {"scan", scan.scan},
+          {"trial", scan.trial},
+          {"pose", std::move(pose)},
+          {"health", LocalizationHealthName(scan.health)},
+          {"error_m", Rounded(scan.error.translation_m, 5)},
+          {"error_deg", Rounded(scan.error.rotation_deg, 5)}};
+}
+
+// An error over no shot at all is no error of 0.
+boost::json::value ErrorJson(const LocalizationScore& score, double error) {
+  return score.successes() == 0 ? boost::json::value(nullptr) : Rounded(error, 5);
+}
+
+boost::json::object SummaryJson(const DriveLocalizationReport& report,
+                                std::uint64_t bytes_received) {
+  return {{"type", "summary"},
+          {"translation_rmse_m", ErrorJson(report.score, report.score.translation_rmse_m())},
+          {"rotation_rmse_deg", ErrorJson(report.score, report.score.rotation_rmse_deg())},
+          {"translation_p95_m", ErrorJson(report.score, report.score.translation_p95_m())},
+          {"failures", report.score.failures()},
+          {"lost", report.score.lost()},
+          {"restarts", report.restarts},
+          {"scans", report.scans},
+          {"shots", report.score.shots()},
+          {"hz", Rounded(report.hz(), 2)},
+          {"bytes_received", bytes_received}};
+}
+
+void PrintSummary(const DriveLocalizationReport& report,
+                  std::uint64_t bytes_received,
+                  std::ostream& out) {
+  const LocalizationScore& score = report.score;
+  FactList facts;
+  facts.Add("scans", StrCat(report.scans, ", ", score.shots(), " localizations, ", report.restarts,
+                            " restarts"));
+  facts.Add("error", score.successes() == 0
+                         ? std::string("no localization succeeded")
+                         : StrCat(FixedText(score.translation_rmse_m(), 3), " m, ",
+                                  FixedText(score.rotation_rmse_deg(), 3), " deg RMSE; ",
+                                  FixedText(score.translation_p95_m(), 3), " m at 95 %"));
+  facts.Add("failures", StrCat(score.failures(), ", of them ", score.lost(), " lost"));
+  facts.Add("speed", FixedText(report.hz(), 1) + " scans a CPU second");
+  facts.Add("received", BytesText(bytes_received));
+  facts.Print(out);
+}
+
+class LocalizeCommand : public Command {
+ public:
+  std::string Name() const override { return "localize"; }
+  std::string Summary() const override {
+    return "Find a drive's scans in the map, score the poses";
+  }
+
+  void Declare(ArgumentSet& arguments) override {
+    drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt");
+    drive_.DeclareSelection(arguments, options_.max_range_m, "what is matched");
+    arguments.Optional("--perturb", "T_M,R_DEG", perturbation_,
+                       "Single shots from starts so far off; else the drive is tracked");
+    arguments.Optional("--trials", "N", trials_, "Single shots a scan [10]");
+    arguments.Optional("--seed", "K", options_.seed, "Of the disturbances [0]");
+    arguments.Choice("--mode", {"atlas"}, mode_, "How scans are matched");
+  }
+
+  Status Run(CommandContext& context) override {
+    ATLAS_RETURN_IF_ERROR(CompleteOptions());
+    const Result<DriveFolder> drive = OpenDriveFolder(drive_.directory());
+    if (!drive) return drive.error();
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const auto report = Localize(*drive, *client, context);
+    if (!report) return report.error();
+    if (context.is_json) {
+      context.PrintJson(SummaryJson(*report, client->bytes_received()));
+    } else {
+      PrintSummary(*report, client->bytes_received(), context.out);
+    }
+    return {};
+  }
+
+ private:
+  Status CompleteOptions() {
+    const Result<ScanParity> parity = drive_.parity();
+    if (!parity) return parity.error();
+    options_.rings = drive_.rings();
+    options_.selection.parity = *parity;
+    if (trials_ && !perturbation_) {
+      return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
+    }
+    if (perturbation_) {
+      options_.shots = {perturbation_->translation_m,
+                        perturbation_->rotation_deg * std::numbers::pi / 180.0,
+                        trials_.value_or(10)};
+    }
+    return options_.Validate();
+  }
+
+  Result<DriveLocalizationReport> Localize(const DriveFolder& drive,
+                                           AtlasClient& client,
+                                           const CommandContext& context) const {
+    MapView view(client);
+    // Lines of a stream would run into the bar on the same terminal.
+    const bool is_stream_seen = context.is_json && context.is_out_terminal;
+    const std::uint32_t first = drive.scans.front().number;
+    ProgressBar bar(context.err, context.is_err_terminal && !is_stream_seen, "localize",
+                    drive.scans.back().number - first + 1);
+    return LocalizeDrive(drive, options_, view, [&](const LocalizedScan& scan) {
+      if (context.is_json) context.PrintJson(ScanJson(scan));
+      bar.Update(scan.scan - first + 1);
+    });
+  }
+
+  DriveFlags drive_;
+  std::string mode_ = "atlas";
+  std::optional<Perturbation> perturbation_;
+  std::optional<std::uint32_t> trials_;
+  DriveLocalizationOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeLocalizeCommand() {
+  return std::make_unique<LocalizeCommand>();
+}
+
+}  // namespace atlas

@@ -1,0 +1,15 @@
+// Commands that read tiles: a place, an area, a route, a picture.
+#pragma once
+
+#include <memory>
+
+#include "client/cli/command_line/command.h"
+
+namespace atlas {
+
+std::unique_ptr<Command> MakePlanCommand();
+std::unique_ptr<Command> MakePointCommand();
+std::unique_ptr<Command> MakeQueryCommand();
+std::unique_ptr<Command> MakeRenderCommand();
+
+}  // namespace atlas

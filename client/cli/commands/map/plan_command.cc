@@ -1,0 +1,103 @@
+// `atlas plan`: a route over the map's surfaces.
+#include "client/cli/commands/map/map_commands.h"
+#include "client/cli/output/json_text.h"
+#include "client/cli/output/text_table.h"
+#include "client/map/map_view.h"
+#include "client/score/cpu_timer.h"
+#include "core/base/str_cat.h"
+#include "core/planning/plan_route.h"
+
+namespace atlas {
+namespace {
+
+// Lends the view's tiles to the planner, one at a time.
+class ViewTiles : public TileSource {
+ public:
+  explicit ViewTiles(MapView& view) : view_(view) {}
+
+  Result<const Tile*> Get(const TileId& id) override {
+    auto tile = view_.Get(id);
+    if (!tile) return Error(tile.error());
+    lent_ = *std::move(tile);
+    return lent_.get();
+  }
+
+ private:
+  MapView& view_;
+  std::shared_ptr<const Tile> lent_;
+};
+
+boost::json::object RouteJson(const Route& route, double ms) {
+  boost::json::array waypoints;
+  for (const Eigen::Vector3d& p : route.waypoints) {
+    waypoints.push_back({Rounded(p.x(), 3), Rounded(p.y(), 3), Rounded(p.z(), 3)});
+  }
+  return {{"found", route.found},
+          {"length_m", Rounded(route.length_m, 3)},
+          {"cost", Rounded(route.cost, 3)},
+          {"waypoints", std::move(waypoints)},
+          {"tiles_loaded", route.tiles_loaded},
+          {"expansions", route.expansions},
+          {"ms", Rounded(ms, 3)}};
+}
+
+void PrintRoute(const Route& route, double ms, std::ostream& out) {
+  TextTable table({">x m", ">y m", ">z m"});
+  for (const Eigen::Vector3d& p : route.waypoints) {
+    table.Row({FixedText(p.x(), 2), FixedText(p.y(), 2), FixedText(p.z(), 2)});
+  }
+  if (!route.waypoints.empty()) table.Print(out);
+  out << (route.found ? StrCat("route of ", FixedText(route.length_m, 1), " m")
+                      : std::string("no route"))
+      << ", " << route.tiles_loaded << " tiles loaded, " << FixedText(ms, 0) << " ms CPU\n";
+}
+
+class PlanCommand : public Command {
+ public:
+  std::string Name() const override { return "plan"; }
+  std::string Summary() const override { return "A drivable route between two places"; }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Required("--from", "X,Y,Z", request_.from, "Start, metres; Z names the surface");
+    arguments.Required("--to", "X,Y,Z", request_.to, "Goal, metres");
+    arguments.Optional("--max-slope-deg", "D", request_.options.max_slope_deg,
+                       "Steepest surface the vehicle drives [25]");
+  }
+
+  Status Run(CommandContext& context) override {
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    MapView view(*client);
+    ViewTiles tiles(view);
+    const CpuTimer timer;
+    Result<Route> route = PlanRoute(tiles, client->profile(), request_);
+    const double ms = 1e3 * timer.elapsed_s();
+    Status failure;
+    if (!route) {
+      // Nothing to stand on at either end is no route as well.
+      if (route.error().code() != StatusCode::kNotFound) return route.error();
+      failure = route.error();
+      route = Route();
+    }
+    if (context.is_json) {
+      context.PrintJson(RouteJson(*route, ms));
+    } else {
+      PrintRoute(*route, ms, context.out);
+    }
+    if (failure.ok() && !route->found) {
+      failure = {StatusCode::kNotFound, "no route: what start and goal stand on is not joined"};
+    }
+    return failure;
+  }
+
+ private:
+  PlanRequest request_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakePlanCommand() {
+  return std::make_unique<PlanCommand>();
+}
+
+}  // namespace atlas

@@ -1,0 +1,82 @@
+// `atlas point X Y`: the surfaces above each other at a place, and what stands on each.
+#include "client/cli/commands/map/map_commands.h"
+#include "client/cli/output/json_text.h"
+#include "client/cli/output/layer_json.h"
+#include "client/cli/output/text_table.h"
+#include "client/map/map_view.h"
+#include "core/geometry/nibble.h"
+
+namespace atlas {
+namespace {
+
+// One character a segment, lowest first: '.' free, '#' occupied, '?' undecided, ' ' no data.
+std::string ColumnText(const TileLayer& layer, const MapProfile& profile) {
+  std::string text = "|";
+  for (int i = 0; i < profile.column_segments; ++i) {
+    const std::uint8_t nibble = NibbleAt(layer.column, i);
+    const char known = nibble > kNibbleUnknown ? '#' : nibble < kNibbleUnknown ? '.' : '?';
+    text += nibble == 0 ? ' ' : known;
+  }
+  return text + "|";
+}
+
+void PrintLayers(const std::vector<TileLayer>& layers,
+                 const MapProfile& profile,
+                 std::ostream& out) {
+  if (layers.empty()) {
+    out << "nothing is known here\n";
+    return;
+  }
+  TextTable table({">layer", ">z m", ">sigma m", ">occupancy", "traversable", ">observations",
+                   "column (lowest first)"});
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const TileLayer& layer = layers[i];
+    table.Row({std::to_string(i), FixedText(layer.altitude_mm / 1e3, 3),
+               FixedText(layer.sigma_100um / 1e4, 3),
+               FixedText(EvidenceProbability(layer.occupancy), 2),
+               layer.is_traversable() ? "yes" : "no", std::to_string(layer.observations),
+               ColumnText(layer, profile)});
+  }
+  table.Print(out);
+}
+
+class PointCommand : public Command {
+ public:
+  std::string Name() const override { return "point"; }
+  std::string Summary() const override { return "The surfaces at a place, lowest first"; }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Required("X", "M", x_m_, "World coordinates of the place");
+    arguments.Required("Y", "M", y_m_, "");
+  }
+
+  Status Run(CommandContext& context) override {
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    MapView view(*client);
+    const auto layers = view.LayersAt({x_m_, y_m_});
+    if (!layers) return layers.error();
+    if (context.is_json) {
+      boost::json::array array;
+      for (const TileLayer& layer : *layers) {
+        array.push_back(LayerJson(layer, client->profile()));
+      }
+      context.PrintJson({{"layers", std::move(array)}});
+    } else {
+      PrintLayers(*layers, client->profile(), context.out);
+    }
+    return {};
+  }
+
+ private:
+  double x_m_ = 0.0;
+  double y_m_ = 0.0;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakePointCommand() {
+  return std::make_unique<PointCommand>();
+}
+
+}  // namespace atlas

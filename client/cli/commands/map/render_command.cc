@@ -1,0 +1,77 @@
+// `atlas render`: a picture of the whole atlas.
+#include "client/cli/commands/map/map_commands.h"
+#include "client/render/map_picture.h"
+#include "core/base/str_cat.h"
+#include "core/tile/tile_codec.h"
+
+namespace atlas {
+namespace {
+
+LevelReader ReaderOf(AtlasClient& client) {
+  return [&client](std::uint8_t level, const TileCallback& on_tile) -> Status {
+    RegionQuery query;
+    query.finest_level = level;
+    query.is_only_finest = true;
+    const auto summary = client.QueryRegion(query, [&](const TileBlob& received) -> Status {
+      const Result<Tile> tile = DecodeTile(received.blob, client.profile());
+      if (!tile) return tile.error().WithContext(StrCat("tile ", received.id));
+      return on_tile(*tile);
+    });
+    return summary ? Status() : summary.error();
+  };
+}
+
+class RenderCommand : public Command {
+ public:
+  std::string Name() const override { return "render"; }
+  std::string Summary() const override { return "A picture of the map"; }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Required("-o,--output", "FILE.png", file_, "Where the picture goes");
+    arguments.Optional("--layer", "lowest|highest|N", layer_,
+                       "Which surface of a cell is shown; 0 is the lowest [highest]");
+    arguments.Choice("--color", {"height", "occupancy", "layers", "columns"}, color_,
+                     "What colours mean");
+  }
+
+  Status Run(CommandContext& context) override {
+    RenderOptions options;
+    const auto layer = LayerChoice::Parse(layer_);
+    if (!layer) return layer.error();
+    options.layer = *layer;
+    const auto color = ParseMapColor(color_);
+    if (!color) return color.error();
+    options.color = *color;
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const auto picture = RenderMap(ReaderOf(*client), options, client->profile());
+    if (!picture) return picture.error();
+    ATLAS_RETURN_IF_ERROR(WritePng(picture->image, file_));
+    Print(*picture, context);
+    return {};
+  }
+
+ private:
+  void Print(const MapPicture& picture, const CommandContext& context) const {
+    if (context.is_json) {
+      context.PrintJson({{"width", picture.image.width},
+                         {"height", picture.image.height},
+                         {"metres_per_pixel", picture.metres_per_pixel}});
+    } else {
+      context.out << file_ << ": " << picture.image.width << " x " << picture.image.height
+                  << " pixels of " << picture.metres_per_pixel << " m\n";
+    }
+  }
+
+  std::string file_;
+  std::string layer_ = "highest";
+  std::string color_ = "height";
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeRenderCommand() {
+  return std::make_unique<RenderCommand>();
+}
+
+}  // namespace atlas

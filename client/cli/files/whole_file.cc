@@ -1,0 +1,73 @@
+#include "client/cli/files/whole_file.h"
+
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+Status SystemError(const char* what, const std::filesystem::path& path, int error) {
+  StatusCode code = StatusCode::kInternal;
+  if (error == ENOENT) code = StatusCode::kNotFound;
+  if (error == EACCES || error == EPERM || error == EROFS) code = StatusCode::kPermissionDenied;
+  if (error == ENOTDIR || error == EISDIR || error == EEXIST) code = StatusCode::kConflict;
+  if (error == ENOSPC || error == EDQUOT) code = StatusCode::kResourceExhausted;
+  return {code, StrCat(what, ' ', path.string(), ": ", std::generic_category().message(error))};
+}
+
+// errno of the failing call, 0 when the bytes are in the file.
+int WriteBytes(const std::filesystem::path& path, ByteSpan bytes) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (file.good()) return 0;
+  return errno != 0 ? errno : EIO;
+}
+
+}  // namespace
+
+Status MakeDirectory(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  return error ? SystemError("cannot make folder", directory, error.value()) : Status();
+}
+
+Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
+  std::filesystem::path partial = path;
+  partial += ".partial";
+  std::error_code error;
+  int failed = WriteBytes(partial, bytes);
+  if (failed == 0) {
+    std::filesystem::rename(partial, path, error);
+    failed = error.value();
+  }
+  if (failed == 0) return {};
+  std::filesystem::remove(partial, error);
+  return SystemError("cannot write", path, failed);
+}
+
+Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes) {
+  std::error_code error;
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error == std::errc::is_a_directory) {
+    return Error(StatusCode::kInvalidData, StrCat(path.string(), ": a folder, expected a file"));
+  }
+  if (error) return Error(SystemError("cannot read", path, error.value()));
+  if (size > max_bytes) {
+    return Error(StatusCode::kResourceExhausted,
+                 StrCat(path.string(), ": ", size, " bytes, at most ", max_bytes));
+  }
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::string text(size, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(size));
+  if (!file) return Error(SystemError("cannot read", path, errno != 0 ? errno : EIO));
+  return text;
+}
+
+}  // namespace atlas

@@ -1,0 +1,20 @@
+// Files that appear whole or not at all.
+#pragma once
+
+#include <filesystem>
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+// With its parents; fine when it exists. kPermissionDenied, kConflict when a file has its name.
+Status MakeDirectory(const std::filesystem::path& directory);
+
+// Written beside `path` and renamed over it.
+Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes);
+
+// kNotFound, kPermissionDenied, kInvalidData for a folder; kResourceExhausted above `max_bytes`.
+Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes);
+
+}  // namespace atlas

@@ -1,0 +1,239 @@
+#include "client/connection/atlas_client.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "client/connection/rpc_channel.h"
+#include "core/base/str_cat.h"
+#include "proto/wire/convert.h"
+
+namespace atlas {
+namespace {
+
+using Body = wire::Envelope;
+using std::chrono::milliseconds;
+
+std::uint32_t TimeoutField(milliseconds timeout) {
+  return static_cast<std::uint32_t>(
+      std::clamp<std::int64_t>(timeout.count(), 0, INT64_C(0xFFFFFFFF)));
+}
+
+wire::Envelope HelloRequest(const ConnectionOptions& options) {
+  wire::Envelope request;
+  wire::Hello& hello = *request.mutable_hello();
+  hello.set_protocol_major(kProtocolMajor);
+  hello.set_protocol_minor(kProtocolMinor);
+  hello.set_client_name(options.client_name);
+  if (options.expected_profile) hello.set_profile(ProfileToWire(*options.expected_profile));
+  return request;
+}
+
+Status CheckVersion(const wire::HelloReply& reply, const Endpoint& endpoint) {
+  if (reply.protocol_major() == kProtocolMajor) return {};
+  return {StatusCode::kUnsupported,
+          StrCat("daemon at ", endpoint.ToText(), ": speaks protocol ", reply.protocol_major(), '.',
+                 reply.protocol_minor(), ", this build ", kProtocolMajor, '.', kProtocolMinor)};
+}
+
+AtlasIdentity IdentityFromWire(const wire::HelloReply& reply) {
+  const ByteSpan id = BytesFromWire(reply.atlas_id());
+  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision()};
+}
+
+wire::Envelope RegionRequest(const RegionQuery& query) {
+  wire::Envelope request;
+  wire::QueryRegion& region = *request.mutable_query_region();
+  if (query.disc) {
+    wire::QueryRegion::Disc& disc = *region.mutable_disc();
+    disc.set_x_um(std::llround(query.disc->center_m.x() * 1e6));
+    disc.set_y_um(std::llround(query.disc->center_m.y() * 1e6));
+    disc.set_radius_um(static_cast<std::uint64_t>(std::llround(query.disc->radius_m * 1e6)));
+  }
+  region.set_finest_level(query.finest_level);
+  region.set_only_finest(query.is_only_finest);
+  region.set_budget_bytes(query.budget_bytes);
+  return request;
+}
+
+// A place or a radius that does not fit a message is refused before it is rounded.
+Status CheckDisc(const RegionQuery& query) {
+  if (!query.disc) return {};
+  const bool is_place = query.disc->center_m.cwiseAbs().maxCoeff() <= 1e7;
+  const bool is_radius = query.disc->radius_m >= 0.0 && query.disc->radius_m <= 1e8;
+  return is_place && is_radius
+             ? Status()
+             : Status(StatusCode::kInvalidArgument,
+                      "region: expected a centre within +-10000 km and a radius of 0 to 100000 km");
+}
+
+Result<TileBlob> TileFromWire(wire::TileMessage& message) {
+  const Result<TileId> id = TileId::FromKey(message.key());
+  if (!id) return Error(id.error());
+  const ByteSpan blob = BytesFromWire(message.blob());
+  return TileBlob{*id, message.revision(), message.payload_hash(), Bytes(blob.begin(), blob.end())};
+}
+
+RegionSummary SummaryFromWire(const wire::QueryEnd& end) {
+  return {end.tiles(), end.bytes(), end.revision(), end.truncated()};
+}
+
+AtlasStatus StatusFromWire(const wire::StatusReply& reply) {
+  AtlasStatus status;
+  status.revision = reply.revision();
+  status.keyframes = reply.keyframes();
+  status.sessions = reply.sessions();
+  status.tiles = reply.tiles();
+  status.dirty_tiles = reply.dirty_tiles();
+  status.damaged_tiles = reply.damaged_tiles();
+  status.store_bytes = reply.store_bytes();
+  status.tile_bytes = reply.tile_bytes();
+  status.keyframe_bytes = reply.keyframe_bytes();
+  status.cells = reply.cells();
+  status.multilayer_cells = reply.multilayer_cells();
+  status.rss_bytes = reply.rss_bytes();
+  return status;
+}
+
+SessionSummary SessionFromWire(const wire::SessionInfo& info) {
+  SessionSummary session;
+  session.key = {info.vehicle(), info.session()};
+  session.state = info.state();
+  session.keyframes = info.keyframes();
+  session.bytes = info.bytes();
+  session.first_time_ms = info.first_time_ms();
+  session.last_time_ms = info.last_time_ms();
+  session.last_sequence = info.last_sequence();
+  return session;
+}
+
+}  // namespace
+
+AtlasClient::AtlasClient(std::unique_ptr<RpcChannel> channel,
+                         const MapProfile& profile,
+                         AtlasIdentity atlas)
+    : channel_(std::move(channel)), profile_(profile), atlas_(std::move(atlas)) {}
+AtlasClient::AtlasClient(AtlasClient&&) noexcept = default;
+AtlasClient& AtlasClient::operator=(AtlasClient&&) noexcept = default;
+AtlasClient::~AtlasClient() = default;
+
+Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
+  Result<DaemonConnection> connection =
+      DaemonConnection::Open(options.endpoint, options.connect_timeout);
+  if (!connection) return Error(connection.error());
+  auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
+  wire::Envelope request = HelloRequest(options);
+  const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply);
+  if (!reply) return Error(reply.error());
+  const wire::HelloReply& hello = reply->hello_reply();
+  if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const Result<MapProfile> profile = ProfileFromWire(hello.profile());
+  if (!profile) return Error(profile.error().WithContext("daemon's handshake"));
+  return AtlasClient(std::move(channel), *profile, IdentityFromWire(hello));
+}
+
+Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection> corrections,
+                                                  const std::string& author) {
+  if (corrections.size() > kMaxRepeatedFields) {
+    return Error(StatusCode::kInvalidArgument, StrCat("pose batch: ", corrections.size(),
+                                                      " poses, at most ", kMaxRepeatedFields));
+  }
+  wire::Envelope request;
+  wire::UpdatePoses& update = *request.mutable_update_poses();
+  update.set_author(author);
+  for (const PoseCorrection& correction : corrections) {
+    wire::PoseUpdate& pose = *update.add_updates();
+    *pose.mutable_key() = KeyToWire(correction.key);
+    *pose.mutable_pose() = PoseToWire(correction.T_world_sensor);
+  }
+  const auto reply = channel_->Call(request, Body::kUpdatePosesReply);
+  if (!reply) return Error(reply.error());
+  const wire::UpdatePosesReply& done = reply->update_poses_reply();
+  return PoseBatchSummary{done.updated(), done.tiles_marked(), done.revision(), done.batch()};
+}
+
+Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
+                                               const TileCallback& on_tile) {
+  if (Status status = CheckDisc(query); !status.ok()) return Error(std::move(status));
+  wire::Envelope request = RegionRequest(query);
+  const Result<std::uint64_t> id = channel_->Send(request);
+  if (!id) return Error(id.error());
+  while (true) {
+    Result<wire::Envelope> reply = channel_->ReceiveFor(*id, Body::kTile, Body::kQueryEnd);
+    if (!reply) return Error(reply.error());
+    if (reply->has_query_end()) return SummaryFromWire(reply->query_end());
+    Result<TileBlob> tile = TileFromWire(*reply->mutable_tile());
+    if (!tile) return Error(tile.error());
+    if (Status status = on_tile(*std::move(tile)); !status.ok()) return Error(std::move(status));
+  }
+}
+
+Result<AtlasStatus> AtlasClient::ReadStatus() {
+  wire::Envelope request;
+  request.mutable_status_request();
+  const auto reply = channel_->Call(request, Body::kStatusReply);
+  if (!reply) return Error(reply.error());
+  return StatusFromWire(reply->status_reply());
+}
+
+Result<WaitSummary> AtlasClient::WaitUntilFused(milliseconds timeout) {
+  wire::Envelope request;
+  request.mutable_wait_request()->set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel_->Call(request, Body::kWaitReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::WaitReply& done = reply->wait_reply();
+  if (done.timed_out()) {
+    return Error(StatusCode::kTimeout,
+                 StrCat(done.dirty_tiles(), " tiles are still to be fused after ",
+                        static_cast<double>(timeout.count()) * 1e-3, " s"));
+  }
+  return WaitSummary{done.revision(), done.dirty_tiles()};
+}
+
+Result<std::vector<SessionSummary>> AtlasClient::ListSessions() {
+  wire::Envelope request;
+  request.mutable_sessions_request();
+  const auto reply = channel_->Call(request, Body::kSessionsReply);
+  if (!reply) return Error(reply.error());
+  std::vector<SessionSummary> sessions;
+  for (const wire::SessionInfo& info : reply->sessions_reply().sessions()) {
+    sessions.push_back(SessionFromWire(info));
+  }
+  return sessions;
+}
+
+Result<DigestSummary> AtlasClient::Digest(milliseconds timeout) {
+  wire::Envelope request;
+  request.mutable_digest_request()->set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel_->Call(request, Body::kDigestReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::DigestReply& done = reply->digest_reply();
+  const ByteSpan sha256 = BytesFromWire(done.sha256());
+  return DigestSummary{Bytes(sha256.begin(), sha256.end()), done.tiles(), done.revision()};
+}
+
+Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout) {
+  wire::Envelope request;
+  request.mutable_verify_request()->set_rebuild(is_rebuild);
+  request.mutable_verify_request()->set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel_->Call(request, Body::kVerifyReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::VerifyReply& done = reply->verify_reply();
+  return VerifySummary{done.checked(),
+                       done.damaged(),
+                       done.mismatched(),
+                       {done.findings().begin(), done.findings().end()},
+                       done.revision()};
+}
+
+std::uint64_t AtlasClient::bytes_sent() const {
+  return channel_->connection().bytes_sent();
+}
+
+std::uint64_t AtlasClient::bytes_received() const {
+  return channel_->connection().bytes_received();
+}
+
+}  // namespace atlas

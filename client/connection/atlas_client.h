@@ -1,0 +1,72 @@
+// A vehicle's or a tool's end of the protocol: one connection, one call at a time, one thread.
+// Every failure is typed: the daemon's own errors keep their code, kUnavailable and kTimeout are
+// the link's.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/connection/endpoint.h"
+#include "client/connection/requests.h"
+#include "core/base/status.h"
+#include "core/geometry/map_profile.h"
+
+namespace atlas {
+
+class RpcChannel;
+
+struct ConnectionOptions {
+  Endpoint endpoint;
+  std::string client_name = "libatlas_client";  // for the daemon's logs
+  std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
+  std::chrono::milliseconds connect_timeout{5'000};
+  std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
+};
+
+class AtlasClient {
+ public:
+  using TileCallback = std::function<Status(TileBlob)>;
+
+  // Connects and shakes hands. kUnsupported when the daemon speaks another protocol version.
+  static Result<AtlasClient> Connect(const ConnectionOptions& options);
+
+  AtlasClient(const AtlasClient&) = delete;
+  AtlasClient& operator=(const AtlasClient&) = delete;
+  AtlasClient(AtlasClient&&) noexcept;
+  AtlasClient& operator=(AtlasClient&&) noexcept;
+  ~AtlasClient();
+
+  const MapProfile& profile() const { return profile_; }
+  const AtlasIdentity& atlas() const { return atlas_; }
+
+  // All or nothing: kNotFound names an unknown keyframe, kInvalidData a refused pose.
+  Result<PoseBatchSummary> UpdatePoses(std::span<const PoseCorrection> corrections,
+                                       const std::string& author);
+  // Calls back once a tile, in the order sent. A failing callback ends the query with its status.
+  Result<RegionSummary> QueryRegion(const RegionQuery& query, const TileCallback& on_tile);
+  Result<AtlasStatus> ReadStatus();
+  // Returns when no tile is dirty; kTimeout after `timeout`.
+  Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
+  Result<std::vector<SessionSummary>> ListSessions();
+  // Waits until no tile is dirty, `timeout` long.
+  Result<DigestSummary> Digest(std::chrono::milliseconds timeout);
+  Result<VerifySummary> Verify(bool is_rebuild, std::chrono::milliseconds timeout);
+
+  std::uint64_t bytes_sent() const;
+  std::uint64_t bytes_received() const;
+
+ private:
+  friend class KeyframeUploader;
+  AtlasClient(std::unique_ptr<RpcChannel> channel, const MapProfile& profile, AtlasIdentity atlas);
+
+  std::unique_ptr<RpcChannel> channel_;
+  MapProfile profile_;
+  AtlasIdentity atlas_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,176 @@
+#include "client/connection/daemon_connection.h"
+
+#include <optional>
+
+#include <boost/asio/connect.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/write.hpp>
+
+#include "core/base/str_cat.h"
+#include "proto/wire/frame.h"
+
+namespace atlas {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+using std::chrono::milliseconds;
+
+namespace {
+
+constexpr std::size_t kChunkBytes = std::size_t{64} << 10;
+
+}  // namespace
+
+class DaemonConnection::Impl {
+ public:
+  explicit Impl(Endpoint endpoint) : endpoint_(std::move(endpoint)), socket_(io_) {}
+
+  Status Open(milliseconds timeout);
+  Status Send(ByteSpan frame, milliseconds timeout);
+  Result<Bytes> Receive(milliseconds timeout);
+
+  const Endpoint& endpoint() const { return endpoint_; }
+  std::uint64_t bytes_sent() const { return bytes_sent_; }
+  std::uint64_t bytes_received() const { return bytes_received_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  // Runs what was started until `done` is set; kTimeout, with the socket closed, if that is too
+  // late.
+  Status Finish(const std::optional<error_code>& done,
+                Clock::time_point deadline,
+                const char* what);
+  Status ReadSome(Clock::time_point deadline);
+  Result<asio::ip::tcp::resolver::results_type> Resolve(Clock::time_point deadline);
+  Status Fail(StatusCode code, const std::string& what);
+
+  Endpoint endpoint_;
+  asio::io_context io_;
+  asio::ip::tcp::socket socket_;
+  FrameDecoder decoder_;
+  Bytes chunk_ = Bytes(kChunkBytes);
+  std::uint64_t bytes_sent_ = 0;
+  std::uint64_t bytes_received_ = 0;
+  Status failure_;
+};
+
+Status DaemonConnection::Impl::Fail(StatusCode code, const std::string& what) {
+  error_code ignored;  // closing is all that is left to do
+  socket_.close(ignored);
+  failure_ = Status(code, StrCat("daemon at ", endpoint_.ToText(), ": ", what));
+  return failure_;
+}
+
+Status DaemonConnection::Impl::Finish(const std::optional<error_code>& done,
+                                      Clock::time_point deadline,
+                                      const char* what) {
+  io_.restart();
+  io_.run_until(deadline);
+  if (!done) {
+    Status status = Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
+    io_.restart();
+    io_.run();  // the cancelled operation still refers to our buffers
+    return status;
+  }
+  if (*done) return Fail(StatusCode::kUnavailable, StrCat(what, ": ", done->message()));
+  return {};
+}
+
+Result<asio::ip::tcp::resolver::results_type> DaemonConnection::Impl::Resolve(
+    Clock::time_point deadline) {
+  asio::ip::tcp::resolver resolver(io_);
+  std::optional<error_code> done;
+  asio::ip::tcp::resolver::results_type found;
+  resolver.async_resolve(endpoint_.host, std::to_string(endpoint_.port),
+                         asio::ip::tcp::resolver::numeric_service,
+                         [&](const error_code& error, auto results) {
+                           done = error;
+                           found = std::move(results);
+                         });
+  if (Status status = Finish(done, deadline, "resolving its name"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return found;
+}
+
+Status DaemonConnection::Impl::Open(milliseconds timeout) {
+  const Clock::time_point deadline = Clock::now() + timeout;
+  const auto addresses = Resolve(deadline);
+  if (!addresses) return addresses.error();
+  std::optional<error_code> done;
+  asio::async_connect(socket_, *addresses,
+                      [&](const error_code& error, const auto&) { done = error; });
+  ATLAS_RETURN_IF_ERROR(Finish(done, deadline, "connecting"));
+  error_code error;
+  socket_.set_option(asio::ip::tcp::no_delay(true), error);
+  return error ? Fail(StatusCode::kUnavailable, error.message()) : Status();
+}
+
+Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
+  ATLAS_RETURN_IF_ERROR(failure_);
+  std::optional<error_code> done;
+  asio::async_write(socket_, asio::buffer(frame.data(), frame.size()),
+                    [&](const error_code& error, std::size_t) { done = error; });
+  ATLAS_RETURN_IF_ERROR(Finish(done, Clock::now() + timeout, "sending"));
+  bytes_sent_ += frame.size();
+  return {};
+}
+
+Status DaemonConnection::Impl::ReadSome(Clock::time_point deadline) {
+  std::optional<error_code> done;
+  std::size_t size = 0;
+  socket_.async_read_some(asio::buffer(chunk_), [&](const error_code& error, std::size_t bytes) {
+    done = error;
+    size = bytes;
+  });
+  ATLAS_RETURN_IF_ERROR(Finish(done, deadline, "waiting for a reply"));
+  bytes_received_ += size;
+  decoder_.Push(ByteSpan(chunk_).first(size));
+  return {};
+}
+
+Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
+  if (!failure_.ok()) return Error(failure_);
+  const Clock::time_point deadline = Clock::now() + timeout;
+  while (true) {
+    Result<std::optional<Bytes>> payload = decoder_.Next();
+    if (!payload) return Error(Fail(payload.error().code(), payload.error().message()));
+    if (*payload) return std::move(**payload);
+    if (Status status = ReadSome(deadline); !status.ok()) return Error(std::move(status));
+  }
+}
+
+DaemonConnection::DaemonConnection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DaemonConnection::DaemonConnection(DaemonConnection&&) noexcept = default;
+DaemonConnection& DaemonConnection::operator=(DaemonConnection&&) noexcept = default;
+DaemonConnection::~DaemonConnection() = default;
+
+Result<DaemonConnection> DaemonConnection::Open(const Endpoint& endpoint, milliseconds timeout) {
+  auto impl = std::make_unique<Impl>(endpoint);
+  if (Status status = impl->Open(timeout); !status.ok()) return Error(std::move(status));
+  return DaemonConnection(std::move(impl));
+}
+
+Status DaemonConnection::Send(ByteSpan frame, milliseconds timeout) {
+  return impl_->Send(frame, timeout);
+}
+
+Result<Bytes> DaemonConnection::Receive(milliseconds timeout) {
+  return impl_->Receive(timeout);
+}
+
+const Endpoint& DaemonConnection::endpoint() const {
+  return impl_->endpoint();
+}
+
+std::uint64_t DaemonConnection::bytes_sent() const {
+  return impl_->bytes_sent();
+}
+
+std::uint64_t DaemonConnection::bytes_received() const {
+  return impl_->bytes_received();
+}
+
+}  // namespace atlas

@@ -1,0 +1,44 @@
+// A TCP connection to a daemon that carries whole frames: blocking, every wait with a deadline. One
+// thread at a time. Knows bytes, not messages.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+
+#include "client/connection/endpoint.h"
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+class DaemonConnection {
+ public:
+  // kUnavailable when nobody listens there, kTimeout after `timeout`.
+  static Result<DaemonConnection> Open(const Endpoint& endpoint, std::chrono::milliseconds timeout);
+
+  DaemonConnection(const DaemonConnection&) = delete;
+  DaemonConnection& operator=(const DaemonConnection&) = delete;
+  DaemonConnection(DaemonConnection&&) noexcept;
+  DaemonConnection& operator=(DaemonConnection&&) noexcept;
+  ~DaemonConnection();
+
+  // A whole frame, header included. After a failure the connection is closed and every further call
+  // returns that failure.
+  Status Send(ByteSpan frame, std::chrono::milliseconds timeout);
+  // The payload of the next frame. kUnavailable when the peer closed, kTimeout when the frame was
+  // not whole in time, kInvalidData or kResourceExhausted when it is not a frame.
+  Result<Bytes> Receive(std::chrono::milliseconds timeout);
+
+  const Endpoint& endpoint() const;
+  std::uint64_t bytes_sent() const;
+  std::uint64_t bytes_received() const;
+
+ private:
+  class Impl;
+  explicit DaemonConnection(std::unique_ptr<Impl> impl);
+
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,62 @@
+// Uploads keyframes without waiting for each: a bounded window of them is on its way at any time,
+// on the client's one connection. While there are uploads in flight, use the client for nothing
+// else.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <string>
+
+#include "client/connection/atlas_client.h"
+
+namespace atlas {
+
+struct UploadOptions {
+  std::size_t max_in_flight = 64;  // the daemon commits up to 64 at a time
+  std::size_t max_in_flight_bytes = std::size_t{16} << 20;
+};
+
+struct UploadTotals {
+  std::uint64_t sent = 0;
+  std::uint64_t acked = 0;       // on disk, duplicates among them
+  std::uint64_t duplicates = 0;  // were there already
+  std::uint64_t tiles_marked = 0;
+  std::uint64_t bytes_sent = 0;  // frames, as on the wire
+  std::uint64_t revision = 0;    // of the newest acknowledgement
+};
+
+class KeyframeUploader {
+ public:
+  // The client outlives the uploader.
+  explicit KeyframeUploader(AtlasClient& client, const UploadOptions& options = {});
+
+  // Sends; waits for an acknowledgement first when the window is full. A refusal of this or of an
+  // earlier keyframe names that keyframe; its code is the daemon's (kConflict: other content under
+  // the key).
+  Status Upload(const KeyframeUpload& upload);
+  // Waits for every acknowledgement. Returns the first refusal, after the others have been counted.
+  Status Finish();
+
+  const UploadTotals& totals() const { return totals_; }
+
+ private:
+  struct InFlight {
+    std::uint64_t request_id = 0;
+    KeyframeKey key;
+    std::size_t size_bytes = 0;
+  };
+
+  // Link failures only; refusals are remembered.
+  Status ReceiveOne();
+  bool IsFull(std::size_t next_bytes) const;
+
+  AtlasClient& client_;
+  UploadOptions options_;
+  UploadTotals totals_;
+  std::deque<InFlight> in_flight_;
+  std::size_t in_flight_bytes_ = 0;
+  Status first_refusal_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,47 @@
+// Requests and replies over a connection. Internal to the client library: this header has Protobuf
+// in it and is included by sources only.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "client/connection/daemon_connection.h"
+#include "core/base/status.h"
+#include "proto/wire/envelope.h"
+
+namespace atlas {
+
+class RpcChannel {
+ public:
+  using Milliseconds = std::chrono::milliseconds;
+
+  // `frame_timeout`: for every frame to be sent or to arrive whole.
+  RpcChannel(DaemonConnection connection, Milliseconds frame_timeout);
+
+  // Gives the request the next id, which is returned.
+  Result<std::uint64_t> Send(wire::Envelope& request);
+  // The next reply, whatever it answers, `extra` longer than usual. A refusal of the connection as
+  // a whole (an Error of no request) is a failure here.
+  Result<wire::Envelope> Receive(Milliseconds extra = Milliseconds(0));
+  // The next reply to request `id`: replies to earlier requests, which were given up, are skipped.
+  // An Error reply becomes its status; another body than `expected` or `also` is kInvalidData.
+  Result<wire::Envelope> ReceiveFor(std::uint64_t id,
+                                    wire::Envelope::BodyCase expected,
+                                    wire::Envelope::BodyCase also,
+                                    Milliseconds extra = Milliseconds(0));
+  // Send and ReceiveFor with one body expected.
+  Result<wire::Envelope> Call(wire::Envelope& request,
+                              wire::Envelope::BodyCase expected,
+                              Milliseconds extra = Milliseconds(0));
+
+  DaemonConnection& connection() { return connection_; }
+
+ private:
+  Status Unexpected(const wire::Envelope& reply) const;
+
+  DaemonConnection connection_;
+  Milliseconds frame_timeout_;
+  std::uint64_t last_id_ = 0;
+};
+
+}  // namespace atlas

@@ -1,0 +1,186 @@
+#include "client/drive/drive_ingest.h"
+
+#include <cmath>
+#include <set>
+
+#include "client/drive/drive_survey.h"
+#include "client/score/cpu_timer.h"
+#include "core/base/str_cat.h"
+#include "core/keyframe/keyframe_builder.h"
+#include "core/keyframe/keyframe_codec.h"
+#include "core/scan/deskew.h"
+#include "core/scan/scan_reader.h"
+
+namespace atlas {
+namespace {
+
+constexpr double kScanInterval_s = 0.1;  // where times.txt is missing
+constexpr double kMaxTime_s = 1e12;      // fits a message; the daemon knows what time it is
+
+// From one scan to the next, as the sensor moves; still when it has no neighbour before a jump.
+Pose MotionAt(const DriveFolder& drive, std::size_t index) {
+  const auto motion = [&drive](std::size_t from, std::size_t to) -> std::optional<Pose> {
+    const DriveScan& a = drive.scans[from];
+    const DriveScan& b = drive.scans[to];
+    const Pose T_a_b = a.T_world_sensor.inverse() * b.T_world_sensor;
+    const bool is_neighbour = b.number == a.number + 1;
+    if (!is_neighbour || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
+    return T_a_b;
+  };
+  std::optional<Pose> found;
+  if (index + 1 < drive.scans.size()) found = motion(index, index + 1);
+  if (!found && index > 0) found = motion(index - 1, index);
+  return found.value_or(Pose::Identity());
+}
+
+SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
+  SurveyOptions survey;
+  survey.rings = options.rings;
+  survey.sensor_height_m = options.sensor_height_m;
+  return survey;
+}
+
+class Ingest {
+ public:
+  Ingest(const DriveFolder& drive, const IngestOptions& options, AtlasClient& client)
+      : drive_(drive), options_(options), uploader_(client, options.upload) {}
+
+  Status Prepare(const MapProfile& profile) {
+    ATLAS_RETURN_IF_ERROR(options_.Validate());
+    ATLAS_RETURN_IF_ERROR(Select());
+    ATLAS_RETURN_IF_ERROR(CheckScans());
+    const Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
+    if (!survey) return survey.error();
+    KeyframeBuilderOptions builder_options;
+    builder_options.max_range_m = options_.max_range_m;
+    builder_options.sensor_height_m = survey->sensor_height_m;
+    builder_options.ring_step = survey->ring_step;
+    ATLAS_RETURN_IF_ERROR(builder_options.Validate(profile));
+    builder_.emplace(profile, survey->layout, builder_options);
+    report_.sensor_height_m = survey->sensor_height_m;
+    if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
+    return {};
+  }
+
+  Status Run(const std::function<void(std::size_t, std::size_t)>& progress) {
+    for (std::size_t i = 0; i < selected_.size(); ++i) {
+      const DriveScan& scan = drive_.scans[selected_[i].index];
+      if (const Status status = UploadOne(selected_[i], scan); !status.ok()) {
+        return FinishAfter(status);
+      }
+      if (progress) progress(i + 1, selected_.size());
+    }
+    return uploader_.Finish();
+  }
+
+  IngestReport Report() {
+    report_.totals = uploader_.totals();
+    return report_;
+  }
+
+ private:
+  Status Select() {
+    selected_ = SelectScans(drive_, options_.selection);
+    report_.keyframes = selected_.size();
+    report_.metres = SelectedMetres(drive_, selected_);
+    std::set<std::uint32_t> parts;
+    for (const SelectedScan& scan : selected_) {
+      parts.insert(scan.session_part);
+      ATLAS_RETURN_IF_ERROR(KeyOf(scan).Validate());  // "S.12" may be too long a name
+    }
+    report_.sessions = parts.size();
+    return {};
+  }
+
+  // Reads every scan once before the first is uploaded: a drive with a bad one leaves no trace.
+  Status CheckScans() const {
+    for (const SelectedScan& selected : selected_) {
+      const DriveScan& scan = drive_.scans[selected.index];
+      if (const auto cloud = ReadScan(scan.scan); !cloud) return cloud.error();
+      if (const auto time_ms = TimeOf(scan); !time_ms) return time_ms.error();
+    }
+    return {};
+  }
+
+  KeyframeKey KeyOf(const SelectedScan& selected) const {
+    return {{options_.session.vehicle,
+             SessionPartName(options_.session.session, selected.session_part)},
+            drive_.scans[selected.index].number};
+  }
+
+  Result<std::int64_t> TimeOf(const DriveScan& scan) const {
+    const double time_s = options_.start_s + scan.time_s.value_or(kScanInterval_s * scan.number);
+    if (!(time_s >= 0.0 && time_s <= kMaxTime_s)) {
+      return Error(StatusCode::kInvalidData,
+                   StrCat("scan ", scan.number, ": time ", time_s, " s: expected 0 or more"));
+    }
+    return std::llround(time_s * 1e3);
+  }
+
+  Status UploadOne(const SelectedScan& selected, const DriveScan& scan) {
+    Result<PointCloud> cloud = ReadScan(scan.scan);
+    if (!cloud) return cloud.error();
+    const Result<std::int64_t> time_ms = TimeOf(scan);
+    if (!time_ms) return time_ms.error();
+    const Bytes blob = BuildBlob(*cloud, selected.index);
+    KeyframeUpload upload;
+    upload.key = KeyOf(selected);
+    upload.time_ms = *time_ms;
+    upload.T_world_sensor = QuantizedPose::FromPose(scan.T_world_sensor);
+    upload.blob = blob;
+    return uploader_.Upload(upload);
+  }
+
+  Bytes BuildBlob(PointCloud& cloud, std::size_t index) {
+    const CpuTimer timer;
+    if (options_.is_deskewed) cloud = Deskew(cloud, MotionAt(drive_, index));
+    const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
+    Bytes blob = EncodeKeyframe(builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor));
+    report_.frontend_s += timer.elapsed_s();
+    return blob;
+  }
+
+  // What is in flight is waited for, so that it is either there or refused when this returns.
+  Status FinishAfter(const Status& failure) {
+    const Status finished = uploader_.Finish();
+    return finished.ok() || finished == failure
+               ? failure
+               : Status(failure.code(), failure.message() + "; and " + finished.message());
+  }
+
+  const DriveFolder& drive_;
+  const IngestOptions& options_;
+  KeyframeUploader uploader_;
+  std::optional<KeyframeBuilder> builder_;
+  std::vector<SelectedScan> selected_;
+  IngestReport report_;
+};
+
+}  // namespace
+
+Status IngestOptions::Validate() const {
+  ATLAS_RETURN_IF_ERROR(session.Validate());
+  ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  if (!(selection.every_m >= 0.0)) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("every ", selection.every_m, " m: expected 0 or more")};
+  }
+  if (upload.max_in_flight < 1) {
+    return {StatusCode::kInvalidArgument, "batch 0: expected at least one keyframe"};
+  }
+  return {};
+}
+
+Result<IngestReport> IngestDrive(const DriveFolder& drive,
+                                 const IngestOptions& options,
+                                 AtlasClient& client,
+                                 const std::function<void(std::size_t, std::size_t)>& progress) {
+  Ingest ingest(drive, options, client);
+  if (Status status = ingest.Prepare(client.profile()); !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = ingest.Run(progress); !status.ok()) return Error(std::move(status));
+  return ingest.Report();
+}
+
+}  // namespace atlas

@@ -1,0 +1,49 @@
+// A recorded drive into an atlas: survey, select, build keyframes, upload them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "client/connection/atlas_client.h"
+#include "client/connection/keyframe_uploader.h"
+#include "client/drive/drive_selection.h"
+#include "core/base/status.h"
+#include "core/scan/drive_folder.h"
+
+namespace atlas {
+
+struct IngestOptions {
+  SessionKey session;  // of the part before the first jump
+  SelectionOptions selection;
+  std::optional<std::uint32_t> rings;
+  double max_range_m = 20.0;
+  std::optional<double> sensor_height_m;
+  bool is_deskewed = false;
+  double start_s = 0.0;  // added to the scans' times
+  std::optional<std::uint64_t> shuffle_seed;
+  UploadOptions upload;
+
+  // kInvalidArgument naming the first option out of range, those aside that depend on the atlas.
+  Status Validate() const;
+};
+
+struct IngestReport {
+  std::uint64_t keyframes = 0;  // selected
+  UploadTotals totals;
+  double metres = 0.0;
+  double frontend_s = 0.0;  // CPU time from scan to blob
+  double sensor_height_m = 0.0;
+  std::uint64_t sessions = 0;
+};
+
+// `progress` (may be empty) is called with the number of keyframes sent. A scan that is bad is
+// named and nothing is uploaded. Fails at the first keyframe that the daemon refuses, naming it;
+// what was acknowledged until then stays.
+Result<IngestReport> IngestDrive(const DriveFolder& drive,
+                                 const IngestOptions& options,
+                                 AtlasClient& client,
+                                 const std::function<void(std::size_t, std::size_t)>& progress);
+
+}  // namespace atlas

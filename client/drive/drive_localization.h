@@ -1,0 +1,62 @@
+// A recorded drive localized in an atlas: by single shots from disturbed starts, or tracked from
+// its first pose. The drive's poses go to the scorer; the localizer is told what an IMU and the
+// start say, and nothing else.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <numbers>
+#include <optional>
+
+#include "client/drive/drive_selection.h"
+#include "client/map/map_view.h"
+#include "client/score/localization_score.h"
+#include "core/base/status.h"
+#include "core/localization/localizer.h"
+#include "core/scan/drive_folder.h"
+
+namespace atlas {
+
+struct DriveLocalizationOptions {
+  struct Shots {
+    double translation_m = 0.0;  // x and y of the start, uniform +-
+    double yaw_rad = 0.0;
+    std::uint32_t trials = 10;  // a scan
+  };
+
+  SelectionOptions selection;
+  std::optional<std::uint32_t> rings;
+  double max_range_m = 40.0;
+  std::optional<Shots> shots;  // tracking, if not given
+  std::uint64_t seed = 0;
+  double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;  // a cheap IMU's
+
+  // kInvalidArgument naming the first option out of range.
+  Status Validate() const;
+};
+
+struct LocalizedScan {
+  std::uint32_t scan = 0;
+  std::uint32_t trial = 0;
+  Pose T_world_sensor = Pose::Identity();
+  LocalizationHealth health = LocalizationHealth::kLost;
+  PoseError error;
+};
+
+struct DriveLocalizationReport {
+  LocalizationScore score;
+  std::uint64_t scans = 0;
+  std::uint64_t restarts = 0;  // after jumps
+  double cpu_s = 0.0;          // segmentation and tiles included
+
+  // Shots a CPU second.
+  double hz() const { return cpu_s > 0.0 ? static_cast<double>(score.shots()) / cpu_s : 0.0; }
+};
+
+Result<DriveLocalizationReport> LocalizeDrive(
+    const DriveFolder& drive,
+    const DriveLocalizationOptions& options,
+    MapView& view,
+    const std::function<void(const LocalizedScan&)>& on_scan);
+
+}  // namespace atlas

@@ -1,0 +1,209 @@
+// Arguments to commands to exit codes, with commands that only record what they were given.
+#include "client/cli/command_line/command_line.h"
+
+#include <sstream>
+
+#include <boost/json/parse.hpp>
+#include <gtest/gtest.h>
+
+namespace atlas {
+namespace {
+
+struct Recorded {
+  double x = 0.0;
+  double y = 0.0;
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  std::optional<double> height;
+  std::uint32_t level = 0;
+  std::string color = "red";
+  NumberRange range;
+  bool is_rebuild = false;
+  bool is_json = false;
+  Endpoint server;
+  int runs = 0;
+};
+
+class RecordingCommand : public Command {
+ public:
+  RecordingCommand(std::string name, Recorded& recorded, Status status)
+      : name_(std::move(name)), recorded_(recorded), status_(std::move(status)) {}
+
+  std::string Name() const override { return name_; }
+  std::string Summary() const override { return "Record"; }
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Required("X", "M", recorded_.x, "");
+    arguments.Required("Y", "M", recorded_.y, "");
+    arguments.Optional("--center", "X,Y", recorded_.center, "");
+    arguments.Optional("--from", "X,Y,Z", recorded_.from, "");
+    arguments.Optional("--height", "M", recorded_.height, "");
+    arguments.Optional("--level", "L", recorded_.level, "");
+    arguments.Optional("--range", "A:B", recorded_.range, "");
+    arguments.Choice("--color", {"red", "blue"}, recorded_.color, "");
+    arguments.Flag("--rebuild", recorded_.is_rebuild, "");
+  }
+  Status Run(CommandContext& context) override {
+    ++recorded_.runs;
+    recorded_.is_json = context.is_json;
+    recorded_.server = context.server;
+    return status_;
+  }
+
+ private:
+  std::string name_;
+  Recorded& recorded_;
+  Status status_;
+};
+
+struct Outcome {
+  ExitCode code = ExitCode::kFailure;
+  Recorded recorded;
+  std::string out;
+  std::string err;
+};
+
+Outcome RunWith(const std::vector<std::string>& arguments,
+                const Status& status = {},
+                std::optional<std::string> environment = std::nullopt) {
+  Outcome outcome;
+  std::vector<std::unique_ptr<Command>> commands;
+  commands.push_back(std::make_unique<RecordingCommand>("point", outcome.recorded, status));
+  Recorded other;
+  commands.push_back(std::make_unique<RecordingCommand>("poses apply", other, status));
+  std::ostringstream out;
+  std::ostringstream err;
+  outcome.code = RunCommandLine(arguments, commands, {out, err, false, std::move(environment)});
+  outcome.recorded.runs += other.runs;
+  outcome.out = out.str();
+  outcome.err = err.str();
+  return outcome;
+}
+
+TEST(CommandLineTest, NegativeNumbersArePositionals) {
+  const Outcome outcome = RunWith({"point", "-0.5", "-3"});
+  ASSERT_EQ(outcome.code, ExitCode::kSuccess) << outcome.err;
+  EXPECT_EQ(outcome.recorded.x, -0.5);
+  EXPECT_EQ(outcome.recorded.y, -3.0);
+}
+
+TEST(CommandLineTest, NegativeNumbersInEveryForm) {
+  const std::vector<std::pair<std::string, double>> forms = {{"-.5", -0.5},     {"-0", 0.0},
+                                                             {"-1e3", -1000.0}, {"-2.5e-1", -0.25},
+                                                             {"+4", 4.0},       {"-9.", -9.0}};
+  for (const auto& [text, value] : forms) {
+    const Outcome outcome = RunWith({"point", "0", text});
+    ASSERT_EQ(outcome.code, ExitCode::kSuccess) << text << ": " << outcome.err;
+    EXPECT_EQ(outcome.recorded.y, value) << text;
+  }
+}
+
+TEST(CommandLineTest, NegativeNumbersInLists) {
+  const Outcome outcome =
+      RunWith({"point", "0", "-3", "--center", "-3,-4", "--from=-1,2,-3", "--height", "-.25"});
+  ASSERT_EQ(outcome.code, ExitCode::kSuccess) << outcome.err;
+  EXPECT_EQ(outcome.recorded.center, Eigen::Vector2d(-3, -4));
+  EXPECT_EQ(outcome.recorded.from, Eigen::Vector3d(-1, 2, -3));
+  EXPECT_EQ(outcome.recorded.height, -0.25);
+  EXPECT_EQ(RunWith({"point", "0", "0", "--from", "-.1,2,-3"}).recorded.from,
+            Eigen::Vector3d(-0.1, 2, -3));
+}
+
+TEST(CommandLineTest, OptionsMayStandBetweenPositionals) {
+  const Outcome outcome = RunWith({"point", "--json", "-1", "--rebuild", "-2"});
+  ASSERT_EQ(outcome.code, ExitCode::kSuccess) << outcome.err;
+  EXPECT_EQ(outcome.recorded.y, -2.0);
+  EXPECT_TRUE(outcome.recorded.is_json);
+  EXPECT_TRUE(outcome.recorded.is_rebuild);
+}
+
+TEST(CommandLineTest, UsageErrorsAreTwo) {
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"nonsense"},
+      {"point"},
+      {"point", "1"},
+      {"point", "1", "2", "3"},
+      {"point", "1", "x"},
+      {"point", "1", "nan"},
+      {"point", "1", "2", "--bogus"},
+      {"point", "1", "2", "--center", "1"},
+      {"point", "1", "2", "--center", "1,2,3"},
+      {"point", "1", "2", "--center", "1,"},
+      {"point", "1", "2", "--level", "-1"},
+      {"point", "1", "2", "--level", "1.5"},
+      {"point", "1", "2", "--color", "green"},
+      {"point", "1", "2", "--range", "5"},
+      {"point", "1", "2", "--range", "5:2"},
+      {"point", "1", "2", "--server", "nowhere"},
+      {"point", "1", "2", "--server", "host:0"},
+      {"point", "1", "2", "--server", "host:70000"},
+      {"point", "1", "2", "--height", "--json"},
+      {"point", "1", "2", "--rebuild=often"},
+      {"point", "1", "2", "--json=0"},
+      {"poses"},
+  };
+  for (const auto& arguments : wrong) {
+    const Outcome outcome = RunWith(arguments);
+    EXPECT_EQ(outcome.code, ExitCode::kUsage) << testing::PrintToString(arguments);
+    EXPECT_EQ(outcome.recorded.runs, 0) << testing::PrintToString(arguments);
+    EXPECT_TRUE(outcome.out.empty());
+    EXPECT_FALSE(outcome.err.empty());
+  }
+}
+
+TEST(CommandLineTest, UsageErrorsAreJsonWhenAskedFor) {
+  const Outcome outcome = RunWith({"point", "--json"});
+  const auto error = boost::json::parse(outcome.err).at("error");
+  EXPECT_EQ(error.at("code").as_string(), "invalid_argument");
+  EXPECT_FALSE(error.at("message").as_string().empty());
+}
+
+TEST(CommandLineTest, UnknownCommandIsNamed) {
+  EXPECT_NE(RunWith({"nonsense"}).err.find("nonsense"), std::string::npos);
+}
+
+TEST(CommandLineTest, HelpAndVersionAreZeroOnStdout) {
+  for (const char* flag : {"--help", "--version"}) {
+    const Outcome outcome = RunWith({flag});
+    EXPECT_EQ(outcome.code, ExitCode::kSuccess);
+    EXPECT_FALSE(outcome.out.empty());
+    EXPECT_TRUE(outcome.err.empty());
+  }
+  EXPECT_NE(RunWith({"--help"}).out.find("point"), std::string::npos);
+  EXPECT_NE(RunWith({"point", "--help"}).out.find("--center"), std::string::npos);
+}
+
+TEST(CommandLineTest, EveryFailureHasItsExitCode) {
+  const std::vector<std::pair<StatusCode, int>> codes = {
+      {StatusCode::kInvalidArgument, 2},   {StatusCode::kInvalidData, 6},
+      {StatusCode::kNotFound, 3},          {StatusCode::kConflict, 4},
+      {StatusCode::kUnavailable, 5},       {StatusCode::kTimeout, 5},
+      {StatusCode::kResourceExhausted, 1}, {StatusCode::kUnsupported, 1},
+      {StatusCode::kPermissionDenied, 1},  {StatusCode::kInternal, 1}};
+  for (const auto& [code, exit] : codes) {
+    const Outcome outcome = RunWith({"point", "1", "2", "--json"}, {code, "what \"it\" was"});
+    EXPECT_EQ(static_cast<int>(outcome.code), exit) << StatusCodeName(code);
+    const auto error = boost::json::parse(outcome.err).at("error");
+    EXPECT_EQ(error.at("code").as_string(), StatusCodeName(code));
+    EXPECT_EQ(error.at("message").as_string(), "what \"it\" was");
+    EXPECT_TRUE(outcome.out.empty());
+  }
+}
+
+TEST(CommandLineTest, ServerComesFromFlagThenEnvironmentThenDefault) {
+  EXPECT_EQ(RunWith({"point", "1", "2"}).recorded.server, (Endpoint{"127.0.0.1", 7447}));
+  EXPECT_EQ(RunWith({"point", "1", "2"}, {}, "example:9").recorded.server,
+            (Endpoint{"example", 9}));
+  EXPECT_EQ(RunWith({"point", "1", "2", "--server", "[::1]:80"}, {}, "example:9").recorded.server,
+            (Endpoint{"::1", 80}));
+  EXPECT_EQ(RunWith({"--server", "a:1", "point", "1", "2"}, {}, "example:9").recorded.server,
+            (Endpoint{"a", 1}));
+  EXPECT_EQ(RunWith({"point", "1", "2"}, {}, "junk").code, ExitCode::kUsage);
+}
+
+TEST(CommandLineTest, CommandsOfTwoWords) {
+  EXPECT_EQ(RunWith({"poses", "apply", "1", "-2"}).recorded.runs, 1);
+}
+
+}  // namespace
+}  // namespace atlas

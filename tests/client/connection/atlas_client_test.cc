@@ -1,0 +1,186 @@
+// The client against peers that behave badly, and against one that behaves.
+#include "client/connection/atlas_client.h"
+
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert.h"
+#include "tests/client/support/test_peer.h"
+
+namespace atlas {
+namespace {
+
+StatusCode ConnectCode(std::function<void(PeerSocket&)> serve) {
+  TestPeer peer(std::move(serve));
+  const auto client = AtlasClient::Connect(peer.options());
+  return client ? StatusCode::kOk : client.error().code();
+}
+
+TEST(AtlasClientTest, NobodyListensIsUnavailable) {
+  Endpoint endpoint;
+  {
+    TestPeer peer([](PeerSocket&) {});
+    endpoint = peer.endpoint();
+  }
+  ConnectionOptions options;
+  options.endpoint = endpoint;
+  const auto client = AtlasClient::Connect(options);
+  ASSERT_FALSE(client);
+  EXPECT_EQ(client.error().code(), StatusCode::kUnavailable);
+  EXPECT_NE(client.error().message().find(endpoint.ToText()), std::string::npos);
+}
+
+TEST(AtlasClientTest, SilentPeerIsTimeout) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) { socket.Drain(); }), StatusCode::kTimeout);
+}
+
+TEST(AtlasClientTest, PeerThatClosesIsUnavailable) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) { socket.ReadRequest(); }),
+            StatusCode::kUnavailable);
+}
+
+TEST(AtlasClientTest, GarbageIsInvalidData) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) {
+              const std::string text = "HTTP/1.1 400 Bad Request\r\n\r\n";
+              socket.Write(BytesFromWire(text));
+              socket.Drain();
+            }),
+            StatusCode::kInvalidData);
+}
+
+TEST(AtlasClientTest, OversizedFrameIsRefusedWithoutReadingIt) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) {
+              ByteWriter header;
+              header.Raw(Bytes{'R', 'A', 'F', '1'});
+              header.U32(0xFFFFFFFF);
+              header.U32(0);
+              socket.Write(header.bytes());
+              socket.Drain();
+            }),
+            StatusCode::kResourceExhausted);
+}
+
+TEST(AtlasClientTest, HalfAFrameIsTimeout) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) {
+              socket.Write(Bytes{'R', 'A', 'F', '1', 9});
+              socket.Drain();
+            }),
+            StatusCode::kTimeout);
+}
+
+TEST(AtlasClientTest, AnotherMajorVersionIsUnsupported) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) {
+              wire::Envelope reply;
+              reply.mutable_hello_reply()->set_protocol_major(2);
+              socket.Reply(socket.ReadRequest()->request_id(), std::move(reply));
+            }),
+            StatusCode::kUnsupported);
+}
+
+TEST(AtlasClientTest, ReplyToARequestNeverSentIsInvalidData) {
+  EXPECT_EQ(ConnectCode([](PeerSocket& socket) {
+              socket.ReadRequest();
+              wire::Envelope reply;
+              reply.mutable_status_reply();
+              socket.Reply(77, std::move(reply));
+              socket.Drain();
+            }),
+            StatusCode::kInvalidData);
+}
+
+TEST(AtlasClientTest, DaemonsErrorKeepsItsCodeAndMessage) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    const auto request = socket.ReadRequest();
+    wire::Envelope reply;
+    *reply.mutable_error() = ErrorToWire({StatusCode::kConflict, "keyframe a/b/3 is another"});
+    socket.Reply(request->request_id(), std::move(reply));
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  EXPECT_EQ(client->profile(), MapProfile{});
+  EXPECT_EQ(client->atlas().revision, 7U);
+  const auto status = client->ReadStatus();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code(), StatusCode::kConflict);
+  EXPECT_EQ(status.error().message(), "keyframe a/b/3 is another");
+}
+
+TEST(AtlasClientTest, LinkFailureStays) {
+  TestPeer peer([](PeerSocket& socket) { AnswerHello(socket, {}); });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  ASSERT_FALSE(client->ReadStatus());
+  const auto again = client->ListSessions();
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code(), StatusCode::kUnavailable);
+}
+
+void SendTile(PeerSocket& socket, std::uint64_t request_id, const TileId& id) {
+  wire::Envelope reply;
+  reply.mutable_tile()->set_key(id.Key());
+  reply.mutable_tile()->set_blob("blob");
+  socket.Reply(request_id, std::move(reply));
+}
+
+TEST(AtlasClientTest, QueryGivenUpLeavesTheConnectionUsable) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    const auto query = socket.ReadRequest();
+    for (int x = 0; x < 3; ++x) {
+      SendTile(socket, query->request_id(), {0, x, -1});
+    }
+    wire::Envelope end;
+    end.mutable_query_end()->set_tiles(3);
+    socket.Reply(query->request_id(), std::move(end));
+    wire::Envelope status;
+    status.mutable_status_reply()->set_tiles(42);
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(status));
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  int tiles = 0;
+  const auto query = client->QueryRegion({}, [&tiles](const TileBlob& tile) {
+    EXPECT_EQ(tile.id, (TileId{0, 0, -1}));
+    ++tiles;
+    return Status(StatusCode::kInvalidData, "enough");
+  });
+  ASSERT_FALSE(query);
+  EXPECT_EQ(query.error().message(), "enough");
+  EXPECT_EQ(tiles, 1);
+  const auto status = client->ReadStatus();
+  ASSERT_TRUE(status) << status.error().message();
+  EXPECT_EQ(status->tiles, 42U);
+}
+
+TEST(AtlasClientTest, TileKeyThatNoTileHasIsInvalidData) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    const auto query = socket.ReadRequest();
+    wire::Envelope reply;
+    reply.mutable_tile()->set_key(~0ULL);
+    socket.Reply(query->request_id(), std::move(reply));
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  const auto query = client->QueryRegion({}, [](const TileBlob&) { return Status(); });
+  ASSERT_FALSE(query);
+  EXPECT_EQ(query.error().code(), StatusCode::kInvalidData);
+}
+
+TEST(AtlasClientTest, WaitThatTimesOutIsTimeout) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    wire::Envelope reply;
+    reply.mutable_wait_reply()->set_timed_out(true);
+    reply.mutable_wait_reply()->set_dirty_tiles(5);
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(reply));
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  const auto wait = client->WaitUntilFused(std::chrono::milliseconds(10));
+  ASSERT_FALSE(wait);
+  EXPECT_EQ(wait.error().code(), StatusCode::kTimeout);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,140 @@
+#include "client/connection/keyframe_uploader.h"
+
+#include <atomic>
+#include <deque>
+
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert.h"
+#include "tests/client/support/test_peer.h"
+
+namespace atlas {
+namespace {
+
+void Acknowledge(PeerSocket& socket, std::uint64_t id, bool is_duplicate) {
+  wire::Envelope reply;
+  reply.mutable_upload_reply()->set_duplicate(is_duplicate);
+  reply.mutable_upload_reply()->set_revision(id);
+  reply.mutable_upload_reply()->set_tiles_marked(2);
+  socket.Reply(id, std::move(reply));
+}
+
+KeyframeUpload Upload(std::uint32_t sequence, const Bytes& blob) {
+  KeyframeUpload upload;
+  upload.key = {{"car", "monday"}, sequence};
+  upload.blob = blob;
+  return upload;
+}
+
+TEST(KeyframeUploaderTest, KeepsTheWindowAndCountsEverything) {
+  constexpr std::size_t kWindow = 4;
+  constexpr std::uint32_t kUploads = 25;
+  std::atomic<std::size_t> most_pending{0};
+  TestPeer peer([&](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    std::deque<std::uint64_t> pending;
+    // Answers only when the window must be full, newest first: any order is allowed.
+    for (std::uint32_t i = 0; i < kUploads; ++i) {
+      pending.push_back(socket.ReadRequest()->request_id());
+      most_pending = std::max(most_pending.load(), pending.size());
+      if (pending.size() < kWindow) continue;
+      Acknowledge(socket, pending.back(), i % 5 == 0);
+      pending.pop_back();
+    }
+    for (const std::uint64_t id : pending) {
+      Acknowledge(socket, id, false);
+    }
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client, {.max_in_flight = kWindow});
+  const Bytes blob(1000, 1);
+  for (std::uint32_t i = 0; i < kUploads; ++i) {
+    const Status status = uploader.Upload(Upload(i, blob));
+    ASSERT_TRUE(status.ok()) << status.message();
+  }
+  ASSERT_TRUE(uploader.Finish().ok());
+  EXPECT_EQ(uploader.totals().sent, kUploads);
+  EXPECT_EQ(uploader.totals().acked, kUploads);
+  EXPECT_EQ(uploader.totals().duplicates, 4U);
+  EXPECT_EQ(uploader.totals().tiles_marked, 2U * kUploads);
+  EXPECT_GT(uploader.totals().bytes_sent, 1000U * kUploads);
+  EXPECT_EQ(most_pending, kWindow);
+}
+
+TEST(KeyframeUploaderTest, BytesBoundTheWindowToo) {
+  TestPeer peer([&](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    while (const auto request = socket.ReadRequest()) {
+      Acknowledge(socket, request->request_id(), false);
+    }
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client, {.max_in_flight = 64, .max_in_flight_bytes = 1500});
+  const Bytes blob(1000, 1);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    ASSERT_TRUE(uploader.Upload(Upload(i, blob)).ok());
+    EXPECT_GE(uploader.totals().acked + 1, uploader.totals().sent);
+  }
+  EXPECT_TRUE(uploader.Finish().ok());
+}
+
+TEST(KeyframeUploaderTest, RefusalNamesItsKeyframeAndTheOthersAreCounted) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    for (int i = 0; i < 3; ++i) {
+      const auto request = socket.ReadRequest();
+      if (request->upload_keyframe().key().sequence() != 1) {
+        Acknowledge(socket, request->request_id(), false);
+        continue;
+      }
+      wire::Envelope reply;
+      *reply.mutable_error() = ErrorToWire({StatusCode::kConflict, "other content"});
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    ASSERT_TRUE(uploader.Upload(Upload(i, Bytes(10))).ok());
+  }
+  const Status status = uploader.Finish();
+  EXPECT_EQ(status.code(), StatusCode::kConflict);
+  EXPECT_NE(status.message().find("car/monday/1"), std::string::npos) << status.message();
+  EXPECT_EQ(uploader.totals().acked, 2U);
+}
+
+TEST(KeyframeUploaderTest, RefusalThatNamesItsKeyframeIsNotNamedTwice) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    wire::Envelope reply;
+    *reply.mutable_error() =
+        ErrorToWire({StatusCode::kInvalidData, "keyframe car/monday/0: of another profile"});
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(reply));
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client);
+  ASSERT_TRUE(uploader.Upload(Upload(0, Bytes(10))).ok());
+  EXPECT_EQ(uploader.Finish().message(), "keyframe car/monday/0: of another profile");
+}
+
+TEST(KeyframeUploaderTest, LostConnectionIsNotAnAcknowledgement) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    Acknowledge(socket, socket.ReadRequest()->request_id(), false);
+    socket.ReadRequest();
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client);
+  ASSERT_TRUE(uploader.Upload(Upload(0, Bytes(10))).ok());
+  ASSERT_TRUE(uploader.Upload(Upload(1, Bytes(10))).ok());
+  EXPECT_EQ(uploader.Finish().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(uploader.totals().acked, 1U);
+}
+
+}  // namespace
+}  // namespace atlas
