@@ -85,6 +85,7 @@ AtlasStatus StatusFromWire(const wire::StatusReply& reply) {
   status.sessions = reply.sessions();
   status.tiles = reply.tiles();
   status.dirty_tiles = reply.dirty_tiles();
+  status.damaged_tiles = reply.damaged_tiles();
   status.store_bytes = reply.store_bytes();
   status.tile_bytes = reply.tile_bytes();
   status.keyframe_bytes = reply.keyframe_bytes();

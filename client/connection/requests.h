@@ -75,6 +75,7 @@ struct AtlasStatus {
   std::uint64_t sessions = 0;
   std::uint64_t tiles = 0;
   std::uint64_t dirty_tiles = 0;
+  std::uint64_t damaged_tiles = 0;  // of the dirty ones
   std::uint64_t store_bytes = 0;
   std::uint64_t tile_bytes = 0;
   std::uint64_t keyframe_bytes = 0;

@@ -16,7 +16,7 @@ namespace atlas {
 inline constexpr std::size_t kFrameHeaderBytes = 12;
 inline constexpr std::uint32_t kMaxFrameBytes = 48u << 20;  // payload
 inline constexpr std::uint32_t kProtocolMajor = 1;
-inline constexpr std::uint32_t kProtocolMinor = 0;
+inline constexpr std::uint32_t kProtocolMinor = 1;
 
 // The 12 bytes that go before `payload`.
 Bytes EncodeFrameHeader(ByteSpan payload);
@@ -39,9 +39,13 @@ class FrameDecoder {
  public:
   explicit FrameDecoder(std::uint32_t max_payload_bytes = kMaxFrameBytes);
 
+  // For the frames that Next() has not looked at yet.
+  void set_max_payload_bytes(std::uint32_t bytes) { max_payload_bytes_ = bytes; }
   void Push(ByteSpan bytes);
   // The next whole payload, nullopt if more bytes are needed. An error is final.
   Result<std::optional<Bytes>> Next();
+  // Bytes have come that Next() did not hand out.
+  bool has_part_of_a_frame() const { return buffer_.size() > consumed_; }
 
  private:
   Result<std::optional<Bytes>> TakeFrame();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <system_error>
 
 #include <toml++/toml.h>
 
@@ -11,31 +12,38 @@
 namespace atlas {
 namespace {
 
-constexpr std::array<std::string_view, 9> kKeys = {
-    "listen",    "data",          "workers",      "cache_mib",
-    "log_level", "map.cell_size", "map.segments", "map.segment_height",
-    "map.preset"};
+struct Key {
+  std::string_view name;
+  bool is_number;  // else a text
+};
 
-using Settings = std::map<std::string, std::string>;
+constexpr std::array<Key, 9> kKeys = {{{"listen", false},
+                                       {"data", false},
+                                       {"workers", true},
+                                       {"cache_mib", true},
+                                       {"log_level", false},
+                                       {"map.cell_size", true},
+                                       {"map.segments", true},
+                                       {"map.segment_height", true},
+                                       {"map.preset", false}}};
 
-Status BadLine(const std::filesystem::path& path,
-               const toml::source_region& where,
-               const std::string& what) {
-  return Status(StatusCode::kInvalidArgument,
-                StrCat(path.string(), ": line ", where.begin.line, ": ", what));
+using Settings = std::map<std::string, GivenSetting>;
+
+std::string Origin(const std::filesystem::path& path, const toml::source_region& where) {
+  return StrCat(path.string(), ": line ", where.begin.line);
 }
 
-Result<std::string> TextOf(const toml::node& node) {
-  if (const auto* text = node.as_string()) {
+Result<std::string> TextOf(const toml::node& node, bool is_number) {
+  if (const auto* text = node.as_string(); text != nullptr && !is_number) {
     return text->get();
   }
-  if (const auto* number = node.as_integer()) {
+  if (const auto* number = node.as_integer(); number != nullptr && is_number) {
     return StrCat(number->get());
   }
-  if (const auto* number = node.as_floating_point()) {
+  if (const auto* number = node.as_floating_point(); number != nullptr && is_number) {
     return StrCat(number->get());
   }
-  return Error(StatusCode::kInvalidArgument, "expected a text or a number");
+  return Error(StatusCode::kInvalidArgument, is_number ? "expected a number" : "expected a text");
 }
 
 Status Flatten(const std::filesystem::path& path,
@@ -44,19 +52,22 @@ Status Flatten(const std::filesystem::path& path,
                Settings& settings) {
   for (const auto& [name, node] : table) {
     const std::string key = prefix + std::string(name.str());
+    const std::string origin = Origin(path, node.source());
     const auto* inner = node.as_table();
     if (inner != nullptr && key == "map") {
       ATLAS_RETURN_IF_ERROR(Flatten(path, *inner, key + ".", settings));
       continue;
     }
-    if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
-      return BadLine(path, node.source(), StrCat("unknown key '", key, "'"));
+    const auto* const known =
+        std::find_if(kKeys.begin(), kKeys.end(), [&key](const Key& k) { return k.name == key; });
+    if (known == kKeys.end()) {
+      return Status(StatusCode::kInvalidArgument, StrCat(origin, ": unknown key '", key, "'"));
     }
-    const Result<std::string> text = TextOf(node);
+    const Result<std::string> text = TextOf(node, known->is_number);
     if (!text) {
-      return BadLine(path, node.source(), StrCat("'", key, "': ", text.error().message()));
+      return text.error().WithContext(StrCat(origin, ": '", key, "'"));
     }
-    settings[key] = *text;
+    settings[key] = {*text, origin};
   }
   return {};
 }
@@ -64,6 +75,10 @@ Status Flatten(const std::filesystem::path& path,
 }  // namespace
 
 Result<Settings> ReadConfigFile(const std::filesystem::path& path) {
+  std::error_code ignored;  // what cannot be looked at cannot be read either
+  if (!std::filesystem::exists(path, ignored)) {
+    return Error(StatusCode::kNotFound, StrCat("there is no file ", path.string()));
+  }
   Settings settings;
   try {
     const toml::table table = toml::parse_file(path.string());
@@ -71,7 +86,8 @@ Result<Settings> ReadConfigFile(const std::filesystem::path& path) {
       return Error(std::move(status));
     }
   } catch (const toml::parse_error& error) {
-    return Error(BadLine(path, error.source(), std::string(error.description())));
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat(Origin(path, error.source()), ": ", error.description()));
   }
   return settings;
 }

@@ -1,4 +1,4 @@
-// The daemon's TOML file as flat settings, unknown keys refused.
+// The daemon's TOML file as flat settings: unknown keys and values of another type are refused.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,14 @@
 
 namespace atlas {
 
-// Keys "listen", "data", "workers", "cache_mib", "log_level", "map.cell_size", "map.segments",
-// "map.segment_height", "map.preset" and their values as text. kInvalidArgument names file and
-// line.
-Result<std::map<std::string, std::string>> ReadConfigFile(const std::filesystem::path& path);
+// A value as text, and where it was given, for messages.
+struct GivenSetting {
+  std::string text;
+  std::string origin;  // "atlasd.toml: line 3", "ATLASD_WORKERS", "--workers"
+};
+
+// By key: "listen", "data", "workers", "cache_mib", "log_level", "map.cell_size", "map.segments",
+// "map.segment_height", "map.preset". kInvalidArgument names file and line, kNotFound the file.
+Result<std::map<std::string, GivenSetting>> ReadConfigFile(const std::filesystem::path& path);
 
 }  // namespace atlas

@@ -38,7 +38,7 @@ constexpr Setting kSettings[] = {
     {"map.preset", "--preset", "ATLASD_PRESET", "new atlas: fusion preset: strict (strict)"},
 };
 
-using Settings = std::map<std::string, std::string>;
+using Settings = std::map<std::string, GivenSetting>;
 
 Status BadValue(const std::string& key, const std::string& text, const char* expected) {
   return Status(StatusCode::kInvalidArgument, StrCat(key, " is '", text, "', expected ", expected));
@@ -147,11 +147,11 @@ Result<Settings> Collect(const Settings& flags, const std::string& file) {
   }
   for (const Setting& setting : kSettings) {
     if (const char* value = std::getenv(setting.environment); value != nullptr) {
-      settings[setting.key] = value;
+      settings[setting.key] = {value, setting.environment};
     }
   }
-  for (const auto& [key, value] : flags) {
-    settings[key] = value;
+  for (const auto& [key, given] : flags) {
+    settings[key] = given;
   }
   return settings;
 }
@@ -212,7 +212,10 @@ Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
   app.add_option("--config", file, "TOML file with these settings");
   for (const Setting& setting : kSettings) {
     app.add_option_function<std::string>(
-        setting.flag, [&flags, key = setting.key](const std::string& value) { flags[key] = value; },
+        setting.flag,
+        [&flags, &setting](const std::string& value) {
+          flags[setting.key] = {value, setting.flag};
+        },
         setting.help);
   }
   DaemonCommand command;
@@ -231,9 +234,9 @@ Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
   if (!settings) {
     return Error(settings.error());
   }
-  for (const auto& [key, value] : *settings) {
-    if (Status status = Apply(key, value, command.config); !status.ok()) {
-      return Error(std::move(status));
+  for (const auto& [key, given] : *settings) {
+    if (Status status = Apply(key, given.text, command.config); !status.ok()) {
+      return Error(status.WithContext(given.origin));
     }
   }
   if (command.config.data.empty()) {

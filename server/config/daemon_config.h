@@ -38,8 +38,9 @@ struct DaemonCommand {
   std::optional<std::string> text;  // of --help or --version
 };
 
-// kInvalidArgument on unknown flags, keys (with file and line) and values, and on an address that
-// is not loopback.
+// kInvalidArgument on unknown flags and keys, on values (named with their flag, variable, or file
+// and line), and on an address that is not loopback; kNotFound on a configuration file that is not
+// there.
 Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv);
 
 }  // namespace atlas

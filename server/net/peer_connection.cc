@@ -4,6 +4,7 @@
 #include <exception>
 #include <utility>
 
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -11,6 +12,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
+#include "server/net/watchdog.h"
 
 namespace atlas {
 namespace {
@@ -53,48 +55,55 @@ class Completion {
 
 PeerConnection::PeerConnection(asio::ip::tcp::socket socket,
                                RequestHandler& handler,
+                               ByteBudget& budget,
                                const NetOptions& options)
     : socket_(std::move(socket)),
       handler_(handler),
+      budget_(budget),
       options_(options),
       peer_(PeerName(socket_)),
       writer_(socket_, options_),
-      decoder_(options.max_frame_bytes),
+      decoder_(options.max_hello_bytes),
       deadline_(socket_.get_executor()),
       changed_(socket_.get_executor(), asio::steady_timer::time_point::max()) {}
 
 void PeerConnection::Start() {
   deadline_.expires_after(options_.handshake);
   const auto self = shared_from_this();
-  asio::co_spawn(socket_.get_executor(), writer_.Run(), Completion(self, "writing"));
+  asio::co_spawn(socket_.get_executor(), Write(), Completion(self, "writing"));
   asio::co_spawn(socket_.get_executor(), WatchDeadline(), Completion(self, "the deadline"));
   asio::co_spawn(socket_.get_executor(), Read(), Completion(self, "reading"));
 }
 
 void PeerConnection::Drain() {
   is_draining_ = true;
-  error_code ignored;  // already closed
-  socket_.cancel(ignored);
-  changed_.cancel();
-  Finish();
+  stop_reading_.emit(asio::cancellation_type::terminal);
 }
 
 asio::awaitable<void> PeerConnection::Read() {
-  bool is_greeted = false;
+  Status broken = co_await ReadRequests();
+  if (!broken.ok()) {
+    spdlog::warn("{}: {}", peer_, broken.message());
+    is_refused_ = true;
+    co_await writer_.SendError(0, std::move(broken));
+  }
+  is_reading_ = false;
+  writer_.NotePeerLeft();
+  Finish();
+}
+
+asio::awaitable<Status> PeerConnection::ReadRequests() {
   while (!is_draining_ && !writer_.is_closed()) {
-    Result<std::optional<wire::Envelope>> request = co_await NextRequest();
+    MaybeRequest request = co_await NextRequest();
     if (!request) {
-      spdlog::warn("{}: {}", peer_, request.error().message());
-      co_await writer_.SendError(0, request.error());
-      break;
+      co_return request.error();
     }
     if (!*request) {
-      break;
+      co_return Status();
     }
-    if (!is_greeted) {
-      is_greeted = co_await handler_.Greet(std::move(**request), writer_);
-      if (!is_greeted) {
-        break;
+    if (!is_greeted_) {
+      if (!co_await Greet(std::move(**request))) {
+        co_return Status();
       }
       continue;
     }
@@ -104,47 +113,81 @@ asio::awaitable<void> PeerConnection::Read() {
                    Completion(shared_from_this(), "a request"));
     co_await WaitForRoom();
   }
-  is_reading_ = false;
-  Finish();
+  co_return Status();
 }
 
-asio::awaitable<Result<std::optional<wire::Envelope>>> PeerConnection::NextRequest() {
+asio::awaitable<bool> PeerConnection::Greet(wire::Envelope hello) {
+  is_greeted_ = co_await handler_.Greet(std::move(hello), writer_);
+  is_refused_ = !is_greeted_;
+  Release(frame_bytes_);
+  decoder_.set_max_payload_bytes(options_.max_frame_bytes);
+  ExpectFrame(false);
+  co_return is_greeted_;
+}
+
+asio::awaitable<PeerConnection::MaybeRequest> PeerConnection::NextRequest() {
   std::array<std::uint8_t, kReadBytes> chunk;  // NOLINT(cppcoreguidelines-pro-type-member-init)
-  bool is_mid_frame = false;
   while (true) {
-    Result<std::optional<Bytes>> payload = decoder_.Next();
-    if (!payload) {
-      co_return Error(payload.error());
+    MaybeRequest request = TakeRequest();
+    if (!request || *request) {
+      ExpectFrame(false);
+      co_return request;
     }
-    if (*payload) {
-      frame_bytes_ = (*payload)->size();
-      deadline_.expires_after(options_.idle);
-      Result<wire::Envelope> envelope = ParseEnvelope(**payload);
-      if (!envelope) {
-        co_return Error(envelope.error());
-      }
-      co_return std::optional<wire::Envelope>(std::move(*envelope));
+    if (!is_mid_frame_ && decoder_.has_part_of_a_frame()) {
+      ExpectFrame(true);
     }
     error_code error;
     const std::size_t size = co_await socket_.async_read_some(
-        asio::buffer(chunk), asio::redirect_error(asio::use_awaitable, error));
-    if (error) {
+        asio::buffer(chunk),
+        asio::bind_cancellation_slot(stop_reading_.slot(),
+                                     asio::redirect_error(asio::use_awaitable, error)));
+    if (error || is_draining_) {
       co_return std::optional<wire::Envelope>();
     }
-    if (!is_mid_frame) {
-      is_mid_frame = true;
-      deadline_.expires_after(options_.frame);
+    if (Status status = Hold(size); !status.ok()) {
+      co_return Error(std::move(status));
     }
     decoder_.Push(ByteSpan(chunk).first(size));
   }
+}
+
+// nullopt: more bytes are needed.
+PeerConnection::MaybeRequest PeerConnection::TakeRequest() {
+  const Result<std::optional<Bytes>> payload = decoder_.Next();
+  if (!payload) {
+    return Error(payload.error());
+  }
+  if (!*payload) {
+    return std::nullopt;
+  }
+  frame_bytes_ = kFrameHeaderBytes + (*payload)->size();
+  Result<wire::Envelope> envelope = ParseEnvelope(**payload);
+  if (!envelope) {
+    return Error(envelope.error());
+  }
+  return std::optional<wire::Envelope>(std::move(*envelope));
 }
 
 asio::awaitable<void> PeerConnection::Serve(wire::Envelope request, std::size_t bytes) {
   co_await handler_.Handle(std::move(request), writer_);
   requests_ -= 1;
   request_bytes_ -= bytes;
+  Release(bytes);
   changed_.cancel();
+  if (requests_ == 0 && !is_mid_frame_) {
+    ExpectFrame(false);
+  }
   Finish();
+}
+
+asio::awaitable<void> PeerConnection::Write() {
+  co_await writer_.Run();
+  error_code gone;
+  if (is_refused_ || socket_.available(gone) > 0) {
+    co_await Linger();
+  }
+  writer_.CloseNow();
+  deadline_.cancel();
 }
 
 asio::awaitable<void> PeerConnection::WaitForRoom() {
@@ -153,26 +196,64 @@ asio::awaitable<void> PeerConnection::WaitForRoom() {
     error_code ignored;  // woken by cancelling
     co_await changed_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
   }
-  deadline_.expires_after(options_.idle);
+}
+
+asio::awaitable<void> PeerConnection::Linger() {
+  error_code error;
+  socket_.shutdown(asio::ip::tcp::socket::shutdown_send, error);
+  const Watchdog limit(socket_.get_executor(), is_refused_ ? options_.linger : options_.drain,
+                       [this] { CloseNow(); });
+  std::array<std::uint8_t, kReadBytes> dropped;  // NOLINT(cppcoreguidelines-pro-type-member-init)
+  while (!error) {
+    co_await socket_.async_read_some(asio::buffer(dropped),
+                                     asio::redirect_error(asio::use_awaitable, error));
+  }
 }
 
 asio::awaitable<void> PeerConnection::WatchDeadline() {
   while (!writer_.is_closed()) {
-    error_code cancelled;  // the deadline moved, or the connection is done
-    co_await deadline_.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
-    if (!cancelled && requests_ == 0 && deadline_.expiry() <= Clock::now()) {
-      spdlog::warn("{}: nothing came in time", peer_);
+    error_code moved;  // or the connection is done
+    co_await deadline_.async_wait(asio::redirect_error(asio::use_awaitable, moved));
+    if (moved || writer_.is_closed()) {
+      continue;
+    }
+    if (is_reading_ && (requests_ == 0 || is_mid_frame_)) {
+      spdlog::warn(
+          "{}: {}", peer_,
+          is_mid_frame_ ? "the rest of a frame did not come in time" : "nothing came in time");
       writer_.CloseNow();
-    } else if (!cancelled) {
+    } else {
       deadline_.expires_after(options_.idle);
     }
+  }
+}
+
+Status PeerConnection::Hold(std::size_t bytes) {
+  if (!budget_.Take(bytes)) {
+    return Status(StatusCode::kResourceExhausted,
+                  StrCat("the daemon holds ", options_.max_held_bytes,
+                         " bytes of requests already; try again later"));
+  }
+  held_bytes_ += bytes;
+  return {};
+}
+
+void PeerConnection::Release(std::size_t bytes) {
+  budget_.GiveBack(bytes);
+  held_bytes_ -= bytes;
+}
+
+// Starts the clock of the next frame, or of the rest of one. The Hello's runs from the start.
+void PeerConnection::ExpectFrame(bool is_mid_frame) {
+  is_mid_frame_ = is_mid_frame;
+  if (is_greeted_) {
+    deadline_.expires_after(is_mid_frame ? options_.frame : options_.idle);
   }
 }
 
 void PeerConnection::Finish() {
   if (!is_reading_ && requests_ == 0) {
     writer_.CloseWhenEmpty();
-    deadline_.cancel();
   }
 }
 

@@ -7,6 +7,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "proto/wire/convert.h"
+#include "server/net/watchdog.h"
 
 namespace atlas {
 namespace {
@@ -64,13 +65,7 @@ asio::awaitable<void> ReplyWriter::Run() {
     const Bytes frame = std::move(queue_.front());
     queue_.pop_front();
     for (std::size_t sent = 0; sent < frame.size() && !is_closed_;) {
-      asio::steady_timer stall(socket_.get_executor(), options_.write_stall);
-      // The timer's handler outlives neither: it is cancelled when `stall` goes.
-      stall.async_wait([this](error_code reason) {
-        if (!reason) {
-          CloseNow();
-        }
-      });
+      const Watchdog stall(socket_.get_executor(), options_.write_stall, [this] { CloseNow(); });
       sent +=
           co_await socket_.async_write_some(asio::buffer(frame.data() + sent, frame.size() - sent),
                                             asio::redirect_error(asio::use_awaitable, error));
@@ -81,7 +76,6 @@ asio::awaitable<void> ReplyWriter::Run() {
     queued_bytes_ -= frame.size();
     Wake();
   }
-  CloseNow();
 }
 
 void ReplyWriter::CloseWhenEmpty() {
@@ -94,6 +88,7 @@ void ReplyWriter::CloseNow() {
     return;
   }
   is_closed_ = true;
+  NotePeerLeft();
   error_code ignored;  // a peer that is gone already
   socket_.shutdown(asio::ip::tcp::socket::shutdown_both, ignored);
   socket_.close(ignored);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <stop_token>
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -26,12 +27,16 @@ class ReplyWriter {
   boost::asio::awaitable<bool> Send(wire::Envelope envelope);
   boost::asio::awaitable<bool> SendError(std::uint64_t request_id, Status status);
 
-  // Writes until Close(); the one coroutine that writes to the socket.
+  // The one coroutine that writes to the socket. Returns after CloseWhenEmpty() when everything
+  // queued has left, and when the connection is closed.
   boost::asio::awaitable<void> Run();
-  // After what is queued now has left, Run() returns.
   void CloseWhenEmpty();
   void CloseNow();
   bool is_closed() const { return is_closed_; }
+
+  // The peer sends no more or is gone: what only waits on its behalf ends.
+  void NotePeerLeft() { peer_left_.request_stop(); }
+  std::stop_token peer_left() const { return peer_left_.get_token(); }
 
  private:
   void Wake();
@@ -43,6 +48,7 @@ class ReplyWriter {
   std::size_t queued_bytes_ = 0;
   bool is_finishing_ = false;
   bool is_closed_ = false;
+  std::stop_source peer_left_;
 };
 
 }  // namespace atlas

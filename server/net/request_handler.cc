@@ -1,142 +1,20 @@
 #include "server/net/request_handler.h"
 
-#include <algorithm>
 #include <memory>
-#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
+#include "server/net/atlas_wait.h"
 #include "server/net/on_pool.h"
 #include "server/net/region_reply.h"
+#include "server/net/request_conversion.h"
 
 namespace atlas {
 namespace {
 
 namespace asio = boost::asio;
-
-constexpr std::chrono::milliseconds kDefaultTimeout{60'000};
-constexpr std::chrono::milliseconds kLongestTimeout{3'600'000};
-
-std::chrono::milliseconds Timeout(std::uint32_t timeout_ms) {
-  const std::chrono::milliseconds asked{timeout_ms};
-  return timeout_ms == 0 ? kDefaultTimeout : std::min(asked, kLongestTimeout);
-}
-
-// Pauses between two looks at what is still dirty.
-class Pauses {
- public:
-  Pauses(asio::any_io_executor executor, std::chrono::milliseconds timeout)
-      : timer_(std::move(executor)), deadline_(std::chrono::steady_clock::now() + timeout) {}
-
-  bool is_over() const { return std::chrono::steady_clock::now() >= deadline_; }
-  asio::awaitable<void> Next() {
-    timer_.expires_after(pause_);
-    pause_ = std::min(2 * pause_, kLongest);
-    co_await timer_.async_wait(asio::use_awaitable);
-  }
-
- private:
-  static constexpr std::chrono::milliseconds kLongest{100};
-
-  asio::steady_timer timer_;
-  std::chrono::steady_clock::time_point deadline_;
-  std::chrono::milliseconds pause_{2};
-};
-
-wire::Envelope ReplyTo(const wire::Envelope& request) {
-  wire::Envelope reply;
-  reply.set_request_id(request.request_id());
-  return reply;
-}
-
-std::optional<PositionPrior> PriorFromWire(const wire::UploadKeyframe& upload) {
-  if (!upload.has_prior()) {
-    return std::nullopt;
-  }
-  const wire::PositionPrior& prior = upload.prior();
-  return PositionPrior{prior.x_um(), prior.y_um(), prior.z_um(), prior.radius_mm()};
-}
-
-Result<UploadRequest> UploadFromWire(const wire::UploadKeyframe& upload) {
-  Result<KeyframeKey> key = KeyFromWire(upload.key());
-  if (!key) {
-    return Error(key.error());
-  }
-  Result<QuantizedPose> pose = PoseFromWire(upload.pose());
-  if (!pose) {
-    return Error(pose.error().WithContext(StrCat("keyframe ", *key)));
-  }
-  const ByteSpan blob = BytesFromWire(upload.blob());
-  return UploadRequest{std::move(*key), upload.time_ms(), *pose, PriorFromWire(upload),
-                       Bytes(blob.begin(), blob.end())};
-}
-
-Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message) {
-  PoseBatchRequest request;
-  request.author = message.author();
-  request.if_revision = message.if_revision();
-  request.updates.reserve(static_cast<std::size_t>(message.updates_size()));
-  for (const wire::PoseUpdate& update : message.updates()) {
-    Result<KeyframeKey> key = KeyFromWire(update.key());
-    if (!key) {
-      return Error(key.error());
-    }
-    Result<QuantizedPose> pose = PoseFromWire(update.pose());
-    if (!pose) {
-      return Error(pose.error().WithContext(StrCat("keyframe ", *key)));
-    }
-    request.updates.push_back({std::move(*key), *pose});
-  }
-  return request;
-}
-
-std::string StateName(SessionState state) {
-  switch (state) {
-    case SessionState::kStaged:
-      return "staged";
-    case SessionState::kLive:
-      return "live";
-    case SessionState::kQuarantined:
-      return "quarantined";
-    case SessionState::kRetracted:
-      return "retracted";
-  }
-  return "unknown";
-}
-
-void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
-  out.set_vehicle(record.key.vehicle);
-  out.set_session(record.key.session);
-  out.set_state(StateName(record.state));
-  out.set_keyframes(record.keyframes);
-  out.set_bytes(record.bytes);
-  out.set_first_time_ms(record.first_time_ms);
-  out.set_last_time_ms(record.last_time_ms);
-  out.set_last_sequence(record.last_sequence);
-}
-
-Status CheckHello(const wire::Envelope& request, const MapProfile& profile) {
-  if (!request.has_hello()) {
-    return Status(StatusCode::kInvalidData, "the first frame must be a Hello");
-  }
-  const wire::Hello& hello = request.hello();
-  if (hello.protocol_major() != kProtocolMajor) {
-    return Status(StatusCode::kUnsupported,
-                  StrCat("protocol version ", hello.protocol_major(), ".", hello.protocol_minor(),
-                         ": this daemon speaks ", kProtocolMajor, ".", kProtocolMinor));
-  }
-  if (!hello.profile().empty()) {
-    const Result<MapProfile> expected = ProfileFromWire(hello.profile());
-    if (!expected) {
-      return expected.error();
-    }
-    if (*expected != profile) {
-      return Status(StatusCode::kInvalidData, "this atlas has another map profile");
-    }
-  }
-  return {};
-}
 
 }  // namespace
 
@@ -207,21 +85,16 @@ asio::awaitable<Status> RequestHandler::Upload(const Envelope& request, ReplyWri
   if (!upload) {
     co_return upload.error();
   }
-  const auto done =
-      std::make_shared<OneShot<PutKeyframeResult>>(co_await asio::this_coro::executor);
-  asio::post(pool_, [this, done, upload = std::move(*upload)]() mutable {
-    service_.Upload(std::move(upload),
-                    [done](Result<PutKeyframeResult> result) { done->Set(std::move(result)); });
-  });
-  const Result<PutKeyframeResult> result = co_await done->Take();
+  const auto owned = std::make_shared<UploadRequest>(std::move(*upload));
+  Starting<PutKeyframeResult> start = [this, owned](auto done) {
+    service_.Upload(std::move(*owned), std::move(done));
+  };
+  const Result<PutKeyframeResult> result = co_await StartOnPool(pool_, std::move(start));
   if (!result) {
     co_return result.error();
   }
   Envelope reply = ReplyTo(request);
-  wire::UploadReply& message = *reply.mutable_upload_reply();
-  message.set_duplicate(result->is_duplicate);
-  message.set_revision(result->revision);
-  message.set_tiles_marked(result->tiles_marked);
+  UploadToWire(*result, *reply.mutable_upload_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }
@@ -231,21 +104,16 @@ asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, Rep
   if (!update) {
     co_return update.error();
   }
-  const auto done = std::make_shared<OneShot<PoseBatchResult>>(co_await asio::this_coro::executor);
-  asio::post(pool_, [this, done, update = std::move(*update)]() mutable {
-    service_.UpdatePoses(std::move(update),
-                         [done](Result<PoseBatchResult> result) { done->Set(std::move(result)); });
-  });
-  const Result<PoseBatchResult> result = co_await done->Take();
+  const auto owned = std::make_shared<PoseBatchRequest>(std::move(*update));
+  Starting<PoseBatchResult> start = [this, owned](auto done) {
+    service_.UpdatePoses(std::move(*owned), std::move(done));
+  };
+  const Result<PoseBatchResult> result = co_await StartOnPool(pool_, std::move(start));
   if (!result) {
     co_return result.error();
   }
   Envelope reply = ReplyTo(request);
-  wire::UpdatePosesReply& message = *reply.mutable_update_poses_reply();
-  message.set_updated(result->updated);
-  message.set_tiles_marked(result->tiles_marked);
-  message.set_revision(result->revision);
-  message.set_batch(result->batch);
+  PosesToWire(*result, *reply.mutable_update_poses_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }
@@ -257,7 +125,12 @@ asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWrit
     co_return region.error();
   }
   if (query.wait_revision() != 0) {
-    Status status = co_await WaitForRevision(query.wait_revision(), Timeout(query.timeout_ms()));
+    const Result<WaitPlaces::Place> place = places_.Take();
+    if (!place) {
+      co_return place.error();
+    }
+    const Patience patience{TimeoutFromWire(query.timeout_ms()), out.peer_left()};
+    Status status = co_await WaitForRevision(service_, pool_, query.wait_revision(), patience);
     if (!status.ok()) {
       co_return status;
     }
@@ -274,78 +147,26 @@ asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, Repl
     co_return status.error();
   }
   Envelope reply = ReplyTo(request);
-  wire::StatusReply& message = *reply.mutable_status_reply();
-  const StoreCounts& counts = status->counts;
-  message.set_revision(counts.revision);
-  message.set_keyframes(counts.keyframes);
-  message.set_sessions(counts.sessions);
-  message.set_tiles(counts.tiles);
-  message.set_dirty_tiles(counts.dirty_tiles);
-  message.set_store_bytes(counts.store_bytes);
-  message.set_tile_bytes(counts.tile_bytes);
-  message.set_keyframe_bytes(counts.keyframe_bytes);
-  message.set_cells(counts.cells);
-  message.set_multilayer_cells(counts.multilayer_cells);
-  message.set_rss_bytes(status->rss_bytes);
+  StatusToWire(*status, *reply.mutable_status_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }
 
-asio::awaitable<Result<WaitOutcome>> RequestHandler::WaitUntilClean(
-    std::chrono::milliseconds timeout) {
-  Pauses pauses(co_await asio::this_coro::executor, timeout);
-  const Blocking<WaitOutcome> look = [this] {
-    return service_.WaitUntilClean(Patience());
-  };
-  while (true) {
-    Result<WaitOutcome> outcome = co_await OnPool(pool_, look);
-    if (!outcome || !outcome->is_timed_out) {
-      co_return outcome;
-    }
-    if (pauses.is_over()) {
-      co_return Error(StatusCode::kTimeout,
-                      StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
-                             timeout.count(), " ms"));
-    }
-    co_await pauses.Next();
-  }
-}
-
-asio::awaitable<Status> RequestHandler::WaitForRevision(std::uint64_t revision,
-                                                        std::chrono::milliseconds timeout) {
-  Pauses pauses(co_await asio::this_coro::executor, timeout);
-  const Blocking<bool> look = [this, revision]() -> Result<bool> {
-    const Status status = service_.WaitForRevision(revision, Patience());
-    if (status.ok() || status.code() == StatusCode::kTimeout) {
-      return status.ok();
-    }
-    return Error(status);
-  };
-  while (true) {
-    const Result<bool> is_reached = co_await OnPool(pool_, look);
-    if (!is_reached) {
-      co_return is_reached.error();
-    }
-    if (*is_reached) {
-      co_return Status();
-    }
-    if (pauses.is_over()) {
-      co_return Status(StatusCode::kTimeout, StrCat("the tiles do not reflect revision ", revision,
-                                                    " after ", timeout.count(), " ms"));
-    }
-    co_await pauses.Next();
-  }
-}
-
 asio::awaitable<Status> RequestHandler::Wait(const Envelope& request, ReplyWriter& out) {
-  const Result<WaitOutcome> outcome =
-      co_await WaitUntilClean(Timeout(request.wait_request().timeout_ms()));
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const Patience patience{TimeoutFromWire(request.wait_request().timeout_ms()), out.peer_left()};
+  const Result<WaitOutcome> outcome = co_await WaitUntilClean(service_, pool_, patience);
   if (!outcome) {
     co_return outcome.error();
   }
+  if (!outcome->damage.ok()) {
+    co_return outcome->damage;
+  }
   Envelope reply = ReplyTo(request);
-  reply.mutable_wait_reply()->set_revision(outcome->revision);
-  reply.mutable_wait_reply()->set_dirty_tiles(outcome->dirty_tiles);
+  WaitToWire(*outcome, *reply.mutable_wait_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }
@@ -368,51 +189,53 @@ asio::awaitable<Status> RequestHandler::ListSessions(const Envelope& request, Re
 }
 
 asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWriter& out) {
-  const std::chrono::milliseconds timeout = Timeout(request.digest_request().timeout_ms());
-  const Result<WaitOutcome> clean = co_await WaitUntilClean(timeout);
-  if (!clean) {
-    co_return clean.error();
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
   }
-  const Blocking<AtlasDigest> compute = [this, timeout] {
-    return service_.Digest(Patience{timeout, {}});
+  const Patience patience{TimeoutFromWire(request.digest_request().timeout_ms()), out.peer_left()};
+  const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
+  if (!settled) {
+    co_return settled.error();
+  }
+  if (!settled->damage.ok()) {
+    co_return settled->damage;
+  }
+  const Blocking<AtlasDigest> compute = [this, patience] {
+    return service_.Digest(patience);
   };
-  const Result<AtlasDigest> digest = co_await OnPool(pool_, compute);
+  const Result<AtlasDigest> digest = co_await OnPool(reading_pool_, compute);
   if (!digest) {
     co_return digest.error();
   }
   Envelope reply = ReplyTo(request);
-  reply.mutable_digest_reply()->set_sha256(BytesToWire(digest->sha256));
-  reply.mutable_digest_reply()->set_tiles(digest->tiles);
-  reply.mutable_digest_reply()->set_revision(digest->revision);
+  DigestToWire(*digest, *reply.mutable_digest_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }
 
 asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWriter& out) {
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
   const bool is_rebuild = request.verify_request().rebuild();
-  const std::chrono::milliseconds timeout = Timeout(request.verify_request().timeout_ms());
+  const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
   if (is_rebuild) {
-    const Result<WaitOutcome> clean = co_await WaitUntilClean(timeout);
-    if (!clean) {
-      co_return clean.error();
+    const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
+    if (!settled) {
+      co_return settled.error();
     }
   }
-  const Blocking<VerifyReport> check = [this, is_rebuild, timeout] {
-    return service_.Verify(is_rebuild, Patience{timeout, {}});
+  const Blocking<VerifyReport> check = [this, is_rebuild, patience] {
+    return service_.Verify(is_rebuild, patience);
   };
-  const Result<VerifyReport> result = co_await OnPool(pool_, check);
+  const Result<VerifyReport> result = co_await OnPool(reading_pool_, check);
   if (!result) {
     co_return result.error();
   }
   Envelope reply = ReplyTo(request);
-  wire::VerifyReply& message = *reply.mutable_verify_reply();
-  message.set_checked(result->checked);
-  message.set_damaged(result->damaged);
-  message.set_mismatched(result->mismatched);
-  message.set_revision(result->revision);
-  for (const std::string& finding : result->findings) {
-    message.add_findings(finding);
-  }
+  VerifyToWire(*result, *reply.mutable_verify_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }

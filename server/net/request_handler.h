@@ -1,24 +1,30 @@
 // One request in, its replies out: the wire's side of every use case of AtlasService.
 #pragma once
 
-#include <chrono>
-#include <functional>
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/thread_pool.hpp>
 
 #include "proto/wire/envelope.h"
 #include "server/net/net_options.h"
 #include "server/net/reply_writer.h"
+#include "server/net/wait_places.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {
 
-// Shared by all connections; used on the network thread only. What may block runs on `pool`.
+// Shared by all connections; used on the network thread only. What may block runs on `pool`, what
+// reads the whole store on `reading_pool`. All arguments outlive this.
 class RequestHandler {
  public:
-  RequestHandler(AtlasService& service, boost::asio::thread_pool& pool, const NetOptions& options)
-      : service_(service), pool_(pool), options_(options) {}
+  RequestHandler(AtlasService& service,
+                 boost::asio::thread_pool& pool,
+                 boost::asio::thread_pool& reading_pool,
+                 const NetOptions& options)
+      : service_(service),
+        pool_(pool),
+        reading_pool_(reading_pool),
+        options_(options),
+        places_(options.max_waits) {}
 
   // The first frame of a connection. False when it ends the connection; the error was then sent.
   boost::asio::awaitable<bool> Greet(wire::Envelope request, ReplyWriter& out);
@@ -39,15 +45,11 @@ class RequestHandler {
   boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
 
-  // Asks again and again, so that no thread waits with the client. kTimeout says how many tiles are
-  // still dirty.
-  boost::asio::awaitable<Result<WaitOutcome>> WaitUntilClean(std::chrono::milliseconds timeout);
-  boost::asio::awaitable<Status> WaitForRevision(std::uint64_t revision,
-                                                 std::chrono::milliseconds timeout);
-
   AtlasService& service_;
   boost::asio::thread_pool& pool_;
+  boost::asio::thread_pool& reading_pool_;
   const NetOptions& options_;
+  WaitPlaces places_;
 };
 
 }  // namespace atlas

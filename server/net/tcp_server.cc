@@ -17,6 +17,8 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
+#include "proto/wire/convert.h"
+#include "server/net/byte_budget.h"
 #include "server/net/peer_connection.h"
 #include "server/net/request_handler.h"
 
@@ -33,10 +35,21 @@ class TcpServer::Impl {
  public:
   Impl(AtlasService& service, const NetOptions& options)
       : options_(options),
+        service_(service),
         pool_(static_cast<std::size_t>(options.service_threads)),
-        handler_(service, pool_, options_),
+        reading_pool_(static_cast<std::size_t>(options.reading_threads)),
+        handler_(service, pool_, reading_pool_, options_),
+        budget_(options.max_held_bytes),
         acceptor_(io_),
         signals_(io_) {}
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  // Calls on the pools and writes of the store report to `io_`: none may be left when it goes.
+  ~Impl() {
+    pool_.join();
+    reading_pool_.join();
+    service_.Flush();
+  }
 
   Result<std::string> Listen(const std::string& host, std::uint16_t port) {
     error_code error;
@@ -60,12 +73,12 @@ class TcpServer::Impl {
       return Error(StatusCode::kUnavailable,
                    StrCat("cannot listen on ", endpoint, ": ", error.message()));
     }
+    signals_.add(SIGTERM);  // from here on: whoever learns the address may stop the daemon
+    signals_.add(SIGINT);
     return StrCat(acceptor_.local_endpoint());
   }
 
   void Run() {
-    signals_.add(SIGTERM);
-    signals_.add(SIGINT);
     signals_.async_wait([this](error_code error, int number) {
       if (!error) {
         spdlog::info("signal {}: draining", number);
@@ -78,7 +91,6 @@ class TcpServer::Impl {
       }
     });
     io_.run();
-    pool_.join();
   }
 
   void Stop() {
@@ -109,16 +121,37 @@ class TcpServer::Impl {
     std::erase_if(connections_, [](const auto& weak) { return weak.expired(); });
     if (connections_.size() >= options_.max_connections) {
       spdlog::warn("connection refused: {} are open", connections_.size());
-      return;  // the socket closes
+      Refuse(std::move(socket));
+      return;
     }
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
-    const auto connection = std::make_shared<PeerConnection>(std::move(socket), handler_, options_);
+    const auto connection =
+        std::make_shared<PeerConnection>(std::move(socket), handler_, budget_, options_);
     connections_.push_back(connection);
     connection->Start();
   }
 
+  // Says why, as far as the socket takes it at once.
+  void Refuse(tcp::socket socket) const {
+    wire::Envelope envelope;
+    *envelope.mutable_error() = ErrorToWire(
+        Status(StatusCode::kUnavailable,
+               StrCat(options_.max_connections, " connections are open already; try again later")));
+    const Result<Bytes> frame = EncodeEnvelopeFrame(envelope);
+    error_code ignored;  // the peer is closed either way
+    socket.non_blocking(true, ignored);
+    if (frame) {
+      socket.write_some(asio::buffer(*frame), ignored);
+    }
+    socket.shutdown(tcp::socket::shutdown_both, ignored);
+  }
+
   void Drain() {
+    if (drain_limit_) {
+      return;  // told twice
+    }
+    service_.EndWaits();
     error_code ignored;  // it may be closed already
     acceptor_.close(ignored);
     signals_.cancel(ignored);
@@ -148,9 +181,12 @@ class TcpServer::Impl {
   }
 
   NetOptions options_;
-  asio::io_context io_{1};
+  AtlasService& service_;
   asio::thread_pool pool_;
+  asio::thread_pool reading_pool_;
   RequestHandler handler_;
+  ByteBudget budget_;
+  asio::io_context io_{1};  // after what its coroutines refer to
   tcp::acceptor acceptor_;
   asio::signal_set signals_;
   std::vector<std::weak_ptr<PeerConnection>> connections_;

@@ -22,8 +22,9 @@ class TcpServer {
   // kUnavailable when the port is taken.
   Result<std::string> Listen(const std::string& host, std::uint16_t port);
 
-  // Serves until SIGTERM or SIGINT or Stop(): then accepts no more, lets requests in flight finish
-  // for a while, closes everything and returns. Call once, after Listen().
+  // Serves until SIGTERM or SIGINT (those since Listen()) or Stop(): then accepts no more, ends the
+  // service's waits, lets requests in flight finish for a while, closes everything and returns.
+  // Call once, after Listen().
   void Run();
   // From any thread.
   void Stop();

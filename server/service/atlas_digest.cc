@@ -60,7 +60,7 @@ Status AddTile(AtlasStore& store, const TileId& id, Sha256& hash, std::uint64_t&
 
 }  // namespace
 
-Result<AtlasDigest> ComputeDigest(AtlasStore& store) {
+Result<AtlasDigest> ComputeDigest(AtlasStore& store, const std::function<Status()>& check_stop) {
   AtlasDigest digest;
   Sha256 hash;
   std::int64_t after = -1;
@@ -73,6 +73,9 @@ Result<AtlasDigest> ComputeDigest(AtlasStore& store) {
       break;
     }
     for (const TileSummary& tile : *page) {
+      if (Status status = check_stop(); !status.ok()) {
+        return Error(std::move(status));
+      }
       if (Status status = AddTile(store, tile.id, hash, digest.tiles); !status.ok()) {
         return Error(std::move(status));
       }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 
 #include "core/base/status.h"
 #include "server/store/atlas_store.h"
@@ -17,7 +18,8 @@ struct AtlasDigest {
 
 // SHA-256 over the tiles in key order, each as key (8 bytes big-endian), length (8 bytes
 // big-endian), canonical uncompressed payload. The state it read may be a mix when the atlas
-// changed meanwhile: compare revisions before and after. kInvalidData names a damaged tile.
-Result<AtlasDigest> ComputeDigest(AtlasStore& store);
+// changed meanwhile: compare revisions before and after. kInvalidData names a damaged tile. A
+// failed status of `check_stop`, asked between tiles, ends it.
+Result<AtlasDigest> ComputeDigest(AtlasStore& store, const std::function<Status()>& check_stop);
 
 }  // namespace atlas

@@ -13,6 +13,10 @@ std::chrono::steady_clock::time_point DeadlineOf(const Patience& patience) {
   return std::chrono::steady_clock::now() + patience.timeout;
 }
 
+bool IsClean(const DirtyState& state) {
+  return state.dirty_tiles == 0;
+}
+
 // Calls `done` with the result after waking whoever waits for changes.
 template <typename T>
 AtlasStore::Done<T> Notifying(ChangeSignal& changes, AtlasStore::Done<T> done) {
@@ -36,11 +40,11 @@ AtlasService::AtlasService(AtlasStore& store,
 
 AtlasService::~AtlasService() {
   Stop();
-  store_.Flush();  // queued writes report to this
+  Flush();  // queued writes report to this
 }
 
 void AtlasService::Stop() {
-  changes_.Close();
+  EndWaits();
   fusion_.Stop();
 }
 
@@ -99,6 +103,12 @@ Status AtlasService::CheckRunning(const std::stop_token& stop) const {
   return {};
 }
 
+// Every mark that is left was tried since it was set, and damage was why it failed.
+bool AtlasService::IsStuck(const DirtyState& state) const {
+  return state.dirty_tiles != 0 && state.failed_tiles == state.dirty_tiles &&
+         fusion_.damage().size() >= state.dirty_tiles;
+}
+
 Result<AtlasService::WaitEnd> AtlasService::WaitFor(
     const std::function<bool(const DirtyState&)>& is_done,
     TimePoint deadline,
@@ -114,6 +124,9 @@ Result<AtlasService::WaitEnd> AtlasService::WaitFor(
     if (is_done(state)) {
       return WaitEnd::kDone;
     }
+    if (IsStuck(state)) {
+      return WaitEnd::kDamaged;
+    }
     if (!changes_.WaitPast(seen, deadline, stop)) {
       if (Status status = CheckRunning(stop); !status.ok()) {
         return Error(std::move(status));
@@ -125,12 +138,15 @@ Result<AtlasService::WaitEnd> AtlasService::WaitFor(
 
 Result<WaitOutcome> AtlasService::WaitUntilClean(const Patience& patience) {
   DirtyState state;
-  const auto end = WaitFor([](const DirtyState& s) { return s.dirty_tiles == 0; },
-                           DeadlineOf(patience), patience.stop, state);
+  const auto end = WaitFor(&IsClean, DeadlineOf(patience), patience.stop, state);
   if (!end) {
     return Error(end.error());
   }
-  return WaitOutcome{state.revision, state.dirty_tiles, *end == WaitEnd::kTimedOut};
+  WaitOutcome outcome{state.revision, state.dirty_tiles, *end == WaitEnd::kTimedOut, {}};
+  if (*end == WaitEnd::kDamaged) {
+    outcome.damage = fusion_.damage().Summary();
+  }
+  return outcome;
 }
 
 Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& patience) {
@@ -148,6 +164,9 @@ Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& pat
       DeadlineOf(patience), patience.stop, state);
   if (!end) {
     return end.error();
+  }
+  if (*end == WaitEnd::kDamaged) {
+    return fusion_.damage().Summary();
   }
   if (*end == WaitEnd::kTimedOut) {
     return Status(StatusCode::kTimeout, StrCat("tiles do not reflect revision ", revision,
@@ -181,7 +200,7 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
   if (!counts) {
     return Error(counts.error());
   }
-  return ServiceStatus{*counts, ResidentBytes()};
+  return ServiceStatus{*counts, fusion_.damage().size(), ResidentBytes()};
 }
 
 Result<std::uint64_t> AtlasService::ReadRevision() {
@@ -192,30 +211,29 @@ Result<std::uint64_t> AtlasService::ReadRevision() {
   return state->revision;
 }
 
-// kTimeout when marks are left at the deadline.
-Status AtlasService::RequireClean(TimePoint deadline,
-                                  const std::stop_token& stop,
-                                  DirtyState& state) {
-  const auto end =
-      WaitFor([](const DirtyState& s) { return s.dirty_tiles == 0; }, deadline, stop, state);
-  if (!end) {
-    return end.error();
+Result<AtlasService::WaitEnd> AtlasService::WaitForWorkers(TimePoint deadline,
+                                                           const std::stop_token& stop,
+                                                           DirtyState& state) {
+  auto end = WaitFor(&IsClean, deadline, stop, state);
+  if (end && *end == WaitEnd::kTimedOut) {
+    return Error(StatusCode::kTimeout,
+                 StrCat("the atlas is not clean: ", state.dirty_tiles, " tiles are to be fused"));
   }
-  if (*end == WaitEnd::kTimedOut) {
-    return Status(StatusCode::kTimeout,
-                  StrCat("the atlas is not clean: ", state.dirty_tiles, " tiles are to be fused"));
-  }
-  return {};
+  return end;
 }
 
 Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
   const TimePoint deadline = DeadlineOf(patience);
   while (true) {
     DirtyState before;
-    if (Status status = RequireClean(deadline, patience.stop, before); !status.ok()) {
-      return Error(std::move(status));
+    const auto end = WaitForWorkers(deadline, patience.stop, before);
+    if (!end) {
+      return Error(end.error());
     }
-    auto digest = ComputeDigest(store_);
+    if (*end == WaitEnd::kDamaged) {
+      return Error(fusion_.damage().Summary());
+    }
+    auto digest = ComputeDigest(store_, [&] { return CheckRunning(patience.stop); });
     if (!digest) {
       return Error(digest.error());
     }
@@ -238,8 +256,9 @@ Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience
   while (true) {
     DirtyState before;
     if (rebuild) {
-      if (Status status = RequireClean(deadline, patience.stop, before); !status.ok()) {
-        return Error(std::move(status));
+      const auto end = WaitForWorkers(deadline, patience.stop, before);
+      if (!end) {
+        return Error(end.error());
       }
     }
     AtlasVerifier::Options options;

@@ -36,10 +36,13 @@ struct WaitOutcome {
   std::uint64_t revision = 0;
   std::uint64_t dirty_tiles = 0;
   bool is_timed_out = false;
+  // kInvalidData when the tiles that are left cannot be fused: names what is damaged.
+  Status damage;
 };
 
 struct ServiceStatus {
   StoreCounts counts;
+  std::uint64_t damaged_tiles = 0;  // dirty, and damage keeps them from being fused
   std::uint64_t rss_bytes = 0;
 };
 
@@ -67,10 +70,11 @@ class AtlasService {
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
 
-  // Until nothing is dirty.
+  // Until nothing is dirty but what damage keeps from being fused.
   Result<WaitOutcome> WaitUntilClean(const Patience& patience);
   // Until the tiles reflect every change up to `revision`. kTimeout if they do not in time,
-  // kInvalidArgument when the atlas has no such revision yet.
+  // kInvalidData if damage keeps them from it, kInvalidArgument when the atlas has no such revision
+  // yet.
   Status WaitForRevision(std::uint64_t revision, const Patience& patience);
 
   Result<RegionQuery> Query(const RegionRequest& request, RegionQuery::Options options);
@@ -81,24 +85,34 @@ class AtlasService {
   Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
   Result<std::uint64_t> ReadRevision();
 
-  // Of a clean atlas that did not change meanwhile; kTimeout if there is none in time.
+  // Of a clean atlas that did not change meanwhile; kTimeout if there is none in time, kInvalidData
+  // if damage keeps it from becoming clean.
   Result<AtlasDigest> Digest(const Patience& patience);
-  // `rebuild` waits until clean like Digest; a plain check does not wait.
+  // `rebuild` waits like WaitUntilClean and reports what is damaged; a plain check does not wait.
   Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
 
-  // Ends every wait and the workers, which finish the tiles at hand. Calls after it fail.
+  // Ends every wait, verification and digest, now and from now on, with kUnavailable. The workers
+  // go on, and uploads are still taken.
+  void EndWaits() { changes_.Close(); }
+  // Returns when every upload and pose batch handed over before was reported to its `done`.
+  void Flush() { store_.Flush(); }
+  // EndWaits(), and the workers finish the tiles at hand and end.
   void Stop();
 
  private:
   using TimePoint = std::chrono::steady_clock::time_point;
-  enum class WaitEnd { kDone, kTimedOut };
+  enum class WaitEnd { kDone, kDamaged, kTimedOut };
 
   Result<WaitEnd> WaitFor(const std::function<bool(const DirtyState&)>& is_done,
                           TimePoint deadline,
                           const std::stop_token& stop,
                           DirtyState& state);
+  bool IsStuck(const DirtyState& state) const;
   Status CheckRunning(const std::stop_token& stop) const;
-  Status RequireClean(TimePoint deadline, const std::stop_token& stop, DirtyState& state);
+  // kTimeout when more than damaged tiles is left at the deadline.
+  Result<WaitEnd> WaitForWorkers(TimePoint deadline,
+                                 const std::stop_token& stop,
+                                 DirtyState& state);
   Result<PoseBatch> PlacePoses(PoseBatchRequest request);
 
   AtlasStore& store_;

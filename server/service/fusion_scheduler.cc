@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <future>
 #include <utility>
 
@@ -104,11 +105,12 @@ void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
       GiveBack(claim, 0);
       continue;
     }
-    auto built = builder_.Build(claim.id);
+    auto built = Build(claim.id);
     if (!built) {
       PostponeFailed(claim, built.error());
       continue;
     }
+    damage_.Remove(claim.id);
     ++tiles_built_;
     FinishedTile tile{claim, built->revision, std::move(built->content)};
     unfinished.push_back({claim, Begin<FinishResult>([&](auto done) {
@@ -126,6 +128,15 @@ void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
   changes_.Notify();
 }
 
+// What it throws (no memory, say) is a failure of this tile, not the end of the process.
+Result<BuiltTile> FusionScheduler::Build(const TileId& id) {
+  try {
+    return builder_.Build(id);
+  } catch (const std::exception& error) {
+    return Error(StatusCode::kInternal, error.what());
+  }
+}
+
 void FusionScheduler::GiveBack(const TileClaim& claim, std::int64_t retry_at_ms) {
   const auto released =
       Await<bool>([&](auto done) { store_.ReleaseClaim(claim, retry_at_ms, std::move(done)); });
@@ -138,30 +149,38 @@ void FusionScheduler::GiveBack(const TileClaim& claim, std::int64_t retry_at_ms)
 void FusionScheduler::PostponeFailed(const TileClaim& claim, const Status& why) {
   const std::int64_t backoff =
       std::min(options_.max_backoff_ms, options_.min_backoff_ms << std::min(claim.attempts, 20u));
-  log_(LogLevel::kError, StrCat("fusion: tile ", claim.id, " stays dirty, next attempt in ",
-                                backoff, " ms: ", why.message()));
-  if (claim.id.level > 0 && why.code() == StatusCode::kInvalidData) {
-    MarkDamagedChildren(claim.id);
+  const bool is_damage = why.code() == StatusCode::kInvalidData &&
+                         !(claim.id.level > 0 && MarkDamagedChildren(claim.id));
+  bool is_news = true;
+  if (is_damage) {
+    is_news = damage_.Add(claim.id, why);
+  } else {
+    damage_.Remove(claim.id);
   }
+  log_(is_news ? LogLevel::kError : LogLevel::kDebug,
+       StrCat("fusion: tile ", claim.id, " keeps its content and stays dirty, next attempt in ",
+              backoff, " ms: ", why.message()));
   GiveBack(claim, clock_() + backoff);
 }
 
-void FusionScheduler::MarkDamagedChildren(const TileId& parent) {
+// True when there are some that can be built again, and the parent then.
+bool FusionScheduler::MarkDamagedChildren(const TileId& parent) {
   std::vector<TileId> damaged;
   for (const TileId& child : parent.Children()) {
     const auto tile = store_.ReadTile(child);
-    if (!tile && tile.error().code() == StatusCode::kInvalidData) {
+    if (!tile && tile.error().code() == StatusCode::kInvalidData && !damage_.Contains(child)) {
       damaged.push_back(child);
     }
   }
   if (damaged.empty()) {
-    return;
+    return false;
   }
   const auto marked =
       Await<std::uint32_t>([&](auto done) { store_.MarkDirty(damaged, std::move(done)); });
   if (!marked) {
     log_(LogLevel::kError, "fusion: cannot mark damaged tiles: " + marked.error().message());
   }
+  return marked.has_value();
 }
 
 }  // namespace atlas

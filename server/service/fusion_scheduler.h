@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/service/change_signal.h"
+#include "server/service/damage_list.h"
 #include "server/service/log_sink.h"
 #include "server/service/tile_builder.h"
 #include "server/store/atlas_store.h"
@@ -46,15 +47,18 @@ class FusionScheduler {
   // Finishes the tiles at hand, gives the other leases back and joins the threads.
   void Stop();
   std::uint64_t tiles_built() const { return tiles_built_; }
+  // Tiles that damage keeps from being fused.
+  const DamageList& damage() const { return damage_; }
 
  private:
   void RunWorker(const std::stop_token& stop, const std::string& owner);
   std::vector<TileClaim> NextClaims(const std::string& owner);
   bool StartNextWave(std::uint64_t done);
   void BuildClaims(const std::vector<TileClaim>& claims, const std::stop_token& stop);
+  Result<BuiltTile> Build(const TileId& id);
   void GiveBack(const TileClaim& claim, std::int64_t retry_at_ms);
   void PostponeFailed(const TileClaim& claim, const Status& why);
-  void MarkDamagedChildren(const TileId& parent);
+  bool MarkDamagedChildren(const TileId& parent);
 
   AtlasStore& store_;
   ChangeSignal& changes_;
@@ -62,6 +66,7 @@ class FusionScheduler {
   LogSink log_;
   FusionOptions options_;
   TileBuilder builder_;
+  DamageList damage_;
   std::atomic<std::uint64_t> wave_ = 0;
   std::atomic<std::uint64_t> tiles_built_ = 0;
   std::vector<std::jthread> threads_;

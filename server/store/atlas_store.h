@@ -43,7 +43,8 @@ class AtlasStore {
   // payload hash does. The mark is cleared only if its generation is still the claimed one.
   // kConflict when the claim's lease ran out and was given to another owner, or was built.
   virtual void FinishTile(FinishedTile tile, Done<FinishResult> done) = 0;
-  // Gives a claim back, to be taken again at `retry_at_ms`.
+  // Gives a claim back, to be taken again at `retry_at_ms`, or at once if the tile was marked
+  // again.
   virtual void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) = 0;
   // Marks tiles to be built again, e.g. one that was found damaged. The value: marks set.
   virtual void MarkDirty(std::vector<TileId> ids, Done<std::uint32_t> done) = 0;

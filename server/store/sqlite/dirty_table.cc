@@ -119,8 +119,11 @@ void PostponeClaim(Connection& connection, const TileClaim& claim, std::int64_t 
   connection
       .Prepare(
           "UPDATE dirty_tiles SET lease_owner = NULL, lease_until_ms = 0, "
-          "attempts = attempts + (? > 0), retry_at_ms = ? WHERE key = ? AND shard = ?")
+          "attempts = attempts + (? > 0 AND generation = ?), "
+          "retry_at_ms = iif(generation = ?, ?, 0) WHERE key = ? AND shard = ?")
       .Bind(retry_at_ms)
+      .Bind(claim.generation)
+      .Bind(claim.generation)
       .Bind(retry_at_ms)
       .Bind(claim.id.Key())
       .Bind(ShardOf(claim.id))
@@ -136,9 +139,11 @@ void DropAllLeases(Connection& connection) {
 DirtyState ReadDirty(Connection& connection) {
   DirtyState state;
   state.revision = ReadCounter(connection, Counter::kRevision);
-  Query row = connection.Prepare("SELECT count(*), coalesce(min(since), 0) FROM dirty_tiles");
+  Query row = connection.Prepare(
+      "SELECT count(*), coalesce(sum(attempts > 0), 0), coalesce(min(since), 0) FROM dirty_tiles");
   if (row.Step()) {
     state.dirty_tiles = row.Unsigned();
+    state.failed_tiles = row.Unsigned();
     state.oldest_since = row.Unsigned();
   }
   return state;

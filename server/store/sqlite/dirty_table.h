@@ -19,6 +19,7 @@ ClaimResult ClaimTiles(Connection& connection, const ClaimRequest& request);
 Status CheckClaim(Connection& connection, const TileClaim& claim);
 // Clears the mark if nothing marked the tile since it was claimed; else gives the lease back.
 void SettleClaim(Connection& connection, const TileClaim& claim);
+// Gives the lease back. A tile that was marked again since it was claimed is free at once.
 void PostponeClaim(Connection& connection, const TileClaim& claim, std::int64_t retry_at_ms);
 // Leases of a process that is gone.
 void DropAllLeases(Connection& connection);

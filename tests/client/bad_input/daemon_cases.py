@@ -112,10 +112,13 @@ def damaged_row_cases(cases, drives, work):
         cases.report.check("a damaged keyframe: still served", client.run("point", "0", "-1.6")["layers"] != [])
         client.run("poses", "apply", moved)  # its neighbours cannot be fused again
         for command in ("wait", "digest"):
-            done = client.call(command, "--timeout", "0.3", "--json")
-            cases.report.equal(f"{command} times out: exit code", done.returncode, 5)
-            client.typed(f"{command} times out", done.stderr, "timeout", "")
-        cases.report.check("a damaged keyframe: dirty tiles stay", client.run("status")["dirty_tiles"] > 0)
+            done = client.call(command, "--json")
+            cases.report.equal(f"{command}, a damaged keyframe: exit code", done.returncode, 6)
+            client.typed(f"{command}, a damaged keyframe", done.stderr, "invalid_data", "keyframe vehicle/good/2")
+        status = client.run("status")
+        cases.report.check("a damaged keyframe: dirty tiles stay", status["dirty_tiles"] > 0)
+        cases.report.equal("a damaged keyframe: they are counted", status["damaged_tiles"],
+                           status["dirty_tiles"])
 
 
 @contextlib.contextmanager

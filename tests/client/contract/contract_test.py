@@ -18,8 +18,8 @@ from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 KEYS = {
     "ingest": "keyframes acked duplicates metres bytes_sent frontend_ms_per_scan sensor_height_m sessions wall_s",
     "wait": "revision dirty_tiles",
-    "status": "revision keyframes sessions tiles dirty_tiles store_bytes tile_bytes keyframe_bytes cells "
-              "multilayer_cells rss_bytes",
+    "status": "revision keyframes sessions tiles dirty_tiles damaged_tiles store_bytes tile_bytes keyframe_bytes "
+              "cells multilayer_cells rss_bytes",
     "point": "layers",
     "query": "type tiles bytes revision truncated",
     "poses": "updated tiles_marked revision batch",

@@ -6,6 +6,7 @@
 #include <set>
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include "client/render/image.h"
 #include "core/scan/scan_reader.h"
@@ -263,6 +264,45 @@ TEST_F(EndToEndTest, TheMapIsDrawnPlannedAndLocalizedIn) {
   ASSERT_EQ(localize.exit_code, 0) << localize.err;
   EXPECT_EQ(localize.lines.size(), 2 * localize.Get<std::size_t>("scans") + 1);
   EXPECT_EQ(localize.lines.front().at("pose").as_array().size(), 12U);
+}
+
+void DamageFirstKeyframe(const fs::path& data) {
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open((data / "atlas.db").c_str(), &db), SQLITE_OK);
+  const char* const sql = "UPDATE keyframes SET blob = zeroblob(length(blob)) WHERE id = 1";
+  EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(db);
+}
+
+TEST_F(EndToEndTest, DamageEndsWaitsAndIsNamed) {
+  const fs::path data = NewData();
+  {
+    DaemonProcess daemon(data, kSmall);
+    ASSERT_EQ(Ingest(daemon).exit_code, 0);
+    ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+    EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+  }
+  DamageFirstKeyframe(data);
+  DaemonProcess daemon(data, {});
+  EXPECT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);  // nothing asks for it yet
+
+  const fs::path file = shared_root / "beside_damage.txt";
+  WritePoses(shared_drive / "poses.txt", file, 1, 0.5);
+  ASSERT_EQ(RunAtlas(daemon.address(), {"poses", "apply", file.string()}).exit_code, 0);
+  for (const char* command : {"wait", "digest"}) {
+    const CommandRun run = RunAtlas(daemon.address(), {command});
+    EXPECT_EQ(run.exit_code, 6) << command;
+    EXPECT_NE(run.err.find("\"invalid_data\""), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("keyframe vehicle/overpass"), std::string::npos) << run.err;
+  }
+  const CommandRun status = RunAtlas(daemon.address(), {"status"});
+  EXPECT_GT(status.Get<int>("damaged_tiles"), 0);
+  EXPECT_EQ(status.Get<int>("damaged_tiles"), status.Get<int>("dirty_tiles"));
+  const CommandRun query =
+      RunAtlas(daemon.address(), {"query", "--center", "-3,-4", "--radius", "30"});
+  EXPECT_EQ(query.exit_code, 0) << query.err;
+  EXPECT_EQ(RunAtlas(daemon.address(), {"verify", "--rebuild"}).exit_code, 6);
+  EXPECT_EQ(daemon.Stop(SIGTERM), 0);
 }
 
 TEST_F(EndToEndTest, SecondDaemonOnTheSameDataIsRefused) {

@@ -113,6 +113,24 @@ TEST_F(TileStoreTest, AWaveLeavesLaterMarksAlone) {
   EXPECT_EQ(wave.claims[0].id, kA.Parent());  // although a level-0 tile is dirty meanwhile
 }
 
+TEST_F(TileStoreTest, AClaimThatFailedAfterItsTileWasMarkedAgainIsFreeAtOnce) {
+  Open();
+  const TileId id{0, 1, 1};
+  ASSERT_TRUE(Put(MakeKeyframe(0, {id})).has_value());
+  const TileClaim old = Claim().claims.at(0);
+  ASSERT_TRUE(Put(MakeKeyframe(1, {id})).has_value());
+  const auto release = [&](const TileClaim& claim) {
+    return Await<bool>([&](auto done) { store_->ReleaseClaim(claim, 5'000, std::move(done)); });
+  };
+  ASSERT_TRUE(release(old).value());
+  EXPECT_EQ(Dirty().failed_tiles, 0u);
+  const TileClaim current = Claim().claims.at(0);
+  EXPECT_GT(current.generation, old.generation);
+  ASSERT_TRUE(release(current).value());
+  EXPECT_EQ(Dirty().failed_tiles, 1u);
+  EXPECT_TRUE(Claim().claims.empty());
+}
+
 TEST_F(TileStoreTest, AReleasedClaimComesBackAtItsTime) {
   Open();
   ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());

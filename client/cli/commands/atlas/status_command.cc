@@ -11,6 +11,7 @@ boost::json::object StatusJson(const AtlasStatus& status) {
           {"sessions", status.sessions},
           {"tiles", status.tiles},
           {"dirty_tiles", status.dirty_tiles},
+          {"damaged_tiles", status.damaged_tiles},
           {"store_bytes", status.store_bytes},
           {"tile_bytes", status.tile_bytes},
           {"keyframe_bytes", status.keyframe_bytes},
@@ -27,6 +28,9 @@ void PrintStatus(const AtlasStatus& status, std::ostream& out) {
             std::to_string(status.keyframes) + ", " + BytesText(status.keyframe_bytes));
   facts.Add("tiles", std::to_string(status.tiles) + ", " + BytesText(status.tile_bytes));
   facts.Add("to be fused", std::to_string(status.dirty_tiles) + " tiles");
+  if (status.damaged_tiles != 0) {
+    facts.Add("damaged", std::to_string(status.damaged_tiles) + " of them; see atlas verify");
+  }
   facts.Add("cells", std::to_string(status.cells) + ", of them " +
                          std::to_string(status.multilayer_cells) + " with several surfaces");
   facts.Add("store", BytesText(status.store_bytes));

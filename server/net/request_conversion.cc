@@ -1,0 +1,160 @@
+#include "server/net/request_conversion.h"
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "proto/wire/convert.h"
+
+namespace atlas {
+namespace {
+
+std::optional<PositionPrior> PriorFromWire(const wire::UploadKeyframe& upload) {
+  if (!upload.has_prior()) {
+    return std::nullopt;
+  }
+  const wire::PositionPrior& prior = upload.prior();
+  return PositionPrior{prior.x_um(), prior.y_um(), prior.z_um(), prior.radius_mm()};
+}
+
+std::string StateName(SessionState state) {
+  switch (state) {
+    case SessionState::kStaged:
+      return "staged";
+    case SessionState::kLive:
+      return "live";
+    case SessionState::kQuarantined:
+      return "quarantined";
+    case SessionState::kRetracted:
+      return "retracted";
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+wire::Envelope ReplyTo(const wire::Envelope& request) {
+  wire::Envelope reply;
+  reply.set_request_id(request.request_id());
+  return reply;
+}
+
+Status CheckHello(const wire::Envelope& request, const MapProfile& profile) {
+  if (!request.has_hello()) {
+    return Status(StatusCode::kInvalidData, "the first frame must be a Hello");
+  }
+  const wire::Hello& hello = request.hello();
+  if (hello.protocol_major() != kProtocolMajor) {
+    return Status(StatusCode::kUnsupported,
+                  StrCat("protocol version ", hello.protocol_major(), ".", hello.protocol_minor(),
+                         ": this daemon speaks ", kProtocolMajor, ".", kProtocolMinor));
+  }
+  if (!hello.profile().empty()) {
+    const Result<MapProfile> expected = ProfileFromWire(hello.profile());
+    if (!expected) {
+      return expected.error();
+    }
+    if (*expected != profile) {
+      return Status(StatusCode::kInvalidData, "this atlas has another map profile");
+    }
+  }
+  return {};
+}
+
+Result<UploadRequest> UploadFromWire(const wire::UploadKeyframe& upload) {
+  Result<KeyframeKey> key = KeyFromWire(upload.key());
+  if (!key) {
+    return Error(key.error());
+  }
+  Result<QuantizedPose> pose = PoseFromWire(upload.pose());
+  if (!pose) {
+    return Error(pose.error().WithContext(StrCat("keyframe ", *key)));
+  }
+  const ByteSpan blob = BytesFromWire(upload.blob());
+  return UploadRequest{std::move(*key), upload.time_ms(), *pose, PriorFromWire(upload),
+                       Bytes(blob.begin(), blob.end())};
+}
+
+Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message) {
+  PoseBatchRequest request;
+  request.author = message.author();
+  request.if_revision = message.if_revision();
+  request.updates.reserve(static_cast<std::size_t>(message.updates_size()));
+  for (const wire::PoseUpdate& update : message.updates()) {
+    Result<KeyframeKey> key = KeyFromWire(update.key());
+    if (!key) {
+      return Error(key.error());
+    }
+    Result<QuantizedPose> pose = PoseFromWire(update.pose());
+    if (!pose) {
+      return Error(pose.error().WithContext(StrCat("keyframe ", *key)));
+    }
+    request.updates.push_back({std::move(*key), *pose});
+  }
+  return request;
+}
+
+void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out) {
+  out.set_duplicate(result.is_duplicate);
+  out.set_revision(result.revision);
+  out.set_tiles_marked(result.tiles_marked);
+}
+
+void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
+  out.set_updated(result.updated);
+  out.set_tiles_marked(result.tiles_marked);
+  out.set_revision(result.revision);
+  out.set_batch(result.batch);
+}
+
+void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
+  const StoreCounts& counts = status.counts;
+  out.set_revision(counts.revision);
+  out.set_keyframes(counts.keyframes);
+  out.set_sessions(counts.sessions);
+  out.set_tiles(counts.tiles);
+  out.set_dirty_tiles(counts.dirty_tiles);
+  out.set_store_bytes(counts.store_bytes);
+  out.set_tile_bytes(counts.tile_bytes);
+  out.set_keyframe_bytes(counts.keyframe_bytes);
+  out.set_cells(counts.cells);
+  out.set_multilayer_cells(counts.multilayer_cells);
+  out.set_rss_bytes(status.rss_bytes);
+  out.set_damaged_tiles(status.damaged_tiles);
+}
+
+void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {
+  out.set_revision(outcome.revision);
+  out.set_dirty_tiles(outcome.dirty_tiles);
+  out.set_timed_out(outcome.is_timed_out);
+}
+
+void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
+  out.set_vehicle(record.key.vehicle);
+  out.set_session(record.key.session);
+  out.set_state(StateName(record.state));
+  out.set_keyframes(record.keyframes);
+  out.set_bytes(record.bytes);
+  out.set_first_time_ms(record.first_time_ms);
+  out.set_last_time_ms(record.last_time_ms);
+  out.set_last_sequence(record.last_sequence);
+}
+
+void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out) {
+  out.set_sha256(BytesToWire(digest.sha256));
+  out.set_tiles(digest.tiles);
+  out.set_revision(digest.revision);
+}
+
+void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out) {
+  out.set_checked(report.checked);
+  out.set_damaged(report.damaged);
+  out.set_mismatched(report.mismatched);
+  out.set_revision(report.revision);
+  for (const std::string& finding : report.findings) {
+    out.add_findings(finding);
+  }
+}
+
+}  // namespace atlas

@@ -1,0 +1,28 @@
+// Between the messages of requests and replies and what AtlasService takes and gives.
+#pragma once
+
+#include "proto/wire/envelope.h"
+#include "server/service/atlas_service.h"
+
+namespace atlas {
+
+// An envelope that answers `request`, without a body yet.
+wire::Envelope ReplyTo(const wire::Envelope& request);
+
+// Not ok: the first frame of a connection is no Hello, or one of another protocol (kUnsupported) or
+// of another map (kInvalidData).
+Status CheckHello(const wire::Envelope& request, const MapProfile& profile);
+
+// The error names the keyframe.
+Result<UploadRequest> UploadFromWire(const wire::UploadKeyframe& upload);
+Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message);
+
+void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out);
+void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out);
+void StatusToWire(const ServiceStatus& status, wire::StatusReply& out);
+void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out);
+void SessionToWire(const SessionRecord& record, wire::SessionInfo& out);
+void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out);
+void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out);
+
+}  // namespace atlas

@@ -1,0 +1,221 @@
+// Where settings come from, which goes before which, and what a mistake says.
+#include "server/config/daemon_config.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace atlas {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class DaemonConfigTest : public testing::Test {
+ protected:
+  DaemonConfigTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "atlas_config_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::runtime_error("cannot make " + name);
+    }
+    directory_ = name;
+  }
+  ~DaemonConfigTest() override {
+    for (const std::string& name : variables_) {
+      ::unsetenv(name.c_str());
+    }
+    std::filesystem::remove_all(directory_);
+  }
+
+  std::string File(const std::string& text) const {
+    const std::string path = (directory_ / "atlasd.toml").string();
+    std::ofstream(path) << text;
+    return path;
+  }
+  void SetVariable(const std::string& name, const std::string& value) {
+    ::setenv(name.c_str(), value.c_str(), 1);
+    variables_.push_back(name);
+  }
+  static Result<DaemonCommand> Parse(std::vector<std::string> arguments) {
+    std::vector<const char*> argv = {"atlasd"};
+    for (const std::string& argument : arguments) {
+      argv.push_back(argument.c_str());
+    }
+    return ParseDaemonCommand(static_cast<int>(argv.size()), argv.data());
+  }
+  // The message of a refused configuration.
+  static std::string Refusal(const std::vector<std::string>& arguments) {
+    const auto command = Parse(arguments);
+    if (command) {
+      return "accepted";
+    }
+    EXPECT_EQ(command.error().code(), StatusCode::kInvalidArgument);
+    return command.error().message();
+  }
+  std::string RefusedFile(const std::string& text) const {
+    return Refusal({"--config", File(text)});
+  }
+
+  std::filesystem::path directory_;
+  std::vector<std::string> variables_;
+};
+
+TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
+  const auto command = Parse({"--data", "/x"});
+  ASSERT_TRUE(command.has_value()) << command.error().message();
+  const DaemonConfig& config = command->config;
+  EXPECT_EQ(config.data, "/x");
+  EXPECT_EQ(config.host, "127.0.0.1");
+  EXPECT_EQ(config.port, 7447);
+  EXPECT_EQ(config.workers, 0);
+  EXPECT_EQ(config.cache_mib, 128);
+  EXPECT_EQ(config.log_level, "info");
+  EXPECT_EQ(config.NewProfile().value(), MapProfile());
+  EXPECT_THAT(Refusal({}), HasSubstr("--data"));
+}
+
+TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
+  const std::string file = File(
+      "data = '/file'\nworkers = 1\ncache_mib = 9\nlisten = '127.0.0.1:1'\nlog_level = 'error'\n"
+      "[map]\ncell_size = 0.2\nsegments = 4\nsegment_height = 0.5\npreset = 'strict'\n");
+  SetVariable("ATLASD_WORKERS", "2");
+  SetVariable("ATLASD_LISTEN", "127.0.0.1:2");
+  SetVariable("ATLASD_SEGMENTS", "16");
+  const auto command = Parse({"--config", file, "--listen", "[::1]:3", "--segments", "8"});
+  ASSERT_TRUE(command.has_value()) << command.error().message();
+  const DaemonConfig& config = command->config;
+  EXPECT_EQ(config.data, "/file");
+  EXPECT_EQ(config.cache_mib, 9);
+  EXPECT_EQ(config.log_level, "error");
+  EXPECT_EQ(config.workers, 2);
+  EXPECT_EQ(config.host, "::1");
+  EXPECT_EQ(config.port, 3);
+  const MapProfile profile = config.NewProfile().value();
+  EXPECT_EQ(profile.cell_size_um, 200'000u);
+  EXPECT_EQ(profile.column_segments, 8);
+  EXPECT_EQ(profile.segment_height_mm, 500);
+}
+
+TEST_F(DaemonConfigTest, AnUnknownKeyIsAnErrorWithItsLine) {
+  EXPECT_THAT(RefusedFile("data = '/x'\n\nworker = 3\n"),
+              HasSubstr("atlasd.toml: line 3: unknown key 'worker'"));
+  EXPECT_THAT(RefusedFile("data = '/x'\n[map]\ncell = 3\n"),
+              HasSubstr("line 3: unknown key 'map.cell'"));
+  EXPECT_THAT(RefusedFile("data = '/x'\n[nothing]\nx = 1\n"),
+              HasSubstr("line 2: unknown key 'nothing'"));
+  EXPECT_THAT(RefusedFile("data = '/x'\n[map]\n[map.deep]\nx = 1\n"),
+              HasSubstr("unknown key 'map.deep'"));
+}
+
+TEST_F(DaemonConfigTest, AValueOfAnotherTypeIsAnErrorWithItsLine) {
+  EXPECT_THAT(RefusedFile("data = '/x'\nworkers = '3'\n"),
+              HasSubstr("line 2: 'workers': expected a number"));
+  EXPECT_THAT(RefusedFile("data = 7\n"), HasSubstr("line 1: 'data': expected a text"));
+  EXPECT_THAT(RefusedFile("data = ['/x']\n"), HasSubstr("line 1: 'data': expected a text"));
+  EXPECT_THAT(RefusedFile("data = '/x'\nlisten = 7447\n"), HasSubstr("line 2: 'listen'"));
+  EXPECT_THAT(RefusedFile("data = '/x'\ncache_mib = true\n"), HasSubstr("line 2: 'cache_mib'"));
+  EXPECT_THAT(RefusedFile("data = '/x'\nmap = 3\n"), HasSubstr("line 2: unknown key 'map'"));
+}
+
+TEST_F(DaemonConfigTest, AValueOutOfRangeNamesWhereItWasGiven) {
+  EXPECT_THAT(RefusedFile("data = '/x'\nworkers = 65\n"),
+              AllOf(HasSubstr("line 2: workers is '65'"), HasSubstr("0 to 64")));
+  EXPECT_THAT(RefusedFile("data = '/x'\nworkers = 1.5\n"), HasSubstr("line 2"));
+  EXPECT_THAT(RefusedFile("data = '/x'\ncache_mib = 7\n"), HasSubstr("line 2: cache_mib is '7'"));
+  EXPECT_THAT(Refusal({"--data", "/x", "--workers", "-1"}),
+              HasSubstr("--workers: workers is '-1'"));
+  SetVariable("ATLASD_WORKERS", "many");
+  EXPECT_THAT(Refusal({"--data", "/x"}), HasSubstr("ATLASD_WORKERS: workers is 'many'"));
+}
+
+TEST_F(DaemonConfigTest, MalformedTomlIsAnErrorWithItsLine) {
+  EXPECT_THAT(RefusedFile("data = '/x'\nworkers = = 3\n"), HasSubstr("atlasd.toml: line 2"));
+  EXPECT_THAT(RefusedFile("data = '/x\n"), HasSubstr("line 1"));
+  EXPECT_THAT(RefusedFile("data = '/x'\ndata = '/y'\n"), HasSubstr("line 2"));
+}
+
+TEST_F(DaemonConfigTest, OnlyLoopbackIsListenedOn) {
+  for (const char* address : {"0.0.0.0:7447", "192.168.1.1:7447", "[::]:7447", "example:7447"}) {
+    EXPECT_THAT(
+        Refusal({"--data", "/x", "--listen", address}),
+        AllOf(HasSubstr("--listen"), HasSubstr(address), HasSubstr("loopback"), HasSubstr("TLS")));
+  }
+  EXPECT_THAT(RefusedFile("data = '/x'\nlisten = '10.0.0.1:7447'\n"),
+              AllOf(HasSubstr("line 2"), HasSubstr("loopback")));
+  for (const char* address : {"127.0.0.1:0", "127.1.2.3:1", "localhost:7447", "[::1]:7447"}) {
+    EXPECT_TRUE(Parse({"--data", "/x", "--listen", address}).has_value()) << address;
+  }
+}
+
+TEST_F(DaemonConfigTest, RefusesValuesThatMakeNoSense) {
+  const std::vector<std::vector<std::string>> mistakes = {{"--cell-size", "0.1x"},
+                                                          {"--segments", "3.5"},
+                                                          {"--segment-height", "x"},
+                                                          {"--listen", "7447"},
+                                                          {"--listen", "h:70000"},
+                                                          {"--listen", "127.0.0.1:"},
+                                                          {"--listen", "127.0.0.1:-1"},
+                                                          {"--log-level", "loud"},
+                                                          {"--preset", "paper"},
+                                                          {"--cache-mib", "9999999999"},
+                                                          {"--workers", ""},
+                                                          {"--workers"},
+                                                          {"--nonsense"},
+                                                          {"--data", "/y", "extra"}};
+  for (std::vector<std::string> arguments : mistakes) {
+    arguments.insert(arguments.begin(), {"--data", "/x"});
+    EXPECT_NE(Refusal(arguments), "accepted") << arguments[2];
+  }
+}
+
+TEST_F(DaemonConfigTest, AMapThatCannotBeIsRefused) {
+  const std::vector<std::vector<std::string>> mistakes = {
+      {"--cell-size", "-0.1"},  {"--cell-size", "nan"},    {"--cell-size", "1e300"},
+      {"--cell-size", "0.001"}, {"--segments", "3"},       {"--segments", "300"},
+      {"--segments", "-8"},     {"--segment-height", "0"}, {"--segment-height", "inf"}};
+  for (std::vector<std::string> arguments : mistakes) {
+    const std::string what = arguments[0] + " " + arguments[1];
+    arguments.insert(arguments.begin(), {"--data", "/x"});
+    const auto command = Parse(arguments);
+    ASSERT_TRUE(command.has_value()) << what;
+    const auto profile = command->config.NewProfile();
+    ASSERT_FALSE(profile.has_value()) << what;
+    EXPECT_EQ(profile.error().code(), StatusCode::kInvalidArgument) << what;
+  }
+}
+
+TEST_F(DaemonConfigTest, AMissingFileIsNotFound) {
+  const auto command = Parse({"--config", "/nowhere.toml"});
+  ASSERT_FALSE(command.has_value());
+  EXPECT_EQ(command.error().code(), StatusCode::kNotFound);
+  EXPECT_THAT(command.error().message(), HasSubstr("/nowhere.toml"));
+}
+
+TEST_F(DaemonConfigTest, HelpAndVersionArePrintedNotRefused) {
+  const auto help = Parse({"--help"});
+  ASSERT_TRUE(help.has_value());
+  EXPECT_THAT(help->text.value(), HasSubstr("--segment-height"));
+  const auto version = Parse({"--version"});
+  ASSERT_TRUE(version.has_value());
+  EXPECT_THAT(version->text.value(), HasSubstr("atlasd "));
+}
+
+TEST_F(DaemonConfigTest, AnExistingMapIsKeptToUnlessNothingWasAsked) {
+  MapProfile existing;
+  existing.segment_height_mm = 500;
+  EXPECT_TRUE(Parse({"--data", "/x"})->config.CheckAgainst(existing).ok());
+  const auto same = Parse({"--data", "/x", "--segment-height", "0.5"});
+  EXPECT_TRUE(same->config.CheckAgainst(existing).ok());
+  const auto other = Parse({"--data", "/x", "--segment-height", "1"});
+  const Status status = other->config.CheckAgainst(existing);
+  EXPECT_EQ(status.code(), StatusCode::kInvalidData);
+  EXPECT_THAT(status.message(), HasSubstr("segment height"));
+}
+
+}  // namespace
+}  // namespace atlas

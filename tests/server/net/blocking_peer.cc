@@ -1,0 +1,116 @@
+#include "tests/server/net/blocking_peer.h"
+
+#include <array>
+#include <cerrno>
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+namespace atlas {
+namespace {
+
+constexpr timeval kPatience{30, 0};
+
+int Connect(std::uint16_t port, int buffer_bytes) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (buffer_bytes != 0) {
+    ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &buffer_bytes, sizeof buffer_bytes);
+    ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
+  }
+  ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+    return fd;
+  }
+  ::close(fd);
+  return -1;
+}
+
+bool IsWritable(int fd, std::chrono::milliseconds patience) {
+  pollfd waiting{fd, POLLOUT, 0};
+  return ::poll(&waiting, 1, static_cast<int>(patience.count())) == 1 &&
+         (waiting.revents & (POLLERR | POLLHUP)) == 0;
+}
+
+}  // namespace
+
+BlockingPeer::BlockingPeer(std::uint16_t port, int buffer_bytes)
+    : fd_(Connect(port, buffer_bytes)) {}
+
+BlockingPeer::~BlockingPeer() {
+  if (fd_ >= 0) {
+    ::close(fd_);
+  }
+}
+
+bool BlockingPeer::SendBytes(ByteSpan bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t sent = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (sent <= 0) {
+      return false;
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(sent));
+  }
+  return true;
+}
+
+bool BlockingPeer::Send(const wire::Envelope& envelope) const {
+  return SendBytes(EncodeEnvelopeFrame(envelope).value());
+}
+
+std::size_t BlockingPeer::SendUntilStuck(ByteSpan bytes, std::chrono::milliseconds patience) const {
+  std::size_t total = 0;
+  while (total < bytes.size() && IsWritable(fd_, patience)) {
+    const ssize_t sent =
+        ::send(fd_, bytes.data() + total, bytes.size() - total, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent <= 0) {
+      break;
+    }
+    total += static_cast<std::size_t>(sent);
+  }
+  return total;
+}
+
+void BlockingPeer::CloseSending() const {
+  ::shutdown(fd_, SHUT_WR);
+}
+
+std::optional<wire::Envelope> BlockingPeer::Receive(std::size_t* size_bytes) {
+  while (true) {
+    auto next = decoder_.Next();
+    EXPECT_TRUE(next.has_value()) << next.error().message();
+    if (next && *next) {
+      if (size_bytes != nullptr) {
+        *size_bytes = kFrameHeaderBytes + (*next)->size();
+      }
+      return ParseEnvelope(**next).value();
+    }
+    std::array<std::uint8_t, 16'384> chunk{};
+    const ssize_t size = ::recv(fd_, chunk.data(), chunk.size(), 0);
+    if (size <= 0) {
+      EXPECT_TRUE(size == 0 || errno != EAGAIN) << "the daemon neither answered nor closed";
+      return std::nullopt;
+    }
+    decoder_.Push(ByteSpan(chunk).first(static_cast<std::size_t>(size)));
+  }
+}
+
+wire::Envelope BlockingPeer::Greet(std::uint32_t major, const std::string& profile) {
+  wire::Envelope hello;
+  hello.set_request_id(1);
+  hello.mutable_hello()->set_protocol_major(major);
+  hello.mutable_hello()->set_profile(profile);
+  Send(hello);
+  return Receive().value_or(wire::Envelope());
+}
+
+}  // namespace atlas

@@ -1,0 +1,238 @@
+// Peers that stall, flood or come in crowds: each within its limits, the others served.
+#include "tests/server/net/net_fixture.h"
+
+namespace atlas {
+namespace {
+
+using std::chrono::milliseconds;
+
+class LimitTest : public NetTest {
+ protected:
+  static constexpr milliseconds kSoon{1'000};
+};
+
+TEST_F(LimitTest, SilenceBeforeTheHelloEnds) {
+  net_.handshake = kSoon;
+  Serve();
+  BlockingPeer peer(port_);
+  EXPECT_TRUE(peer.IsClosed());
+  ExpectServes();
+}
+
+TEST_F(LimitTest, SilenceBetweenFramesEnds) {
+  net_.idle = kSoon;
+  Serve();
+  const auto peer = Connect();
+  EXPECT_TRUE(peer->IsClosed());
+  ExpectServes();
+}
+
+TEST_F(LimitTest, SilenceWhileARequestRunsIsNotIdle) {
+  net_.idle = milliseconds(50);
+  Serve(0);  // nothing is ever fused
+  UploadDrive(1);
+  wire::Envelope hello;
+  hello.mutable_hello()->set_protocol_major(kProtocolMajor);
+  Bytes bytes = EncodeEnvelopeFrame(hello).value();
+  const Bytes wait = EncodeEnvelopeFrame(WaitOf(3, 500)).value();
+  bytes.insert(bytes.end(), wait.begin(), wait.end());
+  BlockingPeer peer(port_);
+  peer.SendBytes(bytes);
+  EXPECT_TRUE(peer.Receive()->has_hello_reply());
+  EXPECT_TRUE(peer.Receive()->has_wait_reply());
+  EXPECT_TRUE(peer.IsClosed());
+}
+
+TEST_F(LimitTest, AStallInTheMiddleOfAFrameEnds) {
+  net_.frame = kSoon;
+  Serve();
+  const auto peer = Connect();
+  const Bytes frame = EncodeEnvelopeFrame(UploadOf(0, 1)).value();
+  peer->SendBytes(ByteSpan(frame).first(frame.size() / 2));
+  EXPECT_TRUE(peer->IsClosed());
+  ExpectServes();
+  EXPECT_EQ(service_->ReadStatus()->counts.keyframes, 0u);
+}
+
+TEST_F(LimitTest, AStallBehindAWholeFrameEnds) {
+  net_.frame = kSoon;
+  Serve();
+  const auto peer = Connect();
+  Bytes bytes = EncodeEnvelopeFrame(StatusOf(5)).value();
+  bytes.push_back('R');
+  peer->SendBytes(bytes);
+  EXPECT_TRUE(peer->Receive()->has_status_reply());
+  EXPECT_TRUE(peer->IsClosed());
+}
+
+TEST_F(LimitTest, FramesThatWaitForRoomAreNoStall) {
+  net_.frame = milliseconds(50);
+  net_.max_requests_in_flight = 1;
+  Serve(0);  // nothing is ever fused
+  UploadDrive(1);
+  const auto peer = Connect();
+  Bytes bytes = EncodeEnvelopeFrame(WaitOf(1, 300)).value();
+  const Bytes next = EncodeEnvelopeFrame(StatusOf(2)).value();
+  bytes.insert(bytes.end(), next.begin(), next.end());
+  peer->SendBytes(bytes);
+  EXPECT_TRUE(peer->Receive()->wait_reply().timed_out());
+  EXPECT_TRUE(peer->Receive()->has_status_reply());
+}
+
+TEST_F(LimitTest, ALargeClaimCostsNothingUntilBytesCome) {
+  net_.frame = kSoon;
+  Serve();
+  const std::uint64_t before = service_->ReadStatus()->rss_bytes;
+  std::vector<std::unique_ptr<BlockingPeer>> peers;
+  for (int i = 0; i < 20; ++i) {
+    Bytes header = EncodeFrameHeader({});
+    header[7] = 2;  // 32 MiB, of which nothing comes
+    peers.push_back(Connect());
+    peers.back()->SendBytes(header);
+  }
+  ExpectServes();
+  EXPECT_LT(service_->ReadStatus()->rss_bytes, before + (64u << 20));
+  for (const auto& peer : peers) {
+    EXPECT_TRUE(peer->IsClosed());
+  }
+}
+
+TEST_F(LimitTest, AReaderThatStopsFillsItsOwnQueueAndLosesNothing) {
+  constexpr std::uint64_t kQueries = 3'000;
+  net_.max_queued_bytes = 4'096;
+  net_.max_requests_in_flight = 4;
+  Serve();
+  UploadDrive(12);
+  Digest();
+  const auto peer = Connect(4'096);
+  // Replies fill every buffer, then the daemon stops reading from this peer: no more is sent.
+  const Bytes queries = PaddedQueries(kQueries);
+  const std::size_t taken = peer->SendUntilStuck(queries, milliseconds(1'000));
+  EXPECT_LT(taken, queries.size());
+  ExpectServes();
+  // It reads again: everything that was sent whole is answered.
+  peer->CloseSending();
+  const std::uint64_t sent = taken * kQueries / queries.size();
+  std::uint64_t ended = 0;
+  while (const auto reply = peer->Receive()) {
+    ended += reply->has_query_end() ? 1u : 0u;
+  }
+  EXPECT_GE(ended + 1, sent);
+  EXPECT_LT(ended, kQueries);
+}
+
+TEST_F(LimitTest, AReaderThatNeverReadsAgainIsClosed) {
+  net_.write_stall = kSoon;
+  Serve();
+  UploadDrive(12);
+  Digest();
+  const auto peer = Connect(4'096);
+  const Bytes queries = PaddedQueries(3'000);
+  EXPECT_LT(peer->SendUntilStuck(queries, milliseconds(5'000)), queries.size());
+  ExpectServes();
+}
+
+TEST_F(LimitTest, ConnectionsBeyondTheLimitAreToldSo) {
+  net_.max_connections = 2;
+  Serve();
+  const auto first = Connect();
+  const auto second = Connect();
+  BlockingPeer third(port_);
+  const auto reply = third.Receive();
+  EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
+  EXPECT_TRUE(reply->error().retry());
+  EXPECT_TRUE(third.IsClosed());
+  first->Send(StatusOf(1));
+  EXPECT_TRUE(first->Receive().has_value());
+}
+
+TEST_F(LimitTest, APlaceIsFreeWhenItsConnectionLeft) {
+  net_.max_connections = 1;
+  Serve();
+  for (int i = 0; i < 20; ++i) {
+    const auto peer = Connect();
+    peer->CloseSending();
+    EXPECT_TRUE(peer->IsClosed());
+  }
+}
+
+TEST_F(LimitTest, APlaceIsFreeWhenASlowReaderGotItsLastReply) {
+  net_.max_connections = 1;
+  Serve();
+  UploadDrive(12);
+  Digest();
+  const auto peer = Connect(4'096);
+  peer->SendUntilStuck(PaddedQueries(3'000), milliseconds(500));
+  peer->CloseSending();
+  while (peer->Receive()) {
+  }
+  ExpectServes();
+}
+
+TEST_F(LimitTest, ALargeHelloIsRefused) {
+  Serve();
+  BlockingPeer peer(port_);
+  const wire::Envelope reply = peer.Greet(kProtocolMajor, std::string(20'000, 'p'));
+  EXPECT_EQ(CodeOf(reply), StatusCode::kResourceExhausted);
+  EXPECT_TRUE(peer.IsClosed());
+}
+
+TEST_F(LimitTest, MoreThanTheDaemonHoldsIsRefused) {
+  net_.max_held_bytes = 256u << 10;
+  Serve();
+  const auto peer = Connect();
+  Bytes bytes = EncodeFrameHeader({});
+  bytes[6] = 0x10;  // 1 MiB
+  bytes.resize(512u << 10);
+  peer->SendBytes(bytes);
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kResourceExhausted);
+  EXPECT_TRUE(peer->IsClosed());
+  ExpectServes();
+}
+
+TEST_F(LimitTest, WhatIsAnsweredIsNoLongerHeld) {
+  net_.max_held_bytes = 256u << 10;
+  Serve();
+  const auto peer = Connect();
+  std::size_t bytes = 0;
+  for (std::uint32_t i = 0; bytes < 4 * net_.max_held_bytes; ++i) {
+    const wire::Envelope upload = UploadOf(i % 8, 10 + i);
+    bytes += upload.ByteSizeLong();
+    ASSERT_TRUE(peer->Send(upload));
+    ASSERT_TRUE(peer->Receive()->has_upload_reply());
+  }
+}
+
+TEST_F(LimitTest, TooManyWaitsAreBusyAndLeaveRoomForWork) {
+  net_.max_waits = 2;
+  Serve(0);  // nothing is ever fused
+  UploadDrive(1);
+  const auto peer = Connect();
+  for (std::uint64_t id = 1; id <= 3; ++id) {
+    peer->Send(WaitOf(id, 60'000));
+  }
+  const auto busy = peer->Receive();
+  EXPECT_EQ(CodeOf(busy), StatusCode::kUnavailable);
+  EXPECT_EQ(busy->request_id(), 3u);
+  EXPECT_TRUE(busy->error().retry());
+  peer->Send(StatusOf(9));
+  EXPECT_EQ(peer->Receive()->request_id(), 9u);
+}
+
+TEST_F(LimitTest, AWaitEndsWhenItsPeerSendsNoMore) {
+  net_.max_waits = 1;
+  Serve(0);  // nothing is ever fused
+  UploadDrive(1);
+  for (int i = 0; i < 5; ++i) {  // one place: each must be given back
+    const auto peer = Connect();
+    peer->Send(WaitOf(1, 3'600'000));
+    peer->CloseSending();
+    const auto reply = peer->Receive();
+    EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
+    EXPECT_NE(reply->error().message().find("gone"), std::string::npos) << reply->error().message();
+    EXPECT_TRUE(peer->IsClosed());
+  }
+}
+
+}  // namespace
+}  // namespace atlas

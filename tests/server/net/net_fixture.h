@@ -1,0 +1,118 @@
+// A served atlas on a free port of loopback, and the requests that tests send to it.
+#pragma once
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <string>
+
+#include "proto/wire/convert.h"
+#include "server/net/tcp_server.h"
+#include "tests/server/net/blocking_peer.h"
+#include "tests/server/service/service_fixture.h"
+
+namespace atlas {
+
+class NetTest : public ServiceTest {
+ protected:
+  ~NetTest() override { StopServer(); }
+
+  void Serve(unsigned workers = 1) {
+    Listen(workers);
+    Run();
+  }
+  void Listen(unsigned workers) {
+    Open(workers);
+    server_ = std::make_unique<TcpServer>(*service_, net_);
+    const Result<std::string> address = server_->Listen("127.0.0.1", 0);
+    ASSERT_TRUE(address.has_value()) << address.error().message();
+    port_ = static_cast<std::uint16_t>(std::stoi(address->substr(address->rfind(':') + 1)));
+  }
+  void Run() {
+    run_ = std::async(std::launch::async, [this] { server_->Run(); });
+  }
+  // The server, told to stop, has drained in time.
+  bool HasDrained() const {
+    return run_.wait_for(std::chrono::seconds(30)) == std::future_status::ready;
+  }
+  void StopServer() {
+    if (server_) {
+      server_->Stop();
+      run_.get();
+    }
+    server_.reset();
+  }
+
+  std::unique_ptr<BlockingPeer> Connect(int buffer_bytes = 0) const {
+    auto peer = std::make_unique<BlockingPeer>(port_, buffer_bytes);
+    EXPECT_EQ(peer->Greet().body_case(), wire::Envelope::kHelloReply);
+    return peer;
+  }
+  // A good client is served, whatever the others do.
+  void ExpectServes() const {
+    const auto peer = Connect();
+    peer->Send(StatusOf(77));
+    const auto reply = peer->Receive();
+    ASSERT_TRUE(reply.has_value());
+    EXPECT_EQ(reply->request_id(), 77u);
+    EXPECT_EQ(reply->body_case(), wire::Envelope::kStatusReply);
+  }
+  // `count` queries, padded with a field that the daemon does not know: few of them fill a socket.
+  static Bytes PaddedQueries(std::uint64_t count) {
+    Bytes bytes;
+    for (std::uint64_t id = 1; id <= count; ++id) {
+      wire::Envelope query = QueryOf(id);
+      auto* const unknown = query.GetReflection()->MutableUnknownFields(&query);
+      unknown->AddLengthDelimited(1'000)->assign(2'000, 'x');
+      const Bytes frame = EncodeEnvelopeFrame(query).value();
+      bytes.insert(bytes.end(), frame.begin(), frame.end());
+    }
+    return bytes;
+  }
+  // kOk for a reply that is no error, or none.
+  static StatusCode CodeOf(const std::optional<wire::Envelope>& reply) {
+    return reply && reply->has_error() ? ErrorFromWire(reply->error()).status.code()
+                                       : StatusCode::kOk;
+  }
+
+  static wire::Envelope UploadOf(UploadRequest upload, std::uint64_t request_id) {
+    wire::Envelope envelope;
+    envelope.set_request_id(request_id);
+    wire::UploadKeyframe& message = *envelope.mutable_upload_keyframe();
+    *message.mutable_key() = KeyToWire(upload.key);
+    message.set_time_ms(upload.time_ms);
+    *message.mutable_pose() = PoseToWire(upload.pose);
+    message.set_blob(BytesToWire(upload.blob));
+    return envelope;
+  }
+  static wire::Envelope UploadOf(std::uint32_t i, std::uint64_t request_id) {
+    return UploadOf(DriveUpload(i), request_id);
+  }
+  static wire::Envelope StatusOf(std::uint64_t request_id) {
+    wire::Envelope envelope;
+    envelope.set_request_id(request_id);
+    envelope.mutable_status_request();
+    return envelope;
+  }
+  static wire::Envelope WaitOf(std::uint64_t request_id, std::uint32_t timeout_ms) {
+    wire::Envelope envelope;
+    envelope.set_request_id(request_id);
+    envelope.mutable_wait_request()->set_timeout_ms(timeout_ms);
+    return envelope;
+  }
+  static wire::Envelope QueryOf(std::uint64_t request_id, std::uint64_t budget_bytes = 0) {
+    wire::Envelope envelope;
+    envelope.set_request_id(request_id);
+    envelope.mutable_query_region()->set_budget_bytes(budget_bytes);
+    return envelope;
+  }
+
+  NetOptions net_;
+  std::unique_ptr<TcpServer> server_;
+  std::uint16_t port_ = 0;
+
+ private:
+  std::future<void> run_;
+};
+
+}  // namespace atlas
