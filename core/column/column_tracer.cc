@@ -14,17 +14,17 @@ namespace {
 
 // What a scan says about the half segments above each cell of the grid.
 struct CellMasks {
-  explicit CellMasks(std::size_t cells) : passed(cells), measured(cells), hit(cells) {}
+  explicit CellMasks(std::size_t cells) : passed(cells), hit(cells) {}
 
-  std::vector<HalfMask> passed;    // by a ray
-  std::vector<HalfMask> measured;  // whole segments in which anything was
-  std::vector<HalfMask> hit;       // whole segments in which an obstacle was
+  std::vector<HalfMask> passed;  // by a ray, and nothing was measured in the segment
+  std::vector<HalfMask> hit;     // whole segments in which an obstacle was
 };
 
 float GroundHeight(const KeyframeCell& cell) {
   return static_cast<float>(cell.altitude_mm) * 1e-3F;
 }
 
+// After the rays: where something was measured nothing was passed.
 void MarkReturns(const LeveledScan& scan,
                  const RayTable& rays,
                  std::span<const KeyframeCell> cells,
@@ -41,7 +41,7 @@ void MarkReturns(const LeveledScan& scan,
     }
     const std::size_t cell = grid.Index(ix, iy);
     const HalfMask segment = halves.SegmentAt(scan.z[i]);
-    masks.measured[cell] |= segment;
+    masks.passed[cell] &= ~segment;
     const float above_ground_m = scan.z[i] - GroundHeight(cells[cell]);
     if (scan.is_ground[i] == 0 && above_ground_m >= base_offset_m) {
       masks.hit[cell] |= segment;
@@ -49,31 +49,25 @@ void MarkReturns(const LeveledScan& scan,
   }
 }
 
-// Ors each entry with its neighbours up to `reach` entries of `stride` away.
-std::vector<HalfMask> Widened(const std::vector<HalfMask>& masks,
-                              std::size_t reach,
-                              std::size_t stride) {
-  std::vector<HalfMask> widened = masks;
-  for (std::size_t offset = stride; offset <= reach * stride; offset += stride) {
-    for (std::size_t i = offset; i < masks.size(); ++i) {
-      widened[i] |= masks[i - offset];
-    }
-    for (std::size_t i = offset; i < masks.size(); ++i) {
-      widened[i - offset] |= masks[i];
-    }
-  }
-  return widened;
-}
-
 // Poses, the vehicle's motion during a scan and the grid itself blur where obstacles are, and a ray
 // that grazes a wall passes the cells beside its own: near a hit segment nothing was passed.
 void ProtectNeighbours(const GridGeometry& grid, float blur_m, CellMasks& masks) {
+  const std::int32_t side = grid.side();
   const auto reach =
-      static_cast<std::size_t>(std::max(1L, std::lround(blur_m / grid.cell_size_m())));
-  const std::vector<HalfMask> near =
-      Widened(Widened(masks.hit, reach, 1), reach, static_cast<std::size_t>(grid.side()));
-  for (std::size_t i = 0; i < near.size(); ++i) {
-    masks.passed[i] &= ~(masks.measured[i] | near[i]);
+      static_cast<std::int32_t>(std::max(1L, std::lround(blur_m / grid.cell_size_m())));
+  for (std::int32_t row = 0; row < side; ++row) {
+    for (std::int32_t column = 0; column < side; ++column) {
+      const HalfMask hit = masks.hit[static_cast<std::size_t>(row * side + column)];
+      if (hit == 0) {
+        continue;
+      }
+      for (std::int32_t y = std::max(0, row - reach); y <= std::min(side - 1, row + reach); ++y) {
+        for (std::int32_t x = std::max(0, column - reach); x <= std::min(side - 1, column + reach);
+             ++x) {
+          masks.passed[static_cast<std::size_t>(y * side + x)] &= ~hit;
+        }
+      }
+    }
   }
 }
 

@@ -16,6 +16,7 @@ class HalfSegments {
   // From eight segments below the ground under the sensor to 24 above it.
   HalfSegments(float segment_height_m, float ground_m)
       : segment_height_m_(segment_height_m),
+        segments_per_m_(1.0F / segment_height_m),
         first_segment_(static_cast<int>(std::floor(ground_m / segment_height_m)) - kBelowGround) {}
 
   float half_height_m() const { return 0.5F * segment_height_m_; }
@@ -27,8 +28,8 @@ class HalfSegments {
   }
   // Both bits of the segment at a height.
   HalfMask SegmentAt(float z_m) const {
-    const auto segment = static_cast<int>(std::floor(z_m / segment_height_m_));
-    return Bit(2 * segment) | Bit(2 * segment + 1);
+    const int bit = 2 * (static_cast<int>(std::floor(z_m * segments_per_m_)) - first_segment_);
+    return bit >= 0 && bit < kBits ? HalfMask{3} << bit : 0;
   }
   // All segments that end below the sensor.
   HalfMask BelowSensor() const { return first_segment_ < 0 ? Bit(0) - 1 : 0; }
@@ -47,6 +48,7 @@ class HalfSegments {
   static constexpr int kBelowGround = 8;
 
   float segment_height_m_;
+  float segments_per_m_;
   int first_segment_;
 };
 

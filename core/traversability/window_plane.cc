@@ -108,6 +108,9 @@ std::optional<PlaneFit> FitPlane(const WindowReturns& window,
     if (!best || inliers > best->inliers) {
       best = PlaneFit{*plane, inliers};
     }
+    if (inliers == window.size()) {
+      break;  // no later triple can have more: most windows of a road end here
+    }
   }
   return best;
 }
