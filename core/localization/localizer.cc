@@ -93,10 +93,10 @@ std::vector<Pose> Localizer::AheadHypotheses(const Pose& T_world_level) const {
   std::vector<Pose> starts{T_world_level};
   if (!is_first_ && !motion_) {
     const Eigen::Vector3d ahead = T_world_level.linear().col(0);
-    for (double d = options_.search_step_m; d <= options_.search_ahead_m;
-         d += options_.search_step_m) {
+    const int steps = static_cast<int>(options_.search_ahead_m / options_.search_step_m);
+    for (int step = 1; step <= steps; ++step) {
       starts.push_back(T_world_level);
-      starts.back().translation() += d * ahead;
+      starts.back().translation() += step * options_.search_step_m * ahead;
     }
   }
   return starts;
@@ -104,9 +104,11 @@ std::vector<Pose> Localizer::AheadHypotheses(const Pose& T_world_level) const {
 
 std::vector<Pose> Localizer::TurnHypotheses(const Pose& T_world_level) const {
   std::vector<Pose> starts;
-  for (double yaw = options_.search_yaw_step_rad; yaw <= options_.search_yaw_rad;
-       yaw += options_.search_yaw_step_rad) {
-    for (const double turn : {yaw, -yaw}) {
+  const int steps =
+      static_cast<int>(std::lround(options_.search_yaw_rad / options_.search_yaw_step_rad));
+  for (int step = 1; step <= steps; ++step) {
+    const double yaw_rad = step * options_.search_yaw_step_rad;
+    for (const double turn : {yaw_rad, -yaw_rad}) {
       starts.push_back(T_world_level);
       starts.back().linear() =
           Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix() *

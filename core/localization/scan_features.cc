@@ -25,7 +25,7 @@ class VoxelAverager {
       for (; end < points_.size() && points_[end].first == points_[begin].first; ++end) {
         sum += points_[end].second;
       }
-      means.push_back(sum / static_cast<float>(end - begin));
+      means.emplace_back(sum / static_cast<float>(end - begin));
       begin = end;
     }
     return means;
