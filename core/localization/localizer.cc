@@ -1,5 +1,6 @@
 #include "core/localization/localizer.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -39,6 +40,7 @@ void Localizer::Start(const Pose& T_world_sensor) {
   motion_.reset();
   is_first_ = true;
   usual_fit_ = 0.0;
+  lost_ = 0;
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
@@ -48,8 +50,14 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
     return Error(std::move(status));
   }
   const ScanFeatures features = ExtractFeatures(scan, options_.features);
+  const Pose T_world_level = LevelFrame(predicted);
   LocalizationResult result;
-  result.registration = Best(features, LevelFrame(predicted));
+  result.registration = Track(features, T_world_level);
+  if (!is_first_ && IsDoubtful(result.registration)) {
+    if (auto found = Search(features, T_world_level, result.registration)) {
+      result.registration = *std::move(found);
+    }
+  }
   result.health = Judge(result.registration);
   result.T_world_sensor = result.registration.T_world_level;
   result.T_world_sensor.linear() =
@@ -57,16 +65,27 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
   if (result.health == LocalizationHealth::kLost) {
     result.T_world_sensor.translation() = predicted.translation();
   }
+  Remember(result);
+  return result;
+}
+
+void Localizer::Remember(const LocalizationResult& result) {
   if (result.health == LocalizationHealth::kGood) {
     const double fit = result.registration.fit;
     usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;
   }
-  if (!is_first_ && (motion_ || result.health == LocalizationHealth::kGood)) {
-    motion_ = last_.inverse() * result.T_world_sensor;
+  if (result.health == LocalizationHealth::kLost) {
+    ++lost_;
+    motion_.reset();  // the vehicle is looked for where it was lost
+  } else {
+    const bool is_motion_known = !is_first_ && lost_ == 0;
+    if (is_motion_known && (motion_ || result.health == LocalizationHealth::kGood)) {
+      motion_ = last_.inverse() * result.T_world_sensor;
+    }
+    lost_ = 0;
   }
   last_ = result.T_world_sensor;
   is_first_ = false;
-  return result;
 }
 
 Status Localizer::RenewWindow(const Eigen::Vector3d& center) {
@@ -86,6 +105,7 @@ Status Localizer::RenewWindow(const Eigen::Vector3d& center) {
   }
   window_.emplace(profile_, views, center, radius_m, options_.window);
   window_center_ = center;
+  coarse_.reset();
   return {};
 }
 
@@ -102,42 +122,47 @@ std::vector<Pose> Localizer::AheadHypotheses(const Pose& T_world_level) const {
   return starts;
 }
 
-std::vector<Pose> Localizer::TurnHypotheses(const Pose& T_world_level) const {
-  std::vector<Pose> starts;
-  const int steps =
-      static_cast<int>(std::lround(options_.search_yaw_rad / options_.search_yaw_step_rad));
-  for (int step = 1; step <= steps; ++step) {
-    const double yaw_rad = step * options_.search_yaw_step_rad;
-    for (const double turn : {yaw_rad, -yaw_rad}) {
-      starts.push_back(T_world_level);
-      starts.back().linear() =
-          Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
-          T_world_level.linear();
-    }
-  }
-  return starts;
-}
-
-RegistrationResult Localizer::Best(const ScanFeatures& features, const Pose& T_world_level) const {
+RegistrationResult Localizer::Track(const ScanFeatures& features, const Pose& T_world_level) const {
   RegistrationOptions options = options_.registration;
   if (!is_first_) {
     options.start_sigma_m = options_.predicted_sigma_m;
     options.start_sigma_rad = options_.predicted_sigma_rad;
   }
   std::optional<RegistrationResult> best;
-  const auto try_all = [&](const std::vector<Pose>& starts) {
-    for (const Pose& start : starts) {
-      RegistrationResult result = Register(*window_, features, start, options);
-      if (!best || result.fit > best->fit) {
-        best = std::move(result);
-      }
+  for (const Pose& start : AheadHypotheses(T_world_level)) {
+    RegistrationResult result = Register(*window_, features, start, options);
+    if (!best || result.fit > best->fit) {
+      best = std::move(result);
     }
-  };
-  try_all(AheadHypotheses(T_world_level));
-  if (!is_first_ && best->fit < options_.doubtful_fit * usual_fit_) {
-    try_all(TurnHypotheses(T_world_level));
   }
   return *best;
+}
+
+bool Localizer::IsDoubtful(const RegistrationResult& result) const {
+  return lost_ > 0 || result.fit < options_.min_fit ||
+         result.fit < options_.doubtful_fit * usual_fit_;
+}
+
+std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features,
+                                                    const Pose& T_world_level,
+                                                    const RegistrationResult& tracked) {
+  if (!coarse_) {
+    coarse_.emplace(*window_, options_.search.block_m);
+  }
+  const SearchReach reach{
+      std::min((1 + lost_) * options_.search_reach.distance_m,
+               options_.max_search_reach.distance_m),
+      std::min((1 + lost_) * options_.search_reach.yaw_rad, options_.max_search_reach.yaw_rad)};
+  std::optional<RegistrationResult> best;
+  for (const Pose& start :
+       SearchPoses(*coarse_, window_->origin(), features, T_world_level, reach, options_.search)) {
+    RegistrationResult result = Register(*window_, features, start, options_.registration);
+    if (!best || result.fit > best->fit) {
+      best = std::move(result);
+    }
+  }
+  const bool is_believed = best && best->fit > options_.believed_gain * tracked.fit;
+  return is_believed ? best : std::nullopt;
 }
 
 LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {

@@ -4,12 +4,14 @@
 
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "core/base/status.h"
 #include "core/localization/map_window.h"
+#include "core/localization/pose_search.h"
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
 
@@ -40,11 +42,14 @@ struct LocalizerOptions {
   // While the speed is unknown, starts are tried this far ahead of the last pose.
   double search_ahead_m = 4.0;
   double search_step_m = 0.5;
-  // A fit below this share of the usual one: the vehicle may have turned, so other headings are
-  // tried.
+  // A fit below this share of the usual one: the vehicle may have turned or braked more than
+  // predicted, so other places and headings are tried, further off with every scan that is lost.
+  // One is believed when its fit is better by this factor.
   double doubtful_fit = 0.85;
-  double search_yaw_rad = 0.56;       // either way
-  double search_yaw_step_rad = 0.14;  // 8 degrees: within the reach of a registration
+  double believed_gain = 1.1;
+  SearchReach search_reach;  // of the first search; each lost scan adds as much
+  SearchReach max_search_reach{8.0, std::numbers::pi};
+  PoseSearchOptions search;
 };
 
 struct LocalizationResult {
@@ -68,19 +73,26 @@ class Localizer {
  private:
   Status RenewWindow(const Eigen::Vector3d& center);
   std::vector<Pose> AheadHypotheses(const Pose& T_world_level) const;
-  std::vector<Pose> TurnHypotheses(const Pose& T_world_level) const;
-  RegistrationResult Best(const ScanFeatures& features, const Pose& T_world_level) const;
+  RegistrationResult Track(const ScanFeatures& features, const Pose& T_world_level) const;
+  bool IsDoubtful(const RegistrationResult& result) const;
+  // The best around `T_world_level` where it beats `tracked`.
+  std::optional<RegistrationResult> Search(const ScanFeatures& features,
+                                           const Pose& T_world_level,
+                                           const RegistrationResult& tracked);
+  void Remember(const LocalizationResult& result);
   LocalizationHealth Judge(const RegistrationResult& result) const;
 
   MapProfile profile_;
   TilesAround tiles_;
   LocalizerOptions options_;
   std::optional<MapWindow> window_;
+  std::optional<CoarseOccupancy> coarse_;  // of window_, made when a search needs it
   Eigen::Vector3d window_center_ = Eigen::Vector3d::Zero();
   Pose last_ = Pose::Identity();  // T_world_sensor
   std::optional<Pose> motion_;    // from one scan to the next, sensor frame
   bool is_first_ = true;
   double usual_fit_ = 0.0;  // of good results, exponentially forgotten
+  int lost_ = 0;            // scans in a row
 };
 
 }  // namespace atlas

@@ -34,7 +34,8 @@ struct SurfacePlane {
   Eigen::Vector2f gradient = Eigen::Vector2f::Zero();
 };
 
-// Window frame: axes of the world, origin at `origin` (world, metres), floats are exact enough.
+// Window frame: axes of the world, origin at `origin` (world, metres), its lowest corner; floats
+// are exact enough.
 class MapWindow {
  public:
   // `tiles`: level-0 tiles that touch the square of `radius_m` around `center`; others are ignored.
@@ -46,6 +47,8 @@ class MapWindow {
 
   const Eigen::Vector3d& origin() const { return origin_; }
   float cell_size_m() const { return cell_size_m_; }
+  float segment_height_m() const { return segment_height_m_; }
+  float side_m() const { return static_cast<float>(side_) * cell_size_m_; }
   std::size_t lines() const { return lines_.size(); }
   std::size_t surfaces() const { return surfaces_.size(); }
 
@@ -57,6 +60,19 @@ class MapWindow {
                                      float* height_m) const;
   // Whether an occupied segment stands at `p`.
   bool IsOccupied(const Eigen::Vector3f& p) const;
+
+  // Calls visit(cell centre, mask) for every cell with occupied segments: bit k is the one at
+  // heights [k, k + 1) segment_height_m().
+  template <typename Visit>
+  void ForEachOccupied(Visit&& visit) const {
+    for (std::int32_t y = 0; y < side_; ++y) {
+      for (std::int32_t x = 0; x < side_; ++x) {
+        if (const std::uint64_t mask = masks_[Index({x, y})]; mask != 0) {
+          visit(CellCenter({x, y}), mask);
+        }
+      }
+    }
+  }
 
  private:
   struct CellRef {
