@@ -15,7 +15,7 @@ namespace atlas {
 namespace {
 
 constexpr double kScanInterval_s = 0.1;  // where times.txt is missing
-constexpr double kMaxTime_s = 1e12;      // fits a message; the daemon knows what time it is
+constexpr double kMaxAhead_s = 60.0;     // what the daemon accepts
 
 // From one scan to the next, as the sensor moves; still when it has no neighbour before a jump.
 Pose MotionAt(const DriveFolder& drive, std::size_t index) {
@@ -110,9 +110,10 @@ class Ingest {
 
   Result<std::int64_t> TimeOf(const DriveScan& scan) const {
     const double time_s = options_.start_s + scan.time_s.value_or(kScanInterval_s * scan.number);
-    if (!(time_s >= 0.0 && time_s <= kMaxTime_s)) {
+    if (!(time_s >= 0.0 && time_s <= options_.now_s + kMaxAhead_s)) {
       return Error(StatusCode::kInvalidData,
-                   StrCat("scan ", scan.number, ": time ", time_s, " s: expected 0 or more"));
+                   StrCat("scan ", scan.number, ": time ", time_s,
+                          " s since 1970: expected 0 to a minute from now"));
     }
     return std::llround(time_s * 1e3);
   }

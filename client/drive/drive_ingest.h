@@ -22,6 +22,7 @@ struct IngestOptions {
   std::optional<double> sensor_height_m;
   bool is_deskewed = false;
   double start_s = 0.0;  // added to the scans' times
+  double now_s = 0.0;    // since 1970: later scans than a minute from now are refused
   std::optional<std::uint64_t> shuffle_seed;
   UploadOptions upload;
 

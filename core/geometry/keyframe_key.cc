@@ -8,6 +8,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::size_t kMaxNameLength = 64;
+
 bool IsNameCharacter(char c) {
   return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' ||
          c == '_' || c == '-';
@@ -16,12 +18,20 @@ bool IsNameCharacter(char c) {
 }  // namespace
 
 Status ValidateName(std::string_view what, std::string_view name) {
-  if (name.empty() || name.size() > 64 || !std::all_of(name.begin(), name.end(), IsNameCharacter)) {
+  if (name.empty() || name.size() > kMaxNameLength ||
+      !std::all_of(name.begin(), name.end(), IsNameCharacter)) {
     return Status(StatusCode::kInvalidArgument,
                   StrCat(what, " name '", name.substr(0, 80),
                          "': expected 1 to 64 characters of A-Z a-z 0-9 . _ -"));
   }
   return {};
+}
+
+std::string NameFrom(std::string_view text) {
+  std::string name(text.substr(0, kMaxNameLength));
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !IsNameCharacter(c); }, '-');
+  return name;
 }
 
 Status SessionKey::Validate() const {

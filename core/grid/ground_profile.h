@@ -31,6 +31,8 @@ struct ProfileOptions {
   // of a car that was taken for ground is not.
   float max_ground_slope = 0.42F;  // tan 0.4 rad: what segmentation calls ground
   float max_ground_step_m = 0.25F;
+  // Altitudes between two ground returns farther apart in height than this are marked extrapolated.
+  float max_interpolated_rise_m = 1.5F;
 };
 
 struct GroundSample {

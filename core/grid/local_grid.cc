@@ -64,19 +64,26 @@ void AddMeasured(const LeveledScan& scan, const RayTable& rays, AltitudeGrid& al
   }
 }
 
-// Of an altitude between two ground samples: below the vehicle its wheels measure it.
-AltitudeSource SourceAt(float range_m, const RayProfile& profile, float contact_radius_m) {
-  if (range_m <= contact_radius_m) {
+// Of an altitude between two ground samples `rise_m` apart in height: below the vehicle its wheels
+// measure it. A ray may pass over a hole, from the edge of a deck to the ramp below it, so what
+// lies between two heights is a guess.
+AltitudeSource SourceAt(float range_m,
+                        float rise_m,
+                        const RayProfile& profile,
+                        const ProfileOptions& options) {
+  if (range_m <= options.contact_radius_m) {
     return AltitudeSource::kMeasured;
   }
-  return range_m <= profile.End() ? AltitudeSource::kInterpolated : AltitudeSource::kExtrapolated;
+  return range_m <= profile.End() && rise_m <= options.max_interpolated_rise_m
+             ? AltitudeSource::kInterpolated
+             : AltitudeSource::kExtrapolated;
 }
 
 // Altitudes below one ray, from the sensor's foot to its farthest return.
 void AddAlongRay(const RayProfile& profile,
                  const RayTable& rays,
                  int ray,
-                 float contact_radius_m,
+                 const ProfileOptions& options,
                  AltitudeGrid& altitudes) {
   const std::uint32_t* cells = rays.Cells(ray);
   const float end_m = std::max(profile.End(), profile.farthest_m);
@@ -95,7 +102,7 @@ void AddAlongRay(const RayProfile& profile,
     const GroundSample& after = profile.ground[next];
     const float t = (range_m - before.range_m) / (after.range_m - before.range_m);
     altitudes.Add(cells[step], before.z_m + t * (after.z_m - before.z_m),
-                  SourceAt(range_m, profile, contact_radius_m));
+                  SourceAt(range_m, std::abs(after.z_m - before.z_m), profile, options));
   }
 }
 
@@ -112,7 +119,7 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
   AddMeasured(scan, rays, altitudes);
   for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
     const RayProfile profile = profiles.Ray(ray);
-    AddAlongRay(profile, rays, ray, options.contact_radius_m, altitudes);
+    AddAlongRay(profile, rays, ray, options, altitudes);
     const int step = static_cast<int>(profile.obstacle_range_m / rays.step_m());
     if (profile.obstacle_range_m >= 0.0F && step < rays.steps()) {
       grid.cells[rays.Cells(ray)[step]].occupancy = Occupancy::kObstacle;

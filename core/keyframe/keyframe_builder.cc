@@ -78,15 +78,33 @@ Keyframe KeyframeBuilder::Build(const PointCloud& cloud,
   return keyframe;
 }
 
-Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans) {
+namespace {
+
+// Heights of the sensor above ground returns up to 12 m away and at most `half_width_m` off the
+// vehicle's axis.
+std::vector<float> HeightsAboveGround(std::span<const LeveledScan> scans, float half_width_m) {
   constexpr float kNear_m = 12.0F;
   std::vector<float> heights_m;
   for (const LeveledScan& scan : scans) {
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      if (scan.is_ground[i] != 0 && scan.range_m[i] < kNear_m) {
+      if (scan.is_ground[i] != 0 && scan.range_m[i] < kNear_m &&
+          std::abs(scan.y[i]) < half_width_m) {
         heights_m.push_back(-scan.z[i]);
       }
     }
+  }
+  return heights_m;
+}
+
+}  // namespace
+
+Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans) {
+  constexpr float kLane_m = 1.0F;
+  constexpr float kAnywhere_m = 100.0F;
+  constexpr std::size_t kEnough = 100;
+  std::vector<float> heights_m = HeightsAboveGround(scans, kLane_m);
+  if (heights_m.size() < kEnough) {
+    heights_m = HeightsAboveGround(scans, kAnywhere_m);
   }
   if (heights_m.empty()) {
     return Error(StatusCode::kInvalidData,

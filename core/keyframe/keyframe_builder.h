@@ -50,8 +50,9 @@ class KeyframeBuilder {
   RayTable rays_;
 };
 
-// The height of the sensor above the ground around it, from segmented scans: the median of the
-// ground within 12 m in the levelled frame. kInvalidData when no ground was seen.
+// The height of the sensor above the ground it drives on, from segmented scans: the median over the
+// ground within 12 m ahead and behind, a metre off its axis at most (pavements beside a street lie
+// a kerb higher), else all around. kInvalidData when no ground was seen.
 Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans);
 
 }  // namespace atlas

@@ -88,6 +88,9 @@ def garage(atlas):
     steps = [abs(b[2] - a[2]) for a, b in zip(route["waypoints"], route["waypoints"][1:])]
     print(f"route of {route['length_m']} m, largest step {max(steps):.3f} m, {route['ms']} ms")
     assert route["found"] and max(steps) <= 0.2
+    track = atlas.run("localize", folder)
+    print(f"tracked in its own map: {track['failures']} of {track['scans']} scans fail")
+    assert track["failures"] <= 0.03 * track["scans"]
     refused = atlas.call("plan", *ends, "--max-slope-deg", 5)
     assert refused.returncode == 3 and json.loads(refused.stdout)["found"] is False
 

@@ -85,6 +85,9 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
 // Not ok: nothing of the group was written.
 Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results) {
   try {
+    if (connection_->is_in_transaction()) {
+      connection_->Execute("ROLLBACK");  // the one before could not
+    }
     connection_->Execute("BEGIN IMMEDIATE");
     for (std::size_t i = 0; i < group.size(); ++i) {
       results[i] = RunOne(group[i]);
@@ -95,11 +98,19 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     connection_->Execute("COMMIT");
     return {};
   } catch (const std::exception& error) {
-    Status status = StatusFromException(error);
+    return RollBack(StatusFromException(error));
+  }
+}
+
+Status WriteQueue::RollBack(Status failure) {
+  try {
     if (connection_->is_in_transaction()) {
       connection_->Execute("ROLLBACK");
     }
-    return status;
+    return failure;
+  } catch (const std::exception& error) {
+    return {failure.code(), StrCat(failure.message(), "; rolling back failed too: ",
+                                   StatusFromException(error).message())};
   }
 }
 

@@ -44,6 +44,7 @@ class WriteQueue {
   std::vector<Operation> TakeGroup();
   void RunGroup(std::vector<Operation>& group);
   Status RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results);
+  Status RollBack(Status failure);
   Status RunOne(Operation& operation);
 
   std::unique_ptr<Connection> connection_;

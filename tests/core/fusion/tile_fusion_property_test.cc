@@ -16,6 +16,7 @@
 #include "core/tile/tile_codec.h"
 #include "tests/core/fusion/reference_fusion.h"
 #include "tests/core/support/keyframe_worlds.h"
+#include "tests/core/support/test_scale.h"
 
 namespace atlas {
 namespace {
@@ -107,7 +108,7 @@ std::size_t UpperLayers(const Tile& tile) {
 TEST(TileFusionPropertyTest, EqualsTheReference) {
   std::size_t upper_layers = 0;
   std::ptrdiff_t columns = 0;
-  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(60); ++seed) {
     const MapProfile profile = ProfileOf(seed);
     const auto keyframes = RandomDrives(profile, seed);
     const TileId id{0, seed % 5 == 0 ? -1 : 0, 0};
@@ -123,7 +124,7 @@ TEST(TileFusionPropertyTest, EqualsTheReference) {
 }
 
 TEST(TileFusionPropertyTest, TheOrderOfKeyframesDoesNotMatter) {
-  for (std::uint32_t seed = 100; seed < 130; ++seed) {
+  for (std::uint32_t seed = 100; seed < 100 + testing::Scaled(30); ++seed) {
     const MapProfile profile = ProfileOf(seed);
     auto keyframes = RandomDrives(profile, seed);
     const Bytes payload = EncodeTilePayload(FuseTile({0, 0, 0}, keyframes, profile), profile);
@@ -136,7 +137,7 @@ TEST(TileFusionPropertyTest, TheOrderOfKeyframesDoesNotMatter) {
 }
 
 TEST(TileFusionPropertyTest, TilesAreValidAndReadBack) {
-  for (std::uint32_t seed = 200; seed < 230; ++seed) {
+  for (std::uint32_t seed = 200; seed < 200 + testing::Scaled(30); ++seed) {
     const MapProfile profile = ProfileOf(seed);
     const Tile tile = FuseTile({0, 0, 0}, RandomDrives(profile, seed), profile);
     const auto decoded = DecodeTile(EncodeTile(tile, profile).blob, profile);
@@ -179,7 +180,7 @@ TEST(TileFusionPropertyTest, AKeyframeReachesNoTileBeyondItsFootprint) {
 }
 
 TEST(TileFusionPropertyTest, TileBordersDoNotShow) {
-  for (std::uint32_t seed = 300; seed < 310; ++seed) {
+  for (std::uint32_t seed = 300; seed < 300 + testing::Scaled(10); ++seed) {
     const MapProfile small = ProfileOf(seed);
     MapProfile large = small;
     large.tile_cells = 32;

@@ -34,5 +34,11 @@ TEST(KeyframeKeyTest, PrintsAsPath) {
   EXPECT_EQ(out.str(), "van/drive/12");
 }
 
+TEST(KeyframeKeyTest, AnyTextBecomesAName) {
+  EXPECT_EQ(NameFrom("my drive (2)"), "my-drive--2-");
+  EXPECT_EQ(NameFrom("2011_09_26-0005.x"), "2011_09_26-0005.x");
+  EXPECT_TRUE(ValidateName("session", NameFrom(std::string(200, '\xe4'))).ok());
+}
+
 }  // namespace
 }  // namespace atlas

@@ -10,6 +10,7 @@
 #include "tests/core/support/golden.h"
 #include "tests/core/support/golden_profile.h"
 #include "tests/core/support/keyframe_worlds.h"
+#include "tests/core/support/test_scale.h"
 
 namespace atlas {
 namespace {
@@ -33,7 +34,7 @@ StatusCode DecodeError(ByteSpan blob) {
 }
 
 TEST(KeyframeCodecTest, RandomKeyframesReadBack) {
-  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(60); ++seed) {
     const std::int32_t radius = 1 + static_cast<std::int32_t>(seed % 21);
     MapProfile profile;
     profile.column_segments = static_cast<std::uint8_t>(2u << (seed % 4));

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/planning/tiny_world.h"
+#include "tests/core/support/test_scale.h"
 
 namespace atlas {
 namespace {
@@ -332,7 +333,7 @@ TEST(PlanRouteTest, CostIsTheSameBothWaysInRandomWorlds) {
   options.comfort_weight = 0.0;
   options.vehicle_width_m = 0.4;
   int found = 0;
-  for (std::uint32_t seed = 0; seed < 30; ++seed) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(30); ++seed) {
     TinyWorld world;
     std::mt19937 random(seed);
     for (std::int64_t y = 0; y < 60; ++y) {

@@ -7,6 +7,7 @@
 #include "core/tile/tile_sections.h"
 #include "tests/core/support/golden.h"
 #include "tests/core/support/golden_profile.h"
+#include "tests/core/support/test_scale.h"
 #include "tests/core/support/tile_worlds.h"
 
 namespace atlas {
@@ -38,7 +39,7 @@ Bytes WithSection(const Tile& tile, TileSection section, const Change& change) {
 }
 
 TEST(TileCodecTest, RandomTilesReadBack) {
-  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(40); ++seed) {
     MapProfile profile = SmallProfile();
     profile.tile_cells = static_cast<std::uint16_t>(16u << (seed % 3));
     profile.column_segments = static_cast<std::uint8_t>(2u << (seed % 4));

@@ -4,6 +4,7 @@
 
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
+#include "tests/core/support/test_scale.h"
 #include "tests/core/support/tile_worlds.h"
 
 namespace atlas {
@@ -147,7 +148,7 @@ TEST(TilePyramidTest, EachQuadrantComesFromItsChild) {
 
 TEST(TilePyramidTest, RandomPyramidsStayValid) {
   const MapProfile profile = SmallProfile();
-  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(20); ++seed) {
     const Tile a = testing::RandomTile({0, 0, 0}, profile, seed);
     const Tile b = testing::RandomTile({0, 1, 0}, profile, seed + 100);
     const Tile parent = BuildParentTile({1, 0, 0}, {&a, &b, nullptr, &a}, profile);

@@ -2,6 +2,7 @@
 // tiles; and what is damaged is found.
 #include <sqlite3.h>
 
+#include "tests/core/support/test_scale.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace atlas {
@@ -29,7 +30,7 @@ class AtlasTest : public ServiceTest {
 TEST_F(AtlasTest, OrderDuplicatesWorkersRestartsAndDetoursDoNotMatter) {
   const AtlasDigest expected = Reference();
   ASSERT_GT(expected.tiles, 20u);
-  for (std::uint32_t seed = 0; seed < 6; ++seed) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(6); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     std::vector<std::uint32_t> order;

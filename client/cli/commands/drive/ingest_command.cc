@@ -95,6 +95,8 @@ class IngestCommand : public Command {
     options_.selection.end = range_.end;
     options_.is_deskewed = deskew_ == "on";
     options_.upload.max_in_flight = batch_;
+    options_.now_s =
+        std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
     options_.session = {vehicle_, session_.value_or(FolderName())};
     return options_.Validate();
   }
@@ -103,7 +105,7 @@ class IngestCommand : public Command {
     std::error_code error;
     const std::filesystem::path given = drive_.directory();
     const std::filesystem::path absolute = std::filesystem::weakly_canonical(given, error);
-    return (error ? given : absolute).filename().string();
+    return NameFrom((error ? given : absolute).filename().string());
   }
 
   Result<IngestReport> Ingest(const DriveFolder& drive,

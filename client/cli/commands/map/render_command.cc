@@ -1,5 +1,6 @@
 // `atlas render`: a picture of the whole atlas.
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/output/json_text.h"
 #include "client/render/map_picture.h"
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
@@ -56,7 +57,7 @@ class RenderCommand : public Command {
     if (context.is_json) {
       context.PrintJson({{"width", picture.image.width},
                          {"height", picture.image.height},
-                         {"metres_per_pixel", picture.metres_per_pixel}});
+                         {"metres_per_pixel", Rounded(picture.metres_per_pixel, 6)}});
     } else {
       context.out << file_ << ": " << picture.image.width << " x " << picture.image.height
                   << " pixels of " << picture.metres_per_pixel << " m\n";
