@@ -26,6 +26,11 @@ class HalfSegments {
     const int bit = halves - 2 * first_segment_;
     return bit >= 0 && bit < kBits ? HalfMask{1} << bit : 0;
   }
+  // Whether a ray that rises (direction 1) or falls (-1) from there comes into no half in reach.
+  bool IsPast(int halves, int direction) const {
+    const int bit = halves - 2 * first_segment_;
+    return direction > 0 ? bit >= kBits : bit < 0;
+  }
   // Both bits of the segment at a height.
   HalfMask SegmentAt(float z_m) const {
     const int bit = 2 * (static_cast<int>(std::floor(z_m * segments_per_m_)) - first_segment_);

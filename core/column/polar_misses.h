@@ -57,10 +57,10 @@ class PolarMisses {
     int half = slope < 0.0F ? -1 : 0;  // the sensor is on the border between these two
     float border = steps_per_half;     // in steps from the sensor
     for (int begin = 0; begin < end; half += direction) {
-      const HalfMask bit = halves_.Bit(half);
-      if (bit == 0) {
-        return;  // out of reach, and so is all that follows
+      if (halves_.IsPast(half, direction)) {
+        return;
       }
+      const HalfMask bit = halves_.Bit(half);
       const int stop = border < static_cast<float>(end) ? static_cast<int>(border) : end;
       for (int step = begin; step < stop; ++step) {
         masks[step] |= bit;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 namespace atlas {
 namespace {
 
 constexpr float kMaxAltitude_m = 32.0F;  // int16 millimetres
+constexpr std::uint16_t kMaxCount = std::numeric_limits<std::uint16_t>::max();
 
 struct AltitudeSum {
   float sum_m = 0.0F;
@@ -15,7 +17,8 @@ struct AltitudeSum {
   AltitudeSource source = AltitudeSource::kNone;
 };
 
-// Collects altitudes; a better source replaces worse ones, equals are averaged.
+// Collects altitudes; a better source replaces worse ones, equals are averaged, the first 65,535 of
+// them.
 class AltitudeGrid {
  public:
   explicit AltitudeGrid(std::size_t size) : cells_(size) {}
@@ -24,7 +27,7 @@ class AltitudeGrid {
     AltitudeSum& sum = cells_[cell];
     if (sum.source == AltitudeSource::kNone || source < sum.source) {
       sum = {z_m, 1, source};
-    } else if (source == sum.source) {
+    } else if (source == sum.source && sum.count < kMaxCount) {
       sum.sum_m += z_m;
       ++sum.count;
     }

@@ -59,12 +59,10 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
     }
   }
   result.health = Judge(result.registration);
-  result.T_world_sensor = result.registration.T_world_level;
-  result.T_world_sensor.linear() =
-      result.registration.T_world_level.linear() * R_level_sensor.toRotationMatrix();
-  if (result.health == LocalizationHealth::kLost) {
-    result.T_world_sensor.translation() = predicted.translation();
-  }
+  const bool is_lost = result.health == LocalizationHealth::kLost;
+  const Pose& believed = is_lost ? T_world_level : result.registration.T_world_level;
+  result.T_world_sensor = believed;
+  result.T_world_sensor.linear() = believed.linear() * R_level_sensor.toRotationMatrix();
   Remember(result);
   return result;
 }

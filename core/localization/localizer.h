@@ -25,7 +25,7 @@ using TilesAround = std::function<Result<std::vector<std::shared_ptr<const Tile>
 enum class LocalizationHealth : std::uint8_t {
   kGood,
   kWeak,  // one horizontal direction is not held by anything seen
-  kLost,  // the scan does not fit the map here
+  kLost,  // the scan does not fit the map here: the pose is the predicted one
 };
 std::string_view LocalizationHealthName(LocalizationHealth health);
 

@@ -11,6 +11,17 @@ namespace {
 
 constexpr int kMaskBits = 64;
 
+struct Corner {
+  std::int64_t x;
+  std::int64_t y;
+};
+
+// Whether a square of cells touches the window's [0, side)^2. Tiles elsewhere may be so far that 32
+// bits would bring their cells back.
+bool Overlaps(const Corner& first, std::int64_t length, std::int64_t side) {
+  return first.x > -length && first.x < side && first.y > -length && first.y < side;
+}
+
 }  // namespace
 
 MapWindow::MapWindow(const MapProfile& profile,
@@ -44,6 +55,9 @@ void MapWindow::AddTile(const MapProfile& profile,
                         const MapWindowOptions& options) {
   const std::int64_t tile_x = std::int64_t{tile.id.x} * profile.tile_cells - first_cell_x_;
   const std::int64_t tile_y = std::int64_t{tile.id.y} * profile.tile_cells - first_cell_y_;
+  if (!Overlaps({tile_x, tile_y}, profile.tile_cells, side_)) {
+    return;
+  }
   for (std::int32_t j = 0; j < profile.tile_cells; ++j) {
     for (std::int32_t i = 0; i < profile.tile_cells; ++i) {
       const CellRef cell{static_cast<std::int32_t>(tile_x + i),

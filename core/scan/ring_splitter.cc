@@ -11,7 +11,6 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kTurn = 2.0F * kPi;
-constexpr float kMinRange_m = 2.5F;          // nearer returns are of the vehicle itself
 constexpr float kStepBack_rad = 0.05F;       // more than the jitter of a motion-compensated ring
 constexpr float kLeap_rad = 0.1F;            // a gap in which the ring may have changed
 constexpr float kMinLeapSlope = 0.0044F;     // 0.25 deg: less than any two rings are apart

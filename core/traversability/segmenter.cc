@@ -1,6 +1,7 @@
 #include "core/traversability/segmenter.h"
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "core/traversability/window_plane.h"
@@ -8,7 +9,8 @@
 namespace atlas {
 namespace {
 
-constexpr float kPadding_m = 1e6F;
+// On no plane: a distance to it is infinite or not a number. Any finite place is on some plane.
+constexpr float kPadding_m = std::numeric_limits<float>::infinity();
 
 // What the windows over a return said about it.
 struct Votes {

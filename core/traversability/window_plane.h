@@ -38,7 +38,7 @@ enum class TripleChoice : std::uint8_t {
 };
 
 // Best of a fixed table of 32 triples; nullopt when every triple is degenerate. Requires at least
-// one return; those beyond size() must be padding far from any plane.
+// one return, and infinite padding beyond size(): it must lie on no plane.
 std::optional<PlaneFit> FitPlane(const WindowReturns& window,
                                  float threshold_m,
                                  TripleChoice choice);

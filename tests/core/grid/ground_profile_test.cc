@@ -1,0 +1,202 @@
+// The ground along single rays, return by return.
+#include "core/grid/ground_profile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "tests/core/support/shape_world.h"
+
+namespace atlas {
+namespace {
+
+using testing::AddReturn;
+
+constexpr float kHeight_m = 1.8F;
+const VehicleContact kContact{Eigen::Vector3f::UnitZ(), kHeight_m};
+
+// A drawing of one ray: returns at growing ranges, all straight ahead.
+struct Drawn {
+  float range_m;
+  float z_m;
+  bool is_ground;
+};
+
+class GroundProfileTest : public ::testing::Test {
+ protected:
+  // In the middle of ray 0.
+  LeveledScan OneRay(std::initializer_list<Drawn> returns) const {
+    LeveledScan scan;
+    const float azimuth_rad = 0.5F * rays_.ray_width_rad();
+    for (const Drawn& r : returns) {
+      AddReturn(scan, {r.range_m * std::cos(azimuth_rad), r.range_m * std::sin(azimuth_rad), r.z_m},
+                r.is_ground);
+    }
+    return scan;
+  }
+
+  GroundProfiles Build(const LeveledScan& scan) const { return {scan, rays_, kContact, options_}; }
+
+  // Ranges of ray 0's ground beyond the vehicle's own, rounded to decimetres.
+  std::vector<int> GroundRanges(std::initializer_list<Drawn> returns) const {
+    const GroundProfiles profiles = Build(OneRay(returns));
+    std::vector<int> ranges_dm;
+    for (const GroundSample& sample : profiles.Ray(0).ground.subspan(2)) {
+      ranges_dm.push_back(static_cast<int>(std::lround(10.0F * sample.range_m)));
+    }
+    return ranges_dm;
+  }
+
+  float ObstacleRange(std::initializer_list<Drawn> returns) const {
+    return Build(OneRay(returns)).Ray(0).obstacle_range_m;
+  }
+
+  RayTable rays_{GridGeometry{100'000, 200}};
+  ProfileOptions options_;
+};
+
+TEST_F(GroundProfileTest, BeginsBelowTheVehicle) {
+  const VehicleContact tilted{Eigen::Vector3f(-0.1F, 0.2F, 1.0F).normalized(), kHeight_m};
+  const GroundProfiles profiles(LeveledScan(), rays_, tilted, options_);
+  for (int ray = 0; ray < rays_.rays(); ray += 13) {
+    const RayProfile profile = profiles.Ray(ray);
+    ASSERT_EQ(profile.ground.size(), 2U);
+    EXPECT_EQ(profile.ground[0].range_m, 0.0F);
+    EXPECT_EQ(profile.ground[0].z_m, -kHeight_m);
+    const double azimuth = (ray + 0.5) * static_cast<double>(rays_.ray_width_rad());
+    EXPECT_EQ(profile.ground[1].range_m, options_.contact_radius_m);
+    EXPECT_NEAR(profile.ground[1].z_m,
+                -kHeight_m + 1.5 * (0.1 * std::cos(azimuth) - 0.2 * std::sin(azimuth)), 1e-4);
+    EXPECT_LT(profile.obstacle_range_m, 0.0F);
+    EXPECT_EQ(profile.End(), options_.contact_radius_m);
+    EXPECT_EQ(profile.farthest_m, 0.0F);
+  }
+}
+
+TEST_F(GroundProfileTest, GroundIsWhatCanBeReachedFromTheGroundBefore) {
+  // A roof 1.3 m up that segmentation took for ground, and the ground behind it.
+  EXPECT_EQ(
+      GroundRanges({{5, -1.8F, true}, {7, -0.5F, true}, {7.2F, -0.5F, true}, {12, -1.8F, true}}),
+      (std::vector<int>{50, 120}));
+  // A slope of 0.4 is climbed, one of 0.6 is not.
+  EXPECT_EQ(GroundRanges({{4, -0.8F, true}, {8, 0.8F, true}}), (std::vector<int>{40, 80}));
+  EXPECT_EQ(GroundRanges({{4, -1.8F, true}, {8, 0.6F, true}}), (std::vector<int>{40}));
+  // The same downwards.
+  EXPECT_EQ(GroundRanges({{4, -2.8F, true}, {8, -4.4F, true}}), (std::vector<int>{40, 80}));
+  EXPECT_EQ(GroundRanges({{4, -1.8F, true}, {8, -4.2F, true}}), (std::vector<int>{40}));
+  // A kerb of 0.2 m within 0.1 m of way is a step, one of 0.35 m is none.
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {5.1F, -1.6F, true}}), (std::vector<int>{50, 51}));
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {5.1F, -1.45F, true}}), (std::vector<int>{50}));
+}
+
+TEST_F(GroundProfileTest, GroundUnderTheVehicleIsNotTakenFromReturns) {
+  EXPECT_TRUE(GroundRanges({{1.2F, -1.2F, true}, {1.45F, -1.7F, true}}).empty());
+}
+
+TEST_F(GroundProfileTest, TheNearestObstacleEndsTheRay) {
+  EXPECT_FLOAT_EQ(ObstacleRange({{5, -1.8F, true}, {9, -0.5F, false}, {7, -1.0F, false}}), 7.0F);
+  const GroundProfiles profiles =
+      Build(OneRay({{5, -1.8F, true}, {7, -1.0F, false}, {12, -1.8F, true}}));
+  EXPECT_FLOAT_EQ(profiles.Ray(0).End(), 7.0F);
+  EXPECT_FLOAT_EQ(profiles.Ray(0).farthest_m, 12.0F);
+  EXPECT_EQ(profiles.Ray(0).ground.size(), 4U);  // the ground behind is known all the same
+}
+
+TEST_F(GroundProfileTest, AVehiclePassesBelowWhatHangsHigherThanItsClearance) {
+  EXPECT_FLOAT_EQ(ObstacleRange({{6, -1.8F, true}, {10, 0.65F, false}}), 10.0F);
+  EXPECT_LT(ObstacleRange({{6, -1.8F, true}, {10, 0.75F, false}}), 0.0F);
+  EXPECT_FLOAT_EQ(ObstacleRange({{6, -1.8F, true}, {7, 0.9F, false}, {10, 0.5F, false}}), 10.0F);
+}
+
+TEST_F(GroundProfileTest, ClearanceCountsFromTheGroundBelowAndNotFromTheVehicle) {
+  // Up a ramp of 0.2 from 2 m on: 2 m above the ramp stands in the way, 3 m does not.
+  const Drawn ramp_a{2, -1.8F, true};
+  const Drawn ramp_b{12, 0.2F, true};
+  EXPECT_FLOAT_EQ(ObstacleRange({ramp_a, ramp_b, {7, -0.8F + 2.4F, false}}), 7.0F);
+  EXPECT_LT(ObstacleRange({ramp_a, ramp_b, {7, -0.8F + 2.6F, false}}), 0.0F);
+  // Beyond the last ground its height goes on.
+  EXPECT_FLOAT_EQ(ObstacleRange({ramp_a, ramp_b, {15, 0.2F + 2.4F, false}}), 15.0F);
+  EXPECT_LT(ObstacleRange({ramp_a, ramp_b, {15, 0.2F + 2.6F, false}}), 0.0F);
+}
+
+TEST_F(GroundProfileTest, WhatIsBelowTheGroundIsAnObstacle) {
+  // A hole's far wall, or the edge of a deck: no vehicle passes there.
+  EXPECT_FLOAT_EQ(ObstacleRange({{5, -1.8F, true}, {8, -2.6F, false}}), 8.0F);
+}
+
+TEST_F(GroundProfileTest, ReturnsBeyondTheRadiusAreNotOnTheGrid) {
+  EXPECT_TRUE(GroundRanges({{20.0F, -1.8F, true}, {25, -1.8F, true}}).empty());
+  EXPECT_LT(ObstacleRange({{20.1F, -1.0F, false}}), 0.0F);
+  EXPECT_EQ(Build(OneRay({{20.1F, -1.0F, false}})).Ray(0).farthest_m, 0.0F);
+}
+
+TEST_F(GroundProfileTest, AReturnStandsForEveryRayBetweenItAndItsNeighbours) {
+  const float width_rad = rays_.ray_width_rad();
+  for (const int middle : {0, 3, rays_.rays() / 2, rays_.rays() - 1}) {
+    LeveledScan scan;
+    const float azimuth_rad = (static_cast<float>(middle) + 0.5F) * width_rad;
+    AddReturn(scan, {8.0F * std::cos(azimuth_rad), 8.0F * std::sin(azimuth_rad), -1.0F}, false);
+    scan.column_spacing_rad = 4.0F * width_rad;  // two rays either way
+    const GroundProfiles profiles = Build(scan);
+    for (int ray = 0; ray < rays_.rays(); ++ray) {
+      const int turns = std::abs(ray - middle);
+      const int away = std::min(turns, rays_.rays() - turns);
+      EXPECT_EQ(profiles.Ray(ray).obstacle_range_m >= 0.0F, away <= 2) << middle << " " << ray;
+    }
+  }
+}
+
+TEST_F(GroundProfileTest, TheOrderOfReturnsDoesNotMatter) {
+  std::mt19937 random(71);
+  std::uniform_real_distribution<float> coordinate(-22.0F, 22.0F);
+  std::uniform_real_distribution<float> height(-2.2F, 1.5F);
+  for (int round = 0; round < 5; ++round) {
+    std::vector<std::pair<Eigen::Vector3f, bool>> returns;
+    for (int i = 0; i < 5000; ++i) {
+      returns.emplace_back(Eigen::Vector3f(coordinate(random), coordinate(random), height(random)),
+                           random() % 2 == 0);
+    }
+    const auto scan_of = [&returns] {
+      LeveledScan scan;
+      for (const auto& [p, is_ground] : returns) {
+        AddReturn(scan, p, is_ground);
+      }
+      scan.column_spacing_rad = 0.01F;
+      return scan;
+    };
+    const GroundProfiles first = Build(scan_of());
+    std::shuffle(returns.begin(), returns.end(), random);
+    const GroundProfiles second = Build(scan_of());
+    for (int ray = 0; ray < rays_.rays(); ++ray) {
+      const RayProfile a = first.Ray(ray);
+      const RayProfile b = second.Ray(ray);
+      EXPECT_EQ(a.obstacle_range_m, b.obstacle_range_m);
+      EXPECT_EQ(a.farthest_m, b.farthest_m);
+      ASSERT_TRUE(std::equal(a.ground.begin(), a.ground.end(), b.ground.begin(), b.ground.end(),
+                             [](const GroundSample& s, const GroundSample& t) {
+                               return s.range_m == t.range_m && s.z_m == t.z_m;
+                             }));
+      EXPECT_TRUE(std::is_sorted(a.ground.begin(), a.ground.end(),
+                                 [](const GroundSample& s, const GroundSample& t) {
+                                   return s.range_m <= t.range_m;  // strictly growing
+                                 }));
+    }
+  }
+}
+
+TEST_F(GroundProfileTest, GridsOfAFewCellsWork) {
+  for (const std::int32_t radius : {1, 2, 3}) {
+    const RayTable rays(GridGeometry{1'000'000, radius});
+    LeveledScan scan;
+    AddReturn(scan, {0.9F, 0.1F, -1.0F}, false);
+    scan.column_spacing_rad = 0.1F;
+    const GroundProfiles profiles(scan, rays, kContact, options_);
+    EXPECT_NEAR(profiles.Ray(0).obstacle_range_m, std::hypot(0.9F, 0.1F), 1e-5F);
+  }
+}
+
+}  // namespace
+}  // namespace atlas

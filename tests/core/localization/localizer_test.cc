@@ -1,0 +1,166 @@
+// Drives through small worlds, scan after scan.
+#include "core/localization/localizer.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/core/localization/painted_map.h"
+
+namespace atlas {
+namespace {
+
+using testing::CastLeveledScan;
+using testing::ErrorOf;
+using testing::GarageMap;
+using testing::kDegree;
+using testing::PaintedMap;
+using testing::PoseError;
+using testing::QuickOptions;
+using testing::ShapeWorld;
+using testing::StreetMap;
+using testing::UprightPose;
+
+const Eigen::Quaterniond kLevel = Eigen::Quaterniond::Identity();
+
+LocalizationResult At(Localizer& localizer, const ShapeWorld& world, const Pose& truth) {
+  return localizer.Localize(CastLeveledScan(testing::QuickSensor(), world, truth), kLevel).value();
+}
+
+// Along the street on the map's slope.
+Pose OnStreet(double x_m, double y_m = 0.0, double yaw_rad = 0.0) {
+  return UprightPose({x_m, y_m, 1.8 + 0.01 * x_m}, yaw_rad);
+}
+
+Localizer StreetLocalizer() {
+  return {StreetMap().profile(), StreetMap().Source(), QuickOptions()};
+}
+
+TEST(LocalizerTest, FollowsADriveFromARoughStart) {
+  Localizer localizer = StreetLocalizer();
+  localizer.Start(OnStreet(-14.7, 0.3, 1.0 * kDegree));
+  for (int i = 0; i < 20; ++i) {
+    const Pose truth = OnStreet(-15.0 + 1.5 * i, 0.4 * std::sin(0.3 * i), 0.05 * std::cos(0.3 * i));
+    const LocalizationResult result = At(localizer, testing::Street(), truth);
+    EXPECT_EQ(result.health, LocalizationHealth::kGood) << i;
+    const PoseError error = ErrorOf(result.T_world_sensor, truth);
+    EXPECT_LT(error.horizontal_m, 0.06) << i;
+    EXPECT_LT(error.vertical_m, 0.03) << i;
+    EXPECT_LT(error.angle_rad, 0.3 * kDegree) << i;
+  }
+}
+
+TEST(LocalizerTest, FindsTheSecondScanHoweverFastTheVehicleIs) {
+  for (const double ahead_m : {0.0, 1.0, 2.5, 4.0}) {
+    Localizer localizer = StreetLocalizer();
+    localizer.Start(OnStreet(-6.0));
+    At(localizer, testing::Street(), OnStreet(-6.0));
+    const Pose truth = OnStreet(-6.0 + ahead_m);
+    const LocalizationResult result = At(localizer, testing::Street(), truth);
+    EXPECT_EQ(result.health, LocalizationHealth::kGood) << ahead_m;
+    EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06) << ahead_m;
+  }
+}
+
+TEST(LocalizerTest, FindsItsHeadingAfterASharpTurn) {
+  for (const double turn_deg : {-30.0, -18.0, 20.0, 32.0}) {
+    Localizer localizer = StreetLocalizer();
+    localizer.Start(OnStreet(-4.0));
+    for (int i = 0; i < 4; ++i) {
+      At(localizer, testing::Street(), OnStreet(-4.0 + i));
+    }
+    const Pose truth = OnStreet(-0.1, 0.1, turn_deg * kDegree);
+    const LocalizationResult result = At(localizer, testing::Street(), truth);
+    EXPECT_EQ(result.health, LocalizationHealth::kGood) << turn_deg;
+    EXPECT_LT(ErrorOf(result.T_world_sensor, truth).angle_rad, 0.3 * kDegree) << turn_deg;
+  }
+}
+
+TEST(LocalizerTest, StaysOnItsDeckOfTwo) {
+  for (const double floor_m : {0.0, 3.0}) {
+    Localizer localizer(GarageMap().profile(), GarageMap().Source(), QuickOptions());
+    const auto at = [floor_m](int i) {
+      return UprightPose({-9.0 + 0.8 * i, -5.0 + 0.3 * i, floor_m + 1.8}, 0.36);
+    };
+    Pose start = at(0);
+    start.translation() += Eigen::Vector3d(0.2, -0.2, 0.25);
+    localizer.Start(start);
+    for (int i = 0; i < 14; ++i) {
+      const LocalizationResult result = At(localizer, testing::GarageCorner(), at(i));
+      EXPECT_EQ(result.health, LocalizationHealth::kGood) << floor_m << " " << i;
+      EXPECT_LT(ErrorOf(result.T_world_sensor, at(i)).vertical_m, 0.03) << floor_m << " " << i;
+      EXPECT_LT(ErrorOf(result.T_world_sensor, at(i)).horizontal_m, 0.08) << floor_m << " " << i;
+    }
+  }
+}
+
+TEST(LocalizerTest, ACorridorIsWeakAndCarriesTheVehicleOnAtItsSpeed) {
+  PaintedMap map;
+  map.Paint(testing::Corridor(), 30.0);
+  LocalizerOptions options = QuickOptions();
+  options.search_ahead_m = 0.0;  // nothing there tells how far ahead
+  Localizer localizer(map.profile(), map.Source(), options);
+  const auto at = [](int i) {
+    return UprightPose({-3.0 + 0.1 * i, 0.0, 1.8}, 0.0);
+  };
+  localizer.Start(at(0));
+  for (int i = 0; i < 5; ++i) {
+    const LocalizationResult result = At(localizer, testing::Corridor(), at(i));
+    EXPECT_EQ(result.health, LocalizationHealth::kWeak) << i;
+    EXPECT_LT(std::abs(result.T_world_sensor.translation().y()), 0.03) << i;
+  }
+}
+
+TEST(LocalizerTest, TiltComesFromTheImu) {
+  const Eigen::Quaterniond R_level_sensor(
+      Eigen::AngleAxisd(6.0 * kDegree, Eigen::Vector3d(0.8, 0.6, 0.0)));
+  Localizer localizer = StreetLocalizer();
+  localizer.Start(OnStreet(0.1));
+  const Pose truth = OnStreet(0.0);
+  const LocalizationResult result =
+      localizer
+          .Localize(CastLeveledScan(testing::QuickSensor(), testing::Street(), truth),
+                    R_level_sensor)
+          .value();
+  Pose tilted = truth;
+  tilted.linear() = truth.linear() * R_level_sensor.toRotationMatrix();
+  EXPECT_EQ(result.health, LocalizationHealth::kGood);
+  EXPECT_LT(ErrorOf(result.T_world_sensor, tilted).angle_rad, 0.3 * kDegree);
+  EXPECT_LT(ErrorOf(result.T_world_sensor, tilted).horizontal_m, 0.06);
+}
+
+TEST(LocalizerTest, TheSameDriveHasTheSameAnswers) {
+  const auto drive = [] {
+    std::vector<Eigen::Matrix4d> poses;
+    Localizer localizer = StreetLocalizer();
+    localizer.Start(OnStreet(-8.2, 0.2));
+    for (int i = 0; i < 8; ++i) {
+      poses.push_back(
+          At(localizer, testing::Street(), OnStreet(-8.0 + 1.3 * i)).T_world_sensor.matrix());
+    }
+    return poses;
+  };
+  EXPECT_EQ(drive(), drive());
+}
+
+TEST(LocalizerTest, StartForgetsTheMotionAndThePlace) {
+  Localizer localizer = StreetLocalizer();
+  localizer.Start(OnStreet(-10.0));
+  for (int i = 0; i < 4; ++i) {
+    At(localizer, testing::Street(), OnStreet(-10.0 + 1.4 * i));
+  }
+  const Pose elsewhere = OnStreet(13.0, -1.0, 3.0);
+  localizer.Start(elsewhere);
+  const LocalizationResult result = At(localizer, testing::Street(), elsewhere);
+  EXPECT_EQ(result.health, LocalizationHealth::kGood);
+  EXPECT_LT(ErrorOf(result.T_world_sensor, elsewhere).horizontal_m, 0.06);
+}
+
+TEST(LocalizationHealthTest, EveryHealthHasAName) {
+  EXPECT_EQ(LocalizationHealthName(LocalizationHealth::kGood), "good");
+  EXPECT_EQ(LocalizationHealthName(LocalizationHealth::kWeak), "weak");
+  EXPECT_EQ(LocalizationHealthName(LocalizationHealth::kLost), "lost");
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,193 @@
+#include "core/localization/map_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "tests/core/localization/painted_map.h"
+
+namespace atlas {
+namespace {
+
+using testing::ColumnLayer;
+using testing::GroundLayer;
+using testing::PaintedMap;
+
+const Eigen::Vector3d kOrigin = Eigen::Vector3d::Zero();
+
+Eigen::Vector3f InWindow(const MapWindow& window, double x, double y, double z) {
+  return (Eigen::Vector3d(x, y, z) - window.origin()).cast<float>();
+}
+
+TEST(MapWindowTest, OccupiedSegmentsStandWhereTheColumnSays) {
+  PaintedMap map;
+  map.Put(12, -7, ColumnLayer(0.0, 0b0110));  // 1 m to 3 m over a base at 0
+  const MapWindow window = map.Window(kOrigin, 10.0);
+  EXPECT_EQ(window.lines(), 2U);
+  for (const double z : {0.5, 1.5, 2.5, 3.5}) {
+    EXPECT_EQ(window.IsOccupied(InWindow(window, 1.25, -0.65, z)), z > 1.0 && z < 3.0) << z;
+    EXPECT_FALSE(window.IsOccupied(InWindow(window, 1.35, -0.65, z)));
+  }
+}
+
+TEST(MapWindowTest, OnlyWhatIsProbablyThereIsOccupied) {
+  for (int nibble = 0; nibble <= 15; ++nibble) {
+    PaintedMap map;
+    TileLayer layer = GroundLayer(0.0);
+    layer.column = static_cast<std::uint64_t>(nibble);
+    map.Put(0, 0, layer);
+    EXPECT_EQ(map.Window(kOrigin, 5.0).lines(), nibble >= 10 ? 1U : 0U) << nibble;
+  }
+}
+
+TEST(MapWindowTest, AWallsNormalPointsAcrossItInAnyDirection) {
+  for (int direction = 0; direction < 12; ++direction) {
+    const double angle = direction * M_PI / 12.0;
+    PaintedMap map;
+    std::set<std::pair<int, int>> cells;
+    for (const double t : testing::Steps(-4.0, 4.0, 0.02)) {
+      cells.emplace(static_cast<int>(std::floor(10.0 * t * std::cos(angle) + 0.5)),
+                    static_cast<int>(std::floor(10.0 * t * std::sin(angle) + 0.5)));
+    }
+    for (const auto& [x, y] : cells) {
+      map.Put(x, y, ColumnLayer(0.0, 0b0011));
+    }
+    const MapWindow window = map.Window(kOrigin, 10.0);
+    const Eigen::Vector2f normal(static_cast<float>(-std::sin(angle)),
+                                 static_cast<float>(std::cos(angle)));
+    for (const double aside : {-0.2, 0.0, 0.2}) {
+      const ColumnLine* line = window.NearestLine(
+          InWindow(window, 0.05 - aside * std::sin(angle), 0.05 + aside * std::cos(angle), 0.5),
+          0.5F);
+      ASSERT_NE(line, nullptr);
+      EXPECT_TRUE(line->is_wall);
+      EXPECT_GT(std::abs(line->normal.dot(normal)), 0.99F) << direction;
+      const Eigen::Vector2f offset = line->center - InWindow(window, 0.05, 0.05, 0.5).head<2>();
+      EXPECT_LT(std::abs(offset.dot(normal)), 0.04F) << direction;
+    }
+  }
+}
+
+TEST(MapWindowTest, EachSegmentOfACellHasItsOwnLine) {
+  PaintedMap map;  // a wall along x, one along y on a lintel above it
+  for (int i = -20; i <= 20; ++i) {
+    map.Put(i, 0, ColumnLayer(0.0, i == 0 ? 0b1001 : 0b0001));
+    if (i != 0) {
+      map.Put(0, i, ColumnLayer(0.0, 0b1000));
+    }
+  }
+  const MapWindow window = map.Window(kOrigin, 5.0);
+  const ColumnLine* low = window.NearestLine(InWindow(window, 0.05, 0.05, 0.5), 0.5F);
+  const ColumnLine* high = window.NearestLine(InWindow(window, 0.05, 0.05, 3.5), 0.5F);
+  ASSERT_TRUE(low != nullptr && high != nullptr);
+  EXPECT_GT(std::abs(low->normal.y()), 0.999F);
+  EXPECT_GT(std::abs(high->normal.x()), 0.999F);
+  EXPECT_EQ(window.NearestLine(InWindow(window, 0.05, 0.05, 1.5), 0.5F), nullptr);
+}
+
+TEST(MapWindowTest, APostIsNoWallAndStandsInItsCell) {
+  for (const int side : {1, 2, 3}) {
+    PaintedMap map;
+    for (int i = 0; i < side * side; ++i) {
+      map.Put(20 + i % side, 30 + i / side, ColumnLayer(0.0, 0b0001));
+    }
+    const MapWindow window = map.Window(kOrigin, 10.0);
+    const ColumnLine* line = window.NearestLine(InWindow(window, 2.0, 3.0, 0.5), 0.5F);
+    ASSERT_NE(line, nullptr);
+    EXPECT_FALSE(line->is_wall) << side;
+    EXPECT_LT((line->center - InWindow(window, 2.05, 3.05, 0.5).head<2>()).norm(), 1e-4F);
+  }
+}
+
+TEST(MapWindowTest, TheNearestLineIsTheNearest) {
+  std::mt19937 random(101);
+  PaintedMap map;
+  std::vector<Eigen::Vector3d> segments;  // middles
+  std::set<std::pair<int, int>> taken;
+  for (int i = 0; i < 150; ++i) {
+    const int x = static_cast<int>(random() % 200) - 100;
+    const int y = static_cast<int>(random() % 200) - 100;
+    if (taken.emplace(x, y).second) {
+      const std::uint32_t bits = random() % 16;
+      map.Put(x, y, ColumnLayer(0.0, bits));
+      for (int k = 0; k < 4; ++k) {
+        if ((bits >> k & 1u) != 0) {
+          segments.emplace_back(0.1 * x + 0.05, 0.1 * y + 0.05, k + 0.5);
+        }
+      }
+    }
+  }
+  const MapWindow window = map.Window(kOrigin, 12.0);
+  ASSERT_EQ(window.lines(), segments.size());
+  std::uniform_real_distribution<double> place(-11.0, 11.0);
+  int found = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector3d p(place(random), place(random), 0.5 + static_cast<int>(random() % 4));
+    double nearest_m = 1.2;
+    for (const Eigen::Vector3d& segment : segments) {
+      if (std::abs(segment.z() - p.z()) < 0.5) {
+        nearest_m = std::min(nearest_m, (segment - p).head<2>().norm());
+      }
+    }
+    const ColumnLine* line = window.NearestLine(InWindow(window, p.x(), p.y(), p.z()), 1.2F);
+    ASSERT_EQ(line != nullptr, nearest_m < 1.2) << p.transpose();
+    if (line != nullptr && !line->is_wall) {
+      ++found;
+      EXPECT_NEAR((line->center - InWindow(window, p.x(), p.y(), p.z()).head<2>()).norm(),
+                  nearest_m, 1e-4);
+    }
+  }
+  EXPECT_GT(found, 500);
+}
+
+TEST(MapWindowTest, OfTwoDecksTheNearerOneIsTheSurface) {
+  PaintedMap map;
+  map.Put(3, 3, GroundLayer(0.0));
+  map.Put(3, 3, GroundLayer(2.8));
+  const MapWindow window = map.Window(kOrigin, 5.0);
+  EXPECT_EQ(window.surfaces(), 2U);
+  for (const double z : {-0.5, -0.1, 0.55, 1.3, 1.5, 2.3, 3.3}) {  // both are in reach
+    float height_m = 0.0F;
+    const auto* plane = window.NearestSurface(InWindow(window, 0.35, 0.35, z), 5.0F, &height_m);
+    ASSERT_NE(plane, nullptr) << z;
+    EXPECT_NEAR(height_m, z < 1.4 ? z : z - 2.8, 1e-4) << z;
+  }
+  float height_m = 0.0F;
+  EXPECT_EQ(window.NearestSurface(InWindow(window, 0.35, 0.35, 1.4), 0.6F, &height_m), nullptr);
+}
+
+TEST(MapWindowTest, OnlyMeasuredGroundThatCanBeDrivenIsASurface) {
+  PaintedMap map;
+  TileLayer guessed = GroundLayer(0.0);
+  guessed.flags = TileLayer::kTraversable;
+  TileLayer obstacle = GroundLayer(0.0);
+  obstacle.flags = TileLayer::kMeasured;
+  map.Put(0, 0, guessed);
+  map.Put(1, 0, obstacle);
+  map.Put(2, 0, GroundLayer(0.0));
+  EXPECT_EQ(map.Window(kOrigin, 5.0).surfaces(), 1U);
+}
+
+TEST(MapWindowTest, SlopesHaveTheirGradientAndLevelGroundHasNone) {
+  for (const Eigen::Vector2d& gradient :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.15, 0), Eigen::Vector2d(-0.1, 0.2)}) {
+    PaintedMap map;
+    map.Paint({{testing::Patch{0.5, gradient}}, {}}, 6.0);
+    const MapWindow window = map.Window(kOrigin, 10.0);
+    for (const Eigen::Vector2d& p : {Eigen::Vector2d(0.03, 0.08), Eigen::Vector2d(-3.2, 2.7)}) {
+      const double ground_m = 0.5 + gradient.dot(p);
+      float height_m = 0.0F;
+      const auto* plane =
+          window.NearestSurface(InWindow(window, p.x(), p.y(), ground_m + 0.1), 0.6F, &height_m);
+      ASSERT_NE(plane, nullptr);
+      EXPECT_NEAR(height_m, 0.1, 2e-3);
+      EXPECT_LT((plane->gradient.cast<double>() - gradient).norm(), 2e-3);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,79 @@
+#include "core/scan/deskew.h"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace atlas {
+namespace {
+
+PointCloud OnePoint(float x, float y, float z) {
+  PointCloud cloud;
+  cloud.points.emplace_back(x, y, z);
+  return cloud;
+}
+
+Pose Motion(const Eigen::Vector3d& translation, double angle_rad, const Eigen::Vector3d& axis) {
+  Pose motion = Pose::Identity();
+  motion.translation() = translation;
+  motion.linear() = Eigen::AngleAxisd(angle_rad, axis.normalized()).toRotationMatrix();
+  return motion;
+}
+
+TEST(DeskewTest, AVehicleAtRestChangesNothing) {
+  const PointCloud cloud = OnePoint(3.0F, -20.0F, 1.5F);
+  EXPECT_EQ(Deskew(cloud, Pose::Identity()).points, cloud.points);
+  EXPECT_EQ(Deskew(PointCloud(), Pose::Identity()).size(), 0U);
+}
+
+TEST(DeskewTest, TheSensorTurnsClockwiseAndItsPoseIsThatOfLookingAhead) {
+  // A metre ahead a revolution: what it saw on the left was a quarter of a metre before.
+  const Pose ahead = Motion({1.0, 0.0, 0.0}, 0.0, Eigen::Vector3d::UnitZ());
+  EXPECT_NEAR(Deskew(OnePoint(10.0F, 0.0F, 0.0F), ahead).points[0].x(), 10.0F, 2e-3);
+  EXPECT_NEAR(Deskew(OnePoint(0.0F, 10.0F, 0.0F), ahead).points[0].x(), -0.25F, 2e-3);
+  EXPECT_NEAR(Deskew(OnePoint(0.0F, -10.0F, 0.0F), ahead).points[0].x(), 0.25F, 2e-3);
+  EXPECT_NEAR(Deskew(OnePoint(-10.0F, 0.01F, 0.0F), ahead).points[0].x(), -10.5F, 2e-3);
+  EXPECT_NEAR(Deskew(OnePoint(-10.0F, -0.01F, 0.0F), ahead).points[0].x(), -9.5F, 2e-3);
+}
+
+TEST(DeskewTest, AnyMotionIsUndoneToWithinAStep) {
+  std::mt19937 random(21);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  std::uniform_real_distribution<double> range(2.0, 80.0);
+  for (int round = 0; round < 10; ++round) {
+    const Eigen::Vector3d axis(unit(random), unit(random), 3.0);
+    const Eigen::Vector3d move(2.0 * unit(random), 0.3 * unit(random), 0.1 * unit(random));
+    const double turn_rad = 0.1 * unit(random);
+    PointCloud cloud;
+    std::vector<Eigen::Vector3d> truth;
+    for (int i = 0; i < 200; ++i) {
+      const double azimuth = std::numbers::pi * unit(random);
+      const double r = range(random);
+      const Eigen::Vector3d then(r * std::cos(azimuth), r * std::sin(azimuth), unit(random));
+      const double share = -azimuth / (2.0 * std::numbers::pi);
+      truth.emplace_back(Motion(share * move, share * turn_rad, axis) * then);
+      cloud.points.emplace_back(then.cast<float>());
+    }
+    const PointCloud result = Deskew(cloud, Motion(move, turn_rad, axis));
+    ASSERT_EQ(result.size(), cloud.size());
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      // Half a step of 1024, by the way and by the turn at that range.
+      const double step_m = (move.norm() + std::abs(turn_rad) * truth[i].norm()) / 2048.0 + 1e-4;
+      EXPECT_LT((result.points[i].cast<double>() - truth[i]).norm(), step_m);
+    }
+  }
+}
+
+TEST(DeskewTest, ReturnsExactlyBehindTheVehicleAreInReach) {
+  const Pose motion = Motion({1.0, 0.0, 0.0}, 0.05, Eigen::Vector3d::UnitZ());
+  for (const float y : {0.0F, -0.0F, 1e-30F, -1e-30F}) {
+    const Eigen::Vector3f p = Deskew(OnePoint(-10.0F, y, 0.0F), motion).points[0];
+    EXPECT_TRUE(p.allFinite());
+    EXPECT_LT((p - Eigen::Vector3f(-10.0F, 0.0F, 0.0F)).norm(), 0.8F);
+  }
+}
+
+}  // namespace
+}  // namespace atlas
