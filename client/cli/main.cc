@@ -4,6 +4,7 @@
 #include <exception>
 #include <iostream>
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include "client/cli/command_line/command_line.h"
@@ -14,6 +15,13 @@ namespace {
 std::optional<std::string> FromEnvironment(const char* name) {
   const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before any thread
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
+}
+
+// The buffers of a scan are megabytes, made and dropped for each: kept by the process instead of being
+// mapped again, the front end takes 12.6 ms a scan instead of 15.6 (deploy/bench.sh frontend).
+void KeepFreedMemory() {
+  mallopt(M_MMAP_THRESHOLD, 64 << 20);
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
 }
 
 int Fail(const std::string& message, const std::vector<std::string>& arguments) {
@@ -34,6 +42,7 @@ int Run(const std::vector<std::string>& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  KeepFreedMemory();
   const std::vector<std::string> arguments(argv + std::min(1, argc), argv + argc);
   try {
     return Run(arguments);
