@@ -8,7 +8,8 @@
 namespace atlas {
 namespace {
 
-// Blobs stand last in their rows: the other columns are read without touching overflow pages.
+// Blobs stand last in their rows: the other columns are read without touching overflow pages. The
+// checksums of counters, keyframe_tiles and dirty_tiles are reserved and null.
 constexpr const char* kTables = R"sql(
 CREATE TABLE meta (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -16,7 +17,7 @@ CREATE TABLE meta (
   checksum INTEGER NOT NULL);
 
 CREATE TABLE counters (
-  id INTEGER PRIMARY KEY, name TEXT NOT NULL, value INTEGER NOT NULL);
+  id INTEGER PRIMARY KEY, name TEXT NOT NULL, value INTEGER NOT NULL, checksum INTEGER);
 
 CREATE TABLE sessions (
   id INTEGER PRIMARY KEY,
@@ -76,6 +77,7 @@ CREATE INDEX tile_summaries ON tiles (key, revision, payload_hash, blob_bytes);
 
 CREATE TABLE keyframe_tiles (
   tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,
+  checksum INTEGER,
   PRIMARY KEY (tile_key, keyframe_id)) WITHOUT ROWID;
 CREATE INDEX tiles_of_keyframe ON keyframe_tiles (keyframe_id);
 
@@ -84,7 +86,8 @@ CREATE TABLE dirty_tiles (
   shard INTEGER NOT NULL, level INTEGER NOT NULL,
   generation INTEGER NOT NULL, since INTEGER NOT NULL,
   lease_owner TEXT, lease_until_ms INTEGER NOT NULL DEFAULT 0,
-  attempts INTEGER NOT NULL DEFAULT 0, retry_at_ms INTEGER NOT NULL DEFAULT 0);
+  attempts INTEGER NOT NULL DEFAULT 0, retry_at_ms INTEGER NOT NULL DEFAULT 0,
+  checksum INTEGER);
 CREATE INDEX dirty_since ON dirty_tiles (since);
 
 INSERT INTO counters (id, name, value) VALUES
