@@ -17,8 +17,9 @@ std::optional<std::string> FromEnvironment(const char* name) {
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
 }
 
-// The buffers of a scan are megabytes, made and dropped for each: kept by the process instead of being
-// mapped again, the front end takes 12.6 ms a scan instead of 15.6 (deploy/bench.sh frontend).
+// The buffers of a scan are megabytes, made and dropped for each: kept by the process instead of
+// being mapped again, the front end takes 12.6 ms a scan instead of 15.6 (deploy/bench.sh
+// frontend).
 void KeepFreedMemory() {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
