@@ -1,5 +1,8 @@
 #include "core/fusion/block_gatherer.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "core/base/integer_math.h"
 
 namespace atlas {
@@ -55,21 +58,20 @@ BlockGatherer::BlockGatherer(const TileId& id,
       column_mask_(ColumnMask(profile)),
       first_i_(std::int64_t{id.x} * profile.tile_cells),
       first_j_(std::int64_t{id.y} * profile.tile_cells),
-      capacity_(input.frames.size()),
-      observations_(counts_.size() * capacity_) {
-  resamplers_.reserve(capacity_);
-  for (std::uint32_t frame = 0; frame < capacity_; ++frame) {
+      blocks_per_side_(profile.tile_cells / kBlockCells) {
+  resamplers_.reserve(input.frames.size());
+  for (std::uint32_t frame = 0; frame < input.frames.size(); ++frame) {
     resamplers_.push_back(MakeResampler(frame));
   }
 }
 
 BlockGatherer::Resampler BlockGatherer::MakeResampler(std::uint32_t frame) const {
-  const PlacedKeyframe& placed = *input_.frames[frame].placed;
+  const FrameOnMap& placed = *input_.frames[frame].placed;
   const KeyframePlacement& p = placed.placement;
   const std::int64_t cos = p.cos_yaw;
   const std::int64_t sin = p.sin_yaw;
-  return {placed.keyframe.get(),
-          FootprintDisc(p, placed.keyframe->grid),
+  return {FootprintDisc(p, placed.grid),
+          placed.grid.radius_cells,
           2 * cos,
           2 * sin,
           RotatedOrigin(p, cos, sin, cell_size_um_),
@@ -80,26 +82,69 @@ BlockGatherer::Resampler BlockGatherer::MakeResampler(std::uint32_t frame) const
           frame};
 }
 
-void BlockGatherer::Gather(std::int32_t block_x, std::int32_t block_y) {
-  counts_.fill(0);
-  const std::int64_t first_i = first_i_ + block_x * kBlockCells;
-  const std::int64_t first_j = first_j_ + block_y * kBlockCells;
-  const Square block{first_i * cell_size_um_, first_j * cell_size_um_, kBlockCells * cell_size_um_};
-  for (const Resampler& resampler : resamplers_) {
-    if (Touches(resampler.disc, block)) {
-      GatherFrame(resampler, first_i, first_j);
+std::int32_t BlockGatherer::RowsWithin(std::size_t max_bytes) const {
+  constexpr std::size_t kBlockBytes =
+      static_cast<std::size_t>(kBlockCells * kBlockCells) * sizeof(Observation);
+  const std::size_t row_bytes = kBlockBytes * static_cast<std::size_t>(blocks_per_side_) *
+                                std::max<std::size_t>(1, resamplers_.size());
+  return static_cast<std::int32_t>(std::clamp<std::size_t>(
+      max_bytes / row_bytes, 1, static_cast<std::size_t>(blocks_per_side_)));
+}
+
+Square BlockGatherer::SquareOf(const Block& block) const {
+  return {block.first_i * cell_size_um_, block.first_j * cell_size_um_,
+          kBlockCells * cell_size_um_};
+}
+
+void BlockGatherer::PrepareBlocks(std::int32_t first_row, std::int32_t rows) {
+  first_row_ = first_row;
+  blocks_.resize(static_cast<std::size_t>(rows * blocks_per_side_));
+  for (std::int32_t y = 0; y < rows; ++y) {
+    for (std::int32_t x = 0; x < blocks_per_side_; ++x) {
+      Block& block = blocks_[static_cast<std::size_t>(y * blocks_per_side_ + x)];
+      block.first_i = first_i_ + x * kBlockCells;
+      block.first_j = first_j_ + (first_row + y) * kBlockCells;
+      const Square square = SquareOf(block);
+      block.capacity = static_cast<std::size_t>(
+          std::count_if(resamplers_.begin(), resamplers_.end(),
+                        [&](const Resampler& r) { return Touches(r.disc, square); }));
+      block.observations.resize(block.counts.size() * block.capacity);
+      block.counts.fill(0);
     }
   }
 }
 
-void BlockGatherer::GatherFrame(const Resampler& r, std::int64_t first_i, std::int64_t first_j) {
+Status BlockGatherer::Gather(std::int32_t first_row,
+                             std::int32_t rows,
+                             const KeyframeSource& source) {
+  PrepareBlocks(first_row, rows);
+  for (const Resampler& resampler : resamplers_) {
+    std::shared_ptr<const Keyframe> keyframe;
+    for (Block& block : blocks_) {
+      if (!Touches(resampler.disc, SquareOf(block))) {
+        continue;
+      }
+      if (keyframe == nullptr) {
+        auto loaded = source(input_.frames[resampler.frame].index);
+        if (!loaded) {
+          return loaded.error();
+        }
+        keyframe = std::move(*loaded);
+      }
+      GatherFrame(resampler, *keyframe, block);
+    }
+  }
+  return {};
+}
+
+void BlockGatherer::GatherFrame(const Resampler& r, const Keyframe& keyframe, Block& block) const {
   constexpr int kShift = kFineBits - kCoarseBits;
   // The centre of cell (i, j) is at (2 i + 1, 2 j + 1) half cells.
   const std::int64_t cos = r.cos2 / 2;
   const std::int64_t sin = r.sin2 / 2;
-  std::int64_t row_u = cos * (2 * first_i + 1) + sin * (2 * first_j + 1) - r.u_origin;
-  std::int64_t row_v = cos * (2 * first_j + 1) - sin * (2 * first_i + 1) - r.v_origin;
-  const std::int64_t radius_q16 = std::int64_t{r.keyframe->grid.radius_cells} << kCoarseBits;
+  std::int64_t row_u = cos * (2 * block.first_i + 1) + sin * (2 * block.first_j + 1) - r.u_origin;
+  std::int64_t row_v = cos * (2 * block.first_j + 1) - sin * (2 * block.first_i + 1) - r.v_origin;
+  const std::int64_t radius_q16 = std::int64_t{r.radius_cells} << kCoarseBits;
   const std::int64_t limit = radius_q16 * radius_q16;
   ColumnLattice lattice(segment_height_mm_);
   std::size_t cell = 0;
@@ -110,7 +155,7 @@ void BlockGatherer::GatherFrame(const Resampler& r, std::int64_t first_i, std::i
       const std::int64_t u_q16 = u >> kShift;
       const std::int64_t v_q16 = v >> kShift;
       if (u_q16 * u_q16 + v_q16 * v_q16 < limit) {
-        GatherCell(r, u_q16, v_q16, cell, lattice);
+        GatherCell(r, keyframe, u_q16, v_q16, cell, lattice, block);
       }
       ++cell;
       u += r.cos2;
@@ -123,11 +168,12 @@ void BlockGatherer::GatherFrame(const Resampler& r, std::int64_t first_i, std::i
 
 // Requires a point inside the disc: then its local cell is inside the grid.
 void BlockGatherer::GatherCell(const Resampler& r,
+                               const Keyframe& keyframe,
                                std::int64_t u_q16,
                                std::int64_t v_q16,
                                std::size_t cell,
-                               ColumnLattice& lattice) {
-  const Keyframe& keyframe = *r.keyframe;
+                               ColumnLattice& lattice,
+                               Block& block) const {
   const auto ix = static_cast<std::int32_t>(u_q16 >> kCoarseBits);
   const auto iy = static_cast<std::int32_t>(v_q16 >> kCoarseBits);
   const std::size_t index = keyframe.grid.Index(ix, iy);
@@ -138,8 +184,8 @@ void BlockGatherer::GatherCell(const Resampler& r,
   const std::int64_t slope_half_cells = r.slope_x * (2 * ix + 1) + r.slope_y * (2 * iy + 1);
   const std::int64_t tilt_um = (slope_half_cells * cell_size_um_) >> kFineBits;
   const std::int64_t d2 = (u_q16 * u_q16 + v_q16 * v_q16) >> (2 * kCoarseBits);
-  Observation& out = observations_[cell * capacity_ + counts_[cell]];
-  ++counts_[cell];
+  Observation& out = block.observations[cell * block.capacity + block.counts[cell]];
+  ++block.counts[cell];
   out.altitude_mm =
       static_cast<std::int32_t>(RoundDiv(r.z_um + seen.altitude_mm * 1000 + tilt_um, 1000));
   out.frame = r.frame;
@@ -154,10 +200,14 @@ void BlockGatherer::GatherCell(const Resampler& r,
   out.occupancy = seen.occupancy;
 }
 
-std::span<const Observation> BlockGatherer::Observations(std::int32_t x, std::int32_t y) const {
-  const std::size_t cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(kBlockCells) +
-                           static_cast<std::size_t>(x);
-  return std::span(observations_).subspan(cell * capacity_, counts_[cell]);
+std::span<const Observation> BlockGatherer::Observations(std::int32_t block_x,
+                                                         std::int32_t block_y,
+                                                         std::int32_t x,
+                                                         std::int32_t y) const {
+  const Block& block =
+      blocks_[static_cast<std::size_t>((block_y - first_row_) * blocks_per_side_ + block_x)];
+  const auto cell = static_cast<std::size_t>(y * kBlockCells + x);
+  return std::span(block.observations).subspan(cell * block.capacity, block.counts[cell]);
 }
 
 }  // namespace atlas

@@ -53,14 +53,15 @@ void NumberSessions(FusionInput& input) {
 }  // namespace
 
 FusionInput PrepareFusion(const TileId& id,
-                          std::span<const PlacedKeyframe> keyframes,
+                          std::span<const FrameOnMap> frames,
                           const MapProfile& profile) {
   const Square tile = TileSquare(id, profile);
   FusionInput input;
-  for (const PlacedKeyframe& placed : keyframes) {
-    if (Touches(FootprintDisc(placed.placement, placed.keyframe->grid), tile)) {
-      input.frames.push_back({&placed, 0, placed.key.sequence, 0});
-      input.max_radius_cells = std::max(input.max_radius_cells, placed.keyframe->grid.radius_cells);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const FrameOnMap& frame = frames[i];
+    if (Touches(FootprintDisc(frame.placement, frame.grid), tile)) {
+      input.frames.push_back({&frame, i, 0, frame.key.sequence, 0});
+      input.max_radius_cells = std::max(input.max_radius_cells, frame.grid.radius_cells);
     }
   }
   SortCanonically(input.frames);

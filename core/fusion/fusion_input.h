@@ -11,7 +11,8 @@
 namespace atlas {
 
 struct FusionFrame {
-  const PlacedKeyframe* placed = nullptr;
+  const FrameOnMap* placed = nullptr;
+  std::size_t index = 0;      // of the frame as it was given
   std::uint32_t session = 0;  // index into FusionInput::sessions
   std::uint32_t sequence = 0;
   std::uint32_t time_rank = 0;  // by (time, vehicle, session, sequence) among the frames
@@ -29,9 +30,9 @@ struct FusionInput {
   std::int32_t max_radius_cells = 1;
 };
 
-// The keyframes that touch the tile, in canonical order. `keyframes` must outlive the result.
+// The frames that touch the tile, in canonical order. `frames` must outlive the result.
 FusionInput PrepareFusion(const TileId& id,
-                          std::span<const PlacedKeyframe> keyframes,
+                          std::span<const FrameOnMap> frames,
                           const MapProfile& profile);
 
 }  // namespace atlas

@@ -1,6 +1,8 @@
 #include "core/fusion/tile_fusion.h"
 
+#include <algorithm>
 #include <cassert>
+#include <utility>
 
 #include "core/fusion/block_gatherer.h"
 #include "core/fusion/cell_layers.h"
@@ -32,25 +34,32 @@ class TileFuser {
     result_.cells.resize(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
   }
 
-  const BlockwiseLayers& Run() {
-    for (std::int32_t y = 0; y < side_ / BlockGatherer::kBlockCells; ++y) {
-      for (std::int32_t x = 0; x < side_ / BlockGatherer::kBlockCells; ++x) {
-        FuseBlock(x, y);
+  Status Run(const KeyframeSource& source, std::size_t max_bytes) {
+    const std::int32_t blocks = side_ / BlockGatherer::kBlockCells;
+    const std::int32_t band = gatherer_.RowsWithin(max_bytes);
+    for (std::int32_t first = 0; first < blocks; first += band) {
+      const std::int32_t rows = std::min(band, blocks - first);
+      ATLAS_RETURN_IF_ERROR(gatherer_.Gather(first, rows, source));
+      for (std::int32_t y = first; y < first + rows; ++y) {
+        for (std::int32_t x = 0; x < blocks; ++x) {
+          FuseBlock(x, y);
+        }
       }
     }
-    return result_;
+    return {};
   }
+
+  const BlockwiseLayers& result() const { return result_; }
 
   const std::vector<bool>& contributed() const { return folder_.contributed(); }
 
  private:
   void FuseBlock(std::int32_t block_x, std::int32_t block_y) {
-    gatherer_.Gather(block_x, block_y);
     for (std::int32_t y = 0; y < BlockGatherer::kBlockCells; ++y) {
       for (std::int32_t x = 0; x < BlockGatherer::kBlockCells; ++x) {
         const auto row = static_cast<std::uint32_t>(block_y * BlockGatherer::kBlockCells + y);
         const auto column = static_cast<std::uint32_t>(block_x * BlockGatherer::kBlockCells + x);
-        FuseCell(gatherer_.Observations(x, y),
+        FuseCell(gatherer_.Observations(block_x, block_y, x, y),
                  result_.cells[std::size_t{row} * static_cast<std::uint32_t>(side_) + column]);
       }
     }
@@ -84,23 +93,43 @@ void AppendCells(const BlockwiseLayers& blockwise, Tile& tile) {
 
 }  // namespace
 
-Tile FuseTile(const TileId& id,
-              std::span<const PlacedKeyframe> keyframes,
-              const MapProfile& profile) {
+Result<Tile> FuseTile(const TileId& id,
+                      std::span<const FrameOnMap> frames,
+                      const KeyframeSource& source,
+                      const MapProfile& profile,
+                      std::size_t max_bytes) {
   assert(id.level == 0);
-  const FusionInput input = PrepareFusion(id, keyframes, profile);
+  const FusionInput input = PrepareFusion(id, frames, profile);
   Tile tile = EmptyTile(id, profile);
   if (input.frames.empty()) {
     return tile;
   }
   TileFuser fuser(id, input, profile);
-  AppendCells(fuser.Run(), tile);
+  if (Status status = fuser.Run(source, max_bytes); !status.ok()) {
+    return Error(std::move(status));
+  }
+  AppendCells(fuser.result(), tile);
   for (std::size_t i = 0; i < input.sessions.size(); ++i) {
     if (fuser.contributed()[i]) {
       tile.contributors.push_back(*input.sessions[i].key);  // sessions are sorted
     }
   }
   return tile;
+}
+
+Tile FuseTile(const TileId& id,
+              std::span<const PlacedKeyframe> keyframes,
+              const MapProfile& profile) {
+  std::vector<FrameOnMap> frames;
+  frames.reserve(keyframes.size());
+  for (const PlacedKeyframe& k : keyframes) {
+    frames.push_back({k.key, k.time_ms, k.placement, k.keyframe->grid});
+  }
+  const auto in_memory = [keyframes](std::size_t i) -> Result<std::shared_ptr<const Keyframe>> {
+    return keyframes[i].keyframe;
+  };
+  constexpr std::size_t kCacheBytes = std::size_t{1} << 20;       // asking again costs nothing here
+  return *FuseTile(id, frames, in_memory, profile, kCacheBytes);  // memory does not fail
 }
 
 }  // namespace atlas

@@ -42,20 +42,30 @@ Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
   if (!sources) {
     return Error(sources.error());
   }
-  std::vector<PlacedKeyframe> placed;
-  placed.reserve(sources->keyframes.size());
+  std::vector<FrameOnMap> frames;
+  frames.reserve(sources->keyframes.size());
   for (const KeyframeRecord& record : sources->keyframes) {
     const auto placement = PlaceKeyframe(record.pose, record.level_quaternion);
     if (!placement) {
       return Error(placement.error().WithContext(StrCat("keyframe ", record.key)));
     }
-    auto keyframe = cache_.Get(record.id, [this](std::int64_t k) { return LoadKeyframe(k); });
-    if (!keyframe) {
-      return Error(keyframe.error().WithContext(StrCat("keyframe ", record.key)));
-    }
-    placed.push_back({record.key, record.time_ms, *placement, std::move(*keyframe)});
+    frames.push_back({record.key, record.time_ms, *placement, record.grid});
   }
-  return BuiltTile{sources->revision, ToContent(FuseTile(id, placed, profile_), profile_)};
+  const auto load = [&](std::size_t i) -> Result<KeyframeCache::Handle> {
+    const KeyframeRecord& record = sources->keyframes[i];
+    auto keyframe = cache_.Get(record.id, [this](std::int64_t k) { return LoadKeyframe(k); });
+    if (keyframe && (*keyframe)->grid != record.grid) {
+      return Error(StatusCode::kInvalidData,
+                   StrCat("keyframe ", record.key, ": its grid is not the one of its row"));
+    }
+    return keyframe ? keyframe
+                    : Error(keyframe.error().WithContext(StrCat("keyframe ", record.key)));
+  };
+  const auto tile = FuseTile(id, frames, load, profile_);
+  if (!tile) {
+    return Error(tile.error());
+  }
+  return BuiltTile{sources->revision, ToContent(*tile, profile_)};
 }
 
 Result<BuiltTile> TileBuilder::BuildFromChildren(const TileId& id) {
