@@ -19,6 +19,20 @@ float GroundAt(std::span<const GroundSample> ground, float range_m) {
   return before.z_m + t * (after->z_m - before.z_m);
 }
 
+// How far sample `i` is from the line that the ground followed before it, in height. That line is
+// taken over half the gap at least, so that noise is not extended into slope.
+float BendAt(std::span<const GroundSample> ground, std::size_t i) {
+  const GroundSample& before = ground[i - 1];
+  const float gap_m = ground[i].range_m - before.range_m;
+  std::size_t first = i - 1;
+  while (first > 0 && before.range_m - ground[first].range_m < 0.5F * gap_m) {
+    --first;
+  }
+  const float base_m = before.range_m - ground[first].range_m;
+  const float slope = base_m > 0.0F ? (before.z_m - ground[first].z_m) / base_m : 0.0F;
+  return std::abs(ground[i].z_m - before.z_m - slope * gap_m);
+}
+
 }  // namespace
 
 GroundProfiles::GroundProfiles(const LeveledScan& scan,
@@ -44,7 +58,7 @@ GroundProfiles::GroundProfiles(const LeveledScan& scan,
 RayProfile GroundProfiles::Ray(int ray) const {
   const auto r = static_cast<std::size_t>(ray);
   return {std::span(ground_).subspan(ground_begin_[r], ground_begin_[r + 1] - ground_begin_[r]),
-          obstacle_range_m_[r], farthest_m_[r]};
+          ends_[r], farthest_m_[r]};
 }
 
 // A return stands for every ray between it and its neighbours on the channel.
@@ -81,6 +95,39 @@ void GroundProfiles::Sort(const LeveledScan& scan, const RayTable& rays) {
   });
 }
 
+// The ray of a return, straight from the sensor at height 0, is lowest against a chord where it
+// ends or where the chord does.
+void GroundProfiles::Join(std::span<const Return> returns,
+                          std::span<GroundSample> ground,
+                          const ProfileOptions& options) {
+  for (std::size_t i = 2; i < ground.size(); ++i) {  // up to 1 the wheels stand on it
+    const GroundSample& before = ground[i - 1];
+    GroundSample& after = ground[i];
+    const float slope = (after.z_m - before.z_m) / (after.range_m - before.range_m);
+    const auto is_below = [&](const Return& r) {
+      const float range_m = std::min(r.range_m, after.range_m);
+      const float chord_m = before.z_m + slope * (range_m - before.range_m);
+      return r.range_m > before.range_m &&
+             r.z_m * (range_m / r.range_m) < chord_m - options.max_chord_error_m;
+    };
+    after.is_joined = BendAt(ground, i) <= options.max_chord_error_m &&
+                      std::none_of(returns.begin(), returns.end(), is_below);
+  }
+}
+
+RayEnd GroundProfiles::FindEnd(std::span<const Return> returns,
+                               std::span<const GroundSample> ground,
+                               const ProfileOptions& options) {
+  for (const Return& r : returns) {
+    const float height_m = r.z_m - GroundAt(ground, r.range_m);
+    if (height_m <= options.vehicle_clearance_m &&
+        (!r.is_ground || height_m > options.max_ground_step_m)) {
+      return {r.range_m, !r.is_ground};
+    }
+  }
+  return {ground.back().range_m, false};
+}
+
 void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& options) {
   std::sort(returns.begin(), returns.end(), [](const Return& a, const Return& b) {
     return a.range_m != b.range_m ? a.range_m < b.range_m : a.z_m < b.z_m;
@@ -94,15 +141,9 @@ void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& o
       ground_.push_back({r.range_m, r.z_m});
     }
   }
-  const std::span<const GroundSample> ground(ground_.data() + begin, ground_.size() - begin);
-  float obstacle_range_m = -1.0F;
-  for (const Return& r : returns) {
-    if (!r.is_ground && r.z_m - GroundAt(ground, r.range_m) <= options.vehicle_clearance_m) {
-      obstacle_range_m = r.range_m;
-      break;
-    }
-  }
-  obstacle_range_m_.push_back(obstacle_range_m);
+  const std::span ground(ground_.data() + begin, ground_.size() - begin);
+  Join(returns, ground, options);
+  ends_.push_back(FindEnd(returns, ground, options));
   farthest_m_.push_back(returns.empty() ? 0.0F : returns.back().range_m);
   ground_begin_.push_back(static_cast<std::uint32_t>(ground_.size()));
 }

@@ -31,23 +31,33 @@ struct ProfileOptions {
   // of a car that was taken for ground is not.
   float max_ground_slope = 0.42F;  // tan 0.4 rad: what segmentation calls ground
   float max_ground_step_m = 0.25F;
-  // Altitudes between two ground returns farther apart in height than this are marked extrapolated.
-  float max_interpolated_rise_m = 1.5F;
+  // Between two ground returns the ground is known (GroundSample::is_joined) when the second one is
+  // this near to the line that the ground followed until the first, and no ray passed this far
+  // below the chord. A step within the gap is off the chord by no more than that.
+  float max_chord_error_m = 0.25F;
 };
 
 struct GroundSample {
   float range_m = 0.0F;
   float z_m = 0.0F;
+  // Whether the ground runs straight from the sample before to this one, as far as can be seen. A
+  // ray may also pass over a hole: from the edge of a deck to the ramp below it.
+  bool is_joined = true;
+};
+
+// Where the virtual scan ends: at the nearest obstacle that a vehicle would hit; before that, where
+// the ray climbs something that was taken for ground and cannot be reached (a parapet's top); else
+// at the farthest ground.
+struct RayEnd {
+  float range_m = 0.0F;
+  bool is_obstacle = false;
 };
 
 // One ray: ground samples by growing range, the first two below the vehicle itself.
 struct RayProfile {
   std::span<const GroundSample> ground;
-  float obstacle_range_m = -1.0F;  // nearest obstacle a vehicle would hit; negative: none
-  float farthest_m = 0.0F;         // farthest return of any kind
-
-  // Where the virtual scan ends: the nearest obstacle, else the farthest ground.
-  float End() const { return obstacle_range_m >= 0.0F ? obstacle_range_m : ground.back().range_m; }
+  RayEnd end;
+  float farthest_m = 0.0F;  // farthest return of any kind
 };
 
 class GroundProfiles {
@@ -69,12 +79,19 @@ class GroundProfiles {
   void Sort(const LeveledScan& scan, const RayTable& rays);
   // Ends the ray that begins with the two `contact` samples.
   void BuildRay(std::span<Return> returns, const ProfileOptions& options);
+  static RayEnd FindEnd(std::span<const Return> returns,
+                        std::span<const GroundSample> ground,
+                        const ProfileOptions& options);
+  // Judges every chord of `ground`, a whole ray's.
+  static void Join(std::span<const Return> returns,
+                   std::span<GroundSample> ground,
+                   const ProfileOptions& options);
 
   std::vector<Return> returns_;  // by ray
   std::vector<std::uint32_t> return_begin_;
   std::vector<GroundSample> ground_;  // by ray
   std::vector<std::uint32_t> ground_begin_;
-  std::vector<float> obstacle_range_m_;
+  std::vector<RayEnd> ends_;
   std::vector<float> farthest_m_;
 };
 

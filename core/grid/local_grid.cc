@@ -67,19 +67,12 @@ void AddMeasured(const LeveledScan& scan, const RayTable& rays, AltitudeGrid& al
   }
 }
 
-// Of an altitude between two ground samples `rise_m` apart in height: below the vehicle its wheels
-// measure it. A ray may pass over a hole, from the edge of a deck to the ramp below it, so what
-// lies between two heights is a guess.
-AltitudeSource SourceAt(float range_m,
-                        float rise_m,
-                        const RayProfile& profile,
-                        const ProfileOptions& options) {
-  if (range_m <= options.contact_radius_m) {
+// Of the altitudes before a ground sample: those below the vehicle its wheels measure.
+AltitudeSource SourceBefore(const GroundSample& sample, const ProfileOptions& options) {
+  if (sample.range_m <= options.contact_radius_m) {
     return AltitudeSource::kMeasured;
   }
-  return range_m <= profile.End() && rise_m <= options.max_interpolated_rise_m
-             ? AltitudeSource::kInterpolated
-             : AltitudeSource::kExtrapolated;
+  return sample.is_joined ? AltitudeSource::kInterpolated : AltitudeSource::kExtrapolated;
 }
 
 // Altitudes below one ray, from the sensor's foot to its farthest return.
@@ -89,7 +82,7 @@ void AddAlongRay(const RayProfile& profile,
                  const ProfileOptions& options,
                  AltitudeGrid& altitudes) {
   const std::uint32_t* cells = rays.Cells(ray);
-  const float end_m = std::max(profile.End(), profile.farthest_m);
+  const float end_m = std::max(profile.end.range_m, profile.farthest_m);
   const int last = std::min(rays.steps() - 1, static_cast<int>(end_m / rays.step_m()));
   std::size_t next = 1;
   for (int step = 0; step <= last; ++step) {
@@ -105,7 +98,8 @@ void AddAlongRay(const RayProfile& profile,
     const GroundSample& after = profile.ground[next];
     const float t = (range_m - before.range_m) / (after.range_m - before.range_m);
     altitudes.Add(cells[step], before.z_m + t * (after.z_m - before.z_m),
-                  SourceAt(range_m, std::abs(after.z_m - before.z_m), profile, options));
+                  range_m <= profile.end.range_m ? SourceBefore(after, options)
+                                                 : AltitudeSource::kExtrapolated);
   }
 }
 
@@ -123,14 +117,14 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
   for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
     const RayProfile profile = profiles.Ray(ray);
     AddAlongRay(profile, rays, ray, options, altitudes);
-    const int step = static_cast<int>(profile.obstacle_range_m / rays.step_m());
-    if (profile.obstacle_range_m >= 0.0F && step < rays.steps()) {
+    const int step = static_cast<int>(profile.end.range_m / rays.step_m());
+    if (profile.end.is_obstacle && step < rays.steps()) {
       grid.cells[rays.Cells(ray)[step]].occupancy = Occupancy::kObstacle;
     }
   }
   for (int ray = 0; ray < rays.rays(); ++ray) {
     const int end =
-        std::min(rays.steps(), static_cast<int>(profiles.Ray(ray).End() / rays.step_m()));
+        std::min(rays.steps(), static_cast<int>(profiles.Ray(ray).end.range_m / rays.step_m()));
     const std::uint32_t* cells = rays.Cells(ray);
     for (int step = 0; step < end; ++step) {
       KeyframeCell& cell = grid.cells[cells[step]];

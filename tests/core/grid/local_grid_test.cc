@@ -178,9 +178,10 @@ TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
       for (int step = 0; step < rays_.steps(); ++step) {
         const float begin_m = static_cast<float>(step) * rays_.step_m();
         const float end_m = begin_m + rays_.step_m();
-        if (profile.obstacle_range_m >= begin_m && profile.obstacle_range_m < end_m) {
+        if (profile.end.is_obstacle && profile.end.range_m >= begin_m &&
+            profile.end.range_m < end_m) {
           hits.insert(rays_.Cells(ray)[step]);
-        } else if (end_m <= profile.End()) {
+        } else if (end_m <= profile.end.range_m) {
           expected[rays_.Cells(ray)[step]] = Occupancy::kFree;
         }
       }
