@@ -88,6 +88,9 @@ def garage(atlas):
     steps = [abs(b[2] - a[2]) for a, b in zip(route["waypoints"], route["waypoints"][1:])]
     print(f"route of {route['length_m']} m, largest step {max(steps):.3f} m, {route['ms']} ms")
     assert route["found"] and max(steps) <= 0.2
+    ramps = atlas.run("plan", *ends, "--max-slope-deg", 20)  # they reach 18.5 degrees
+    print(f"with --max-slope-deg 20: {ramps['length_m']} m")
+    assert ramps["found"]
     track = atlas.run("localize", folder)
     print(f"tracked in its own map: {track['failures']} of {track['scans']} scans fail")
     assert track["failures"] <= 0.03 * track["scans"]

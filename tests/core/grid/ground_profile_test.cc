@@ -50,8 +50,19 @@ class GroundProfileTest : public ::testing::Test {
     return ranges_dm;
   }
 
+  RayEnd End(std::initializer_list<Drawn> returns) const {
+    return Build(OneRay(returns)).Ray(0).end;
+  }
+
+  // Negative: none.
   float ObstacleRange(std::initializer_list<Drawn> returns) const {
-    return Build(OneRay(returns)).Ray(0).obstacle_range_m;
+    const RayEnd end = End(returns);
+    return end.is_obstacle ? end.range_m : -1.0F;
+  }
+
+  // Whether the ground is known between the last two samples.
+  bool IsLastJoined(std::initializer_list<Drawn> returns) const {
+    return Build(OneRay(returns)).Ray(0).ground.back().is_joined;
   }
 
   RayTable rays_{GridGeometry{100'000, 200}};
@@ -70,8 +81,8 @@ TEST_F(GroundProfileTest, BeginsBelowTheVehicle) {
     EXPECT_EQ(profile.ground[1].range_m, options_.contact_radius_m);
     EXPECT_NEAR(profile.ground[1].z_m,
                 -kHeight_m + 1.5 * (0.1 * std::cos(azimuth) - 0.2 * std::sin(azimuth)), 1e-4);
-    EXPECT_LT(profile.obstacle_range_m, 0.0F);
-    EXPECT_EQ(profile.End(), options_.contact_radius_m);
+    EXPECT_FALSE(profile.end.is_obstacle);
+    EXPECT_EQ(profile.end.range_m, options_.contact_radius_m);
     EXPECT_EQ(profile.farthest_m, 0.0F);
   }
 }
@@ -100,7 +111,7 @@ TEST_F(GroundProfileTest, TheNearestObstacleEndsTheRay) {
   EXPECT_FLOAT_EQ(ObstacleRange({{5, -1.8F, true}, {9, -0.5F, false}, {7, -1.0F, false}}), 7.0F);
   const GroundProfiles profiles =
       Build(OneRay({{5, -1.8F, true}, {7, -1.0F, false}, {12, -1.8F, true}}));
-  EXPECT_FLOAT_EQ(profiles.Ray(0).End(), 7.0F);
+  EXPECT_FLOAT_EQ(profiles.Ray(0).end.range_m, 7.0F);
   EXPECT_FLOAT_EQ(profiles.Ray(0).farthest_m, 12.0F);
   EXPECT_EQ(profiles.Ray(0).ground.size(), 4U);  // the ground behind is known all the same
 }
@@ -127,6 +138,39 @@ TEST_F(GroundProfileTest, WhatIsBelowTheGroundIsAnObstacle) {
   EXPECT_FLOAT_EQ(ObstacleRange({{5, -1.8F, true}, {8, -2.6F, false}}), 8.0F);
 }
 
+TEST_F(GroundProfileTest, ATopThatCannotBeReachedEndsTheRayAndIsNoObstacle) {
+  // The flat top of a parapet, taken for ground, before a ramp and a floor beyond it.
+  const RayEnd end = End({{2, -0.4F, true}, {7, -1.8F, true}, {12, -1.8F, true}});
+  EXPECT_FLOAT_EQ(end.range_m, 2.0F);
+  EXPECT_FALSE(end.is_obstacle);
+  // A kerb that is climbed ends nothing; what hangs higher than the vehicle does not, either.
+  EXPECT_FLOAT_EQ(End({{5, -1.8F, true}, {5.1F, -1.6F, true}, {9, -1.6F, true}}).range_m, 9.0F);
+  EXPECT_FLOAT_EQ(End({{5, -1.8F, true}, {6, 0.8F, true}, {9, -1.8F, true}}).range_m, 9.0F);
+}
+
+TEST_F(GroundProfileTest, StraightGroundIsKnownBetweenItsReturns) {
+  EXPECT_TRUE(IsLastJoined({{7, -1.8F, true}}));
+  EXPECT_TRUE(IsLastJoined({{5, -0.8F, true}, {6, -0.5F, true}, {9, 0.4F, true}}));  // a ramp
+  EXPECT_TRUE(IsLastJoined({{5, -1.8F, true}, {6, -1.8F, true}, {9, -1.6F, true}}));
+  // Two centimetres of noise within a decimetre are no slope to go on with.
+  EXPECT_TRUE(IsLastJoined({{6.9F, -1.82F, true}, {7, -1.8F, true}, {10, -1.8F, true}}));
+}
+
+TEST_F(GroundProfileTest, BeyondABendTheGroundIsAGuess) {
+  EXPECT_FALSE(IsLastJoined({{5, -1.8F, true}, {6, -1.8F, true}, {9, -1.5F, true}}));
+  EXPECT_FALSE(IsLastJoined({{5, -1.8F, true}, {6, -1.8F, true}, {9, -2.7F, true}}));
+}
+
+TEST_F(GroundProfileTest, WhereARayPassedBelowTheChordThereIsNoGround) {
+  // A floor on both sides of a hole: one ray meets the bottom of it, or a wall far beyond.
+  EXPECT_TRUE(IsLastJoined({{5, -1.8F, true}, {12, -1.8F, true}}));
+  EXPECT_FALSE(IsLastJoined({{5, -1.8F, true}, {9, -3.1F, true}, {12, -1.8F, true}}));
+  EXPECT_FALSE(IsLastJoined({{5, -1.8F, true}, {12, -1.8F, true}, {18, -3.6F, false}}));
+  // Rays that end before the gap, or pass above it, say nothing.
+  EXPECT_TRUE(IsLastJoined({{4.9F, -2.2F, false}, {5, -1.8F, true}, {12, -1.8F, true}}));
+  EXPECT_TRUE(IsLastJoined({{5, -1.8F, true}, {12, -1.8F, true}, {18, -2.4F, false}}));
+}
+
 TEST_F(GroundProfileTest, ReturnsBeyondTheRadiusAreNotOnTheGrid) {
   EXPECT_TRUE(GroundRanges({{20.0F, -1.8F, true}, {25, -1.8F, true}}).empty());
   EXPECT_LT(ObstacleRange({{20.1F, -1.0F, false}}), 0.0F);
@@ -144,7 +188,7 @@ TEST_F(GroundProfileTest, AReturnStandsForEveryRayBetweenItAndItsNeighbours) {
     for (int ray = 0; ray < rays_.rays(); ++ray) {
       const int turns = std::abs(ray - middle);
       const int away = std::min(turns, rays_.rays() - turns);
-      EXPECT_EQ(profiles.Ray(ray).obstacle_range_m >= 0.0F, away <= 2) << middle << " " << ray;
+      EXPECT_EQ(profiles.Ray(ray).end.is_obstacle, away <= 2) << middle << " " << ray;
     }
   }
 }
@@ -173,11 +217,13 @@ TEST_F(GroundProfileTest, TheOrderOfReturnsDoesNotMatter) {
     for (int ray = 0; ray < rays_.rays(); ++ray) {
       const RayProfile a = first.Ray(ray);
       const RayProfile b = second.Ray(ray);
-      EXPECT_EQ(a.obstacle_range_m, b.obstacle_range_m);
+      EXPECT_EQ(a.end.range_m, b.end.range_m);
+      EXPECT_EQ(a.end.is_obstacle, b.end.is_obstacle);
       EXPECT_EQ(a.farthest_m, b.farthest_m);
       ASSERT_TRUE(std::equal(a.ground.begin(), a.ground.end(), b.ground.begin(), b.ground.end(),
                              [](const GroundSample& s, const GroundSample& t) {
-                               return s.range_m == t.range_m && s.z_m == t.z_m;
+                               return s.range_m == t.range_m && s.z_m == t.z_m &&
+                                      s.is_joined == t.is_joined;
                              }));
       EXPECT_TRUE(std::is_sorted(a.ground.begin(), a.ground.end(),
                                  [](const GroundSample& s, const GroundSample& t) {
@@ -194,7 +240,7 @@ TEST_F(GroundProfileTest, GridsOfAFewCellsWork) {
     AddReturn(scan, {0.9F, 0.1F, -1.0F}, false);
     scan.column_spacing_rad = 0.1F;
     const GroundProfiles profiles(scan, rays, kContact, options_);
-    EXPECT_NEAR(profiles.Ray(0).obstacle_range_m, std::hypot(0.9F, 0.1F), 1e-5F);
+    EXPECT_NEAR(profiles.Ray(0).end.range_m, std::hypot(0.9F, 0.1F), 1e-5F);
   }
 }
 

@@ -95,19 +95,32 @@ TEST_F(LocalGridTest, HeightsLieOnTheSlopeWhereverTheyComeFrom) {
 TEST_F(LocalGridTest, BetweenTwoReturnsTheGroundIsInterpolatedAndSaysSo) {
   LeveledScan scan;
   AddReturn(scan, {6.0F, 0.05F, -1.8F}, true);
-  AddReturn(scan, {10.0F, 0.083F, -1.0F}, true);
+  AddReturn(scan, {10.0F, 0.083F, -1.6F}, true);
   const LocalGrid grid = Build(scan);
   for (const double x : testing::Steps(6.15, 9.8, 0.1)) {
     const KeyframeCell& cell = At(grid, x, 0.05);
     EXPECT_EQ(cell.source, AltitudeSource::kInterpolated) << x;
-    EXPECT_NEAR(cell.altitude_mm, -1800 + 200 * (x - 6.0), 20) << x;
+    EXPECT_NEAR(cell.altitude_mm, -1800 + 50 * (x - 6.0), 8) << x;
     EXPECT_EQ(cell.occupancy, Occupancy::kFree) << x;
   }
   EXPECT_EQ(At(grid, 6.02, 0.05).source, AltitudeSource::kMeasured);
   EXPECT_EQ(At(grid, 6.02, 0.05).altitude_mm, -1800);
-  EXPECT_EQ(At(grid, 10.02, 0.05).altitude_mm, -1000);
+  EXPECT_EQ(At(grid, 10.02, 0.05).altitude_mm, -1600);
   EXPECT_EQ(At(grid, 10.35, 0.05).source, AltitudeSource::kNone);
   EXPECT_EQ(At(grid, 8.0, 0.55).source, AltitudeSource::kNone);  // no ray there
+}
+
+TEST_F(LocalGridTest, AcrossAHoleTheGroundIsAGuess) {
+  LeveledScan scan;
+  AddReturn(scan, {6.0F, 0.05F, -1.8F}, true);
+  AddReturn(scan, {10.0F, 0.083F, -1.8F}, true);
+  AddReturn(scan, {8.0F, 0.066F, -2.3F}, true);  // the floor below, past the near edge
+  const LocalGrid grid = Build(scan);
+  EXPECT_EQ(At(grid, 5.0, 0.05).source, AltitudeSource::kInterpolated);
+  for (const double x : testing::Steps(8.15, 9.8, 0.1)) {
+    EXPECT_EQ(At(grid, x, 0.06).source, AltitudeSource::kExtrapolated) << x;
+  }
+  EXPECT_EQ(At(grid, 10.02, 0.05).source, AltitudeSource::kMeasured);
 }
 
 TEST_F(LocalGridTest, BehindAnObstacleTheLastGroundIsExtrapolatedAndUnknown) {
