@@ -10,6 +10,7 @@ BUILD_PACKAGES=(
 )
 TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format python3 xz-utils)
 BENCH_PACKAGES=(libbenchmark-dev)
+TIDY_PACKAGES=(clang-tidy)
 
 # install_packages PACKAGE...: asks apt only for what is missing.
 install_packages() {

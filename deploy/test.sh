@@ -2,7 +2,7 @@
 # Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize] [--long]
 #   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, and TSan over
 #               the tests labelled threads
-#   --long      ten times as many random worlds in the tests that make them
+#   --long      ten times as many random worlds in the tests that make them, and clang-tidy over all sources
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
@@ -39,4 +39,8 @@ if ((sanitize)); then
   export ATLAS_TEST_SCALE=0.1
   run asan -L 'unit|integration' -LE data
   run tsan -L threads
+fi
+if ((long)); then
+  echo "== clang-tidy"
+  deploy/tidy.sh
 fi

@@ -152,10 +152,9 @@ void BlockGatherer::GatherFrame(const Resampler& r, const Keyframe& keyframe, Bl
     std::int64_t u = row_u;
     std::int64_t v = row_v;
     for (std::int32_t x = 0; x < kBlockCells; ++x) {
-      const std::int64_t u_q16 = u >> kShift;
-      const std::int64_t v_q16 = v >> kShift;
-      if (u_q16 * u_q16 + v_q16 * v_q16 < limit) {
-        GatherCell(r, keyframe, u_q16, v_q16, cell, lattice, block);
+      const LocalPoint point{u >> kShift, v >> kShift};
+      if (point.squared_distance_q32() < limit) {
+        GatherCell(r, keyframe, point, cell, lattice, block);
       }
       ++cell;
       u += r.cos2;
@@ -169,13 +168,12 @@ void BlockGatherer::GatherFrame(const Resampler& r, const Keyframe& keyframe, Bl
 // Requires a point inside the disc: then its local cell is inside the grid.
 void BlockGatherer::GatherCell(const Resampler& r,
                                const Keyframe& keyframe,
-                               std::int64_t u_q16,
-                               std::int64_t v_q16,
+                               const LocalPoint& point,
                                std::size_t cell,
                                ColumnLattice& lattice,
                                Block& block) const {
-  const auto ix = static_cast<std::int32_t>(u_q16 >> kCoarseBits);
-  const auto iy = static_cast<std::int32_t>(v_q16 >> kCoarseBits);
+  const auto ix = static_cast<std::int32_t>(point.u_q16 >> kCoarseBits);
+  const auto iy = static_cast<std::int32_t>(point.v_q16 >> kCoarseBits);
   const std::size_t index = keyframe.grid.Index(ix, iy);
   const KeyframeCell& seen = keyframe.cells[index];
   if (seen.source == AltitudeSource::kNone) {
@@ -183,7 +181,7 @@ void BlockGatherer::GatherCell(const Resampler& r,
   }
   const std::int64_t slope_half_cells = r.slope_x * (2 * ix + 1) + r.slope_y * (2 * iy + 1);
   const std::int64_t tilt_um = (slope_half_cells * cell_size_um_) >> kFineBits;
-  const std::int64_t d2 = (u_q16 * u_q16 + v_q16 * v_q16) >> (2 * kCoarseBits);
+  const std::int64_t d2 = point.squared_distance_q32() >> (2 * kCoarseBits);
   Observation& out = block.observations[cell * block.capacity + block.counts[cell]];
   ++block.counts[cell];
   out.altitude_mm =

@@ -56,6 +56,13 @@ class BlockGatherer {
     std::uint32_t frame = 0;
   };
   class ColumnLattice;
+  // A point of the map in a keyframe's levelled frame, cells x 2^16.
+  struct LocalPoint {
+    std::int64_t u_q16 = 0;
+    std::int64_t v_q16 = 0;
+
+    std::int64_t squared_distance_q32() const { return u_q16 * u_q16 + v_q16 * v_q16; }
+  };
 
   // The observations of one block; each cell has room for one of every frame that reaches it.
   struct Block {
@@ -72,8 +79,7 @@ class BlockGatherer {
   void GatherFrame(const Resampler& resampler, const Keyframe& keyframe, Block& block) const;
   void GatherCell(const Resampler& resampler,
                   const Keyframe& keyframe,
-                  std::int64_t u_q16,
-                  std::int64_t v_q16,
+                  const LocalPoint& point,
                   std::size_t cell,
                   ColumnLattice& lattice,
                   Block& block) const;

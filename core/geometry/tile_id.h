@@ -30,6 +30,7 @@ struct TileId {
   TileId Parent() const;
   std::array<TileId, 4> Children() const;  // (0,0), (1,0), (0,1), (1,1); requires level > 0
 
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 sees a null pointer in <=>
   friend auto operator<=>(const TileId&, const TileId&) = default;
 };
 

@@ -6,19 +6,6 @@
 namespace atlas {
 namespace {
 
-// Ground below an obstacle at `range_m`: between its neighbours, else that of the last sample.
-float GroundAt(std::span<const GroundSample> ground, float range_m) {
-  const auto after = std::upper_bound(
-      ground.begin(), ground.end(), range_m,
-      [](float range, const GroundSample& sample) { return range < sample.range_m; });
-  if (after == ground.end()) {
-    return ground.back().z_m;
-  }
-  const GroundSample& before = *std::prev(after);  // the first sample is at range 0
-  const float t = (range_m - before.range_m) / (after->range_m - before.range_m);
-  return before.z_m + t * (after->z_m - before.z_m);
-}
-
 // How far sample `i` is from the line that the ground followed before it, in height. That line is
 // taken over half the gap at least, so that noise is not extended into slope.
 float BendAt(std::span<const GroundSample> ground, std::size_t i) {
@@ -34,6 +21,18 @@ float BendAt(std::span<const GroundSample> ground, std::size_t i) {
 }
 
 }  // namespace
+
+float RayProfile::GroundAt(float range_m) const {
+  const auto after = std::upper_bound(
+      ground.begin(), ground.end(), range_m,
+      [](float range, const GroundSample& sample) { return range < sample.range_m; });
+  if (after == ground.end()) {
+    return ground.back().z_m;
+  }
+  const GroundSample& before = *std::prev(after);  // the first sample is at range 0
+  const float t = (range_m - before.range_m) / (after->range_m - before.range_m);
+  return before.z_m + t * (after->z_m - before.z_m);
+}
 
 GroundProfiles::GroundProfiles(const LeveledScan& scan,
                                const RayTable& rays,
@@ -116,16 +115,15 @@ void GroundProfiles::Join(std::span<const Return> returns,
 }
 
 RayEnd GroundProfiles::FindEnd(std::span<const Return> returns,
-                               std::span<const GroundSample> ground,
+                               const RayProfile& profile,
                                const ProfileOptions& options) {
   for (const Return& r : returns) {
-    const float height_m = r.z_m - GroundAt(ground, r.range_m);
-    if (height_m <= options.vehicle_clearance_m &&
-        (!r.is_ground || height_m > options.max_ground_step_m)) {
+    const float height_m = r.z_m - profile.GroundAt(r.range_m);
+    if (r.is_ground ? IsTop(height_m, options) : height_m <= options.vehicle_clearance_m) {
       return {r.range_m, !r.is_ground};
     }
   }
-  return {ground.back().range_m, false};
+  return {profile.ground.back().range_m, false};
 }
 
 void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& options) {
@@ -143,7 +141,7 @@ void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& o
   }
   const std::span ground(ground_.data() + begin, ground_.size() - begin);
   Join(returns, ground, options);
-  ends_.push_back(FindEnd(returns, ground, options));
+  ends_.push_back(FindEnd(returns, {ground, {}, 0.0F}, options));
   farthest_m_.push_back(returns.empty() ? 0.0F : returns.back().range_m);
   ground_begin_.push_back(static_cast<std::uint32_t>(ground_.size()));
 }

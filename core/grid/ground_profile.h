@@ -37,6 +37,12 @@ struct ProfileOptions {
   float max_chord_error_m = 0.25F;
 };
 
+// Whether a return taken for ground lies so much above the ground below it that no vehicle gets up
+// there, and not so high that one passes below: the top of a car or a parapet.
+inline bool IsTop(float height_m, const ProfileOptions& options) {
+  return height_m > options.max_ground_step_m && height_m <= options.vehicle_clearance_m;
+}
+
 struct GroundSample {
   float range_m = 0.0F;
   float z_m = 0.0F;
@@ -58,6 +64,9 @@ struct RayProfile {
   std::span<const GroundSample> ground;
   RayEnd end;
   float farthest_m = 0.0F;  // farthest return of any kind
+
+  // Height of the ground below a point at `range_m`: between its samples, else that of the last.
+  float GroundAt(float range_m) const;
 };
 
 class GroundProfiles {
@@ -80,7 +89,7 @@ class GroundProfiles {
   // Ends the ray that begins with the two `contact` samples.
   void BuildRay(std::span<Return> returns, const ProfileOptions& options);
   static RayEnd FindEnd(std::span<const Return> returns,
-                        std::span<const GroundSample> ground,
+                        const RayProfile& profile,
                         const ProfileOptions& options);
   // Judges every chord of `ground`, a whole ray's.
   static void Join(std::span<const Return> returns,

@@ -51,11 +51,20 @@ class AltitudeGrid {
   std::vector<AltitudeSum> cells_;
 };
 
-void AddMeasured(const LeveledScan& scan, const RayTable& rays, AltitudeGrid& altitudes) {
+// Ground returns of any deck; not the tops of things that stand on this one.
+void AddMeasured(const LeveledScan& scan,
+                 const RayTable& rays,
+                 const GroundProfiles& profiles,
+                 const ProfileOptions& options,
+                 AltitudeGrid& altitudes) {
   const GridGeometry& grid = rays.grid();
   const float cells_per_m = 1.0F / static_cast<float>(grid.cell_size_m());
   for (std::size_t i = 0; i < scan.size(); ++i) {
     if (scan.is_ground[i] == 0 || scan.range_m[i] >= rays.radius_m()) {
+      continue;
+    }
+    const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
+    if (IsTop(scan.z[i] - profile.GroundAt(scan.range_m[i]), options)) {
       continue;
     }
     const auto ix = static_cast<std::int32_t>(std::floor(scan.x[i] * cells_per_m));
@@ -113,7 +122,7 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
   LocalGrid grid;
   grid.cells.resize(rays.grid().size());
   AltitudeGrid altitudes(rays.grid().size());
-  AddMeasured(scan, rays, altitudes);
+  AddMeasured(scan, rays, profiles, options, altitudes);
   for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
     const RayProfile profile = profiles.Ray(ray);
     AddAlongRay(profile, rays, ray, options, altitudes);

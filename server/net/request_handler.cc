@@ -135,7 +135,7 @@ asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWrit
       co_return status;
     }
   }
-  co_return co_await SendRegion(service_, pool_, request, std::move(*region), out);
+  co_return co_await SendRegion(service_, pool_, request, *region, out);
 }
 
 asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, ReplyWriter& out) {

@@ -55,6 +55,7 @@ class RegionQuery {
     Int128 distance = 0;
     std::uint64_t key = 0;
 
+    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 sees a null pointer in <=>
     friend auto operator<=>(const Candidate&, const Candidate&) = default;
   };
 

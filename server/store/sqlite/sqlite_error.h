@@ -5,7 +5,7 @@
 
 #include "core/base/status.h"
 
-namespace SQLite {
+namespace SQLite {  // NOLINT(readability-identifier-naming): the library's
 class Exception;
 }
 

@@ -29,10 +29,10 @@ class SqliteStore final : public AtlasStore {
  public:
   SqliteStore(const SqliteStoreOptions& options,
               DataDirectory directory,
-              AtlasIdentity identity,
+              const AtlasIdentity& identity,
               std::unique_ptr<Connection> writer)
       : directory_(std::move(directory)),
-        identity_(std::move(identity)),
+        identity_(identity),
         writes_(std::move(writer), {options.max_queued_writes, options.max_group}),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
@@ -276,7 +276,7 @@ Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
     }
     writer->Execute("PRAGMA journal_mode = WAL");
     DropAllLeases(*writer);
-    return std::make_unique<SqliteStore>(options, std::move(directory), std::move(*identity),
+    return std::make_unique<SqliteStore>(options, std::move(directory), *identity,
                                          std::move(writer));
   } catch (const std::exception& error) {
     return Error(StatusFromException(error).WithContext(directory.database_file().string()));

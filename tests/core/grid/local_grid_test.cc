@@ -123,6 +123,20 @@ TEST_F(LocalGridTest, AcrossAHoleTheGroundIsAGuess) {
   EXPECT_EQ(At(grid, 10.02, 0.05).source, AltitudeSource::kMeasured);
 }
 
+TEST_F(LocalGridTest, ACarsRoofIsNoGroundAndAnotherDeckIs) {
+  LeveledScan scan;
+  AddReturn(scan, {5.0F, 0.05F, -1.8F}, true);
+  AddReturn(scan, {8.05F, 0.0805F, -0.1F}, true);  // 1.7 m above the road
+  AddReturn(scan, {12.05F, 0.1205F, 1.6F}, true);  // 3.4 m above it
+  AddReturn(scan, {16.05F, 0.1605F, -7.5F}, true);
+  const LocalGrid grid = Build(scan);
+  EXPECT_NE(At(grid, 8.05, 0.08).source, AltitudeSource::kMeasured);
+  EXPECT_EQ(At(grid, 12.05, 0.12).source, AltitudeSource::kMeasured);
+  EXPECT_EQ(At(grid, 12.05, 0.12).altitude_mm, 1600);
+  EXPECT_EQ(At(grid, 16.05, 0.16).source, AltitudeSource::kMeasured);
+  EXPECT_EQ(At(grid, 16.05, 0.16).altitude_mm, -7500);
+}
+
 TEST_F(LocalGridTest, BehindAnObstacleTheLastGroundIsExtrapolatedAndUnknown) {
   LeveledScan scan;
   AddReturn(scan, {6.0F, 0.05F, -1.8F}, true);
