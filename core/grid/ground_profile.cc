@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace atlas {
 namespace {
@@ -94,23 +95,28 @@ void GroundProfiles::Sort(const LeveledScan& scan, const RayTable& rays) {
   });
 }
 
-// The ray of a return, straight from the sensor at height 0, is lowest against a chord where it
-// ends or where the chord does.
+// The sensor is at height 0: a ray that ends behind a chord is lowest against it at its far end,
+// one that ends within it where it ends.
 void GroundProfiles::Join(std::span<const Return> returns,
                           std::span<GroundSample> ground,
                           const ProfileOptions& options) {
-  for (std::size_t i = 2; i < ground.size(); ++i) {  // up to 1 the wheels stand on it
+  std::size_t behind = returns.size();  // the first return behind the chord
+  float lowest_slope = std::numeric_limits<float>::infinity();
+  for (std::size_t i = ground.size() - 1; i >= 2; --i) {  // up to 1 the wheels stand on it
     const GroundSample& before = ground[i - 1];
     GroundSample& after = ground[i];
+    for (; behind > 0 && returns[behind - 1].range_m > after.range_m; --behind) {
+      const Return& r = returns[behind - 1];
+      lowest_slope = std::min(lowest_slope, r.z_m / r.range_m);
+    }
+    bool is_crossed = lowest_slope * after.range_m < after.z_m - options.max_chord_error_m;
     const float slope = (after.z_m - before.z_m) / (after.range_m - before.range_m);
-    const auto is_below = [&](const Return& r) {
-      const float range_m = std::min(r.range_m, after.range_m);
-      const float chord_m = before.z_m + slope * (range_m - before.range_m);
-      return r.range_m > before.range_m &&
-             r.z_m * (range_m / r.range_m) < chord_m - options.max_chord_error_m;
-    };
-    after.is_joined = BendAt(ground, i) <= options.max_chord_error_m &&
-                      std::none_of(returns.begin(), returns.end(), is_below);
+    for (std::size_t k = behind; k > 0 && returns[k - 1].range_m > before.range_m; --k) {
+      const Return& r = returns[k - 1];
+      const float chord_m = before.z_m + slope * (r.range_m - before.range_m);
+      is_crossed |= r.z_m < chord_m - options.max_chord_error_m;
+    }
+    after.is_joined = !is_crossed && BendAt(ground, i) <= options.max_chord_error_m;
   }
 }
 

@@ -64,7 +64,9 @@ void AddMeasured(const LeveledScan& scan,
       continue;
     }
     const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
-    if (IsTop(scan.z[i] - profile.GroundAt(scan.range_m[i]), options)) {
+    const float range_m = scan.range_m[i];
+    if (range_m >= profile.end.range_m &&  // the nearest top is there
+        IsTop(scan.z[i] - profile.GroundAt(range_m), options)) {
       continue;
     }
     const auto ix = static_cast<std::int32_t>(std::floor(scan.x[i] * cells_per_m));
