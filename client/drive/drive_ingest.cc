@@ -8,7 +8,6 @@
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/keyframe/keyframe_codec.h"
-#include "core/scan/deskew.h"
 #include "core/scan/scan_reader.h"
 
 namespace atlas {
@@ -119,7 +118,7 @@ class Ingest {
   }
 
   Status UploadOne(const SelectedScan& selected, const DriveScan& scan) {
-    Result<PointCloud> cloud = ReadScan(scan.scan);
+    const Result<PointCloud> cloud = ReadScan(scan.scan);
     if (!cloud) return cloud.error();
     const Result<std::int64_t> time_ms = TimeOf(scan);
     if (!time_ms) return time_ms.error();
@@ -132,11 +131,13 @@ class Ingest {
     return uploader_.Upload(upload);
   }
 
-  Bytes BuildBlob(PointCloud& cloud, std::size_t index) {
+  Bytes BuildBlob(const PointCloud& cloud, std::size_t index) {
     const CpuTimer timer;
-    if (options_.is_deskewed) cloud = Deskew(cloud, MotionAt(drive_, index));
+    std::optional<Pose> T_now_later;
+    if (options_.is_deskewed) T_now_later = MotionAt(drive_, index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
-    Bytes blob = EncodeKeyframe(builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor));
+    Bytes blob = EncodeKeyframe(
+        builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor, T_now_later));
     report_.frontend_s += timer.elapsed_s();
     return blob;
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/str_cat.h"
+#include "core/scan/deskew.h"
 
 namespace atlas {
 namespace {
@@ -38,8 +39,12 @@ LeveledScan SegmentScan(const PointCloud& cloud,
                         const SensorLayout& layout,
                         int ring_step,
                         const Eigen::Quaterniond& R_level_sensor,
-                        const SegmenterOptions& options) {
-  const RangeImage image = MakeRangeImage(cloud, layout, ring_step);
+                        const SegmenterOptions& options,
+                        const std::optional<Pose>& T_now_later) {
+  RangeImage image = MakeRangeImage(cloud, layout, ring_step);
+  if (T_now_later) {
+    Deskew(image, *T_now_later);
+  }
   const Eigen::Vector3f up_sensor =
       (R_level_sensor.conjugate() * Eigen::Vector3d::UnitZ()).cast<float>();
   return LevelScan(image, Segmenter(options).Segment(image, up_sensor),
@@ -55,9 +60,10 @@ KeyframeBuilder::KeyframeBuilder(const MapProfile& map,
       rays_(GridFor(map, options.max_range_m)) {}
 
 Keyframe KeyframeBuilder::Build(const PointCloud& cloud,
-                                const Eigen::Quaterniond& R_level_sensor) const {
-  const LeveledScan scan =
-      SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor, options_.segmenter);
+                                const Eigen::Quaterniond& R_level_sensor,
+                                const std::optional<Pose>& T_now_later) const {
+  const LeveledScan scan = SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor,
+                                       options_.segmenter, T_now_later);
   const VehicleContact contact{(R_level_sensor * Eigen::Vector3d::UnitZ()).cast<float>(),
                                static_cast<float>(options_.sensor_height_m)};
   LocalGrid grid = BuildLocalGrid(scan, rays_, contact, WithClearance(options_.profile, map_));

@@ -1,6 +1,8 @@
 // The front end of a vehicle: scan and attitude in, keyframe out (paper III-A, III-B, III-D).
 #pragma once
 
+#include <optional>
+
 #include "core/base/status.h"
 #include "core/column/column_tracer.h"
 #include "core/geometry/map_profile.h"
@@ -25,12 +27,14 @@ struct KeyframeBuilderOptions {
   Status Validate(const MapProfile& map) const;
 };
 
-// A segmented, levelled scan: what keyframes are built from and what the localizer matches.
+// A segmented, levelled scan: what keyframes are built from and what the localizer matches. With
+// `T_now_later`, the sensor's motion during a revolution, it is deskewed.
 LeveledScan SegmentScan(const PointCloud& cloud,
                         const SensorLayout& layout,
                         int ring_step,
                         const Eigen::Quaterniond& R_level_sensor,
-                        const SegmenterOptions& options);
+                        const SegmenterOptions& options,
+                        const std::optional<Pose>& T_now_later = std::nullopt);
 
 class KeyframeBuilder {
  public:
@@ -40,8 +44,10 @@ class KeyframeBuilder {
                   const KeyframeBuilderOptions& options);
 
   // `R_level_sensor`: the attitude without yaw (SplitYaw), never a fit to the ground. A scan
-  // without a usable return makes a keyframe that has seen nothing.
-  Keyframe Build(const PointCloud& cloud, const Eigen::Quaterniond& R_level_sensor) const;
+  // without a usable return makes a keyframe that has seen nothing. `T_now_later` as SegmentScan.
+  Keyframe Build(const PointCloud& cloud,
+                 const Eigen::Quaterniond& R_level_sensor,
+                 const std::optional<Pose>& T_now_later = std::nullopt) const;
 
  private:
   MapProfile map_;

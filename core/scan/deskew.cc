@@ -12,7 +12,7 @@ constexpr int kSteps = 1024;
 
 }  // namespace
 
-PointCloud Deskew(const PointCloud& cloud, const Pose& T_now_later) {
+void Deskew(RangeImage& image, const Pose& T_now_later) {
   const Eigen::AngleAxisd turn(T_now_later.linear());
   std::array<Eigen::Isometry3f, kSteps + 1> T_now_then;
   for (int i = 0; i <= kSteps; ++i) {
@@ -22,15 +22,16 @@ PointCloud Deskew(const PointCloud& cloud, const Pose& T_now_later) {
     pose.translation() = fraction * T_now_later.translation();
     T_now_then[static_cast<std::size_t>(i)] = pose.cast<float>();
   }
-  PointCloud result;
-  result.points.reserve(cloud.size());
-  for (const Eigen::Vector3f& p_then : cloud.points) {
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const Eigen::Vector3f p_then(image.x[i], image.y[i], image.z[i]);
     const float azimuth = std::atan2(p_then.y(), p_then.x());
     const float fraction = 0.5F - azimuth / (2.0F * std::numbers::pi_v<float>);
     const auto step = static_cast<std::size_t>(std::lround(fraction * kSteps));
-    result.points.emplace_back(T_now_then[step] * p_then);
+    const Eigen::Vector3f p_now = T_now_then[step] * p_then;
+    image.x[i] = p_now.x();
+    image.y[i] = p_now.y();
+    image.z[i] = p_now.z();
   }
-  return result;
 }
 
 }  // namespace atlas

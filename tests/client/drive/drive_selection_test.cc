@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "client/score/segmentation_score.h"
-#include "core/scan/deskew.h"
 
 namespace atlas {
 namespace {
@@ -73,17 +72,6 @@ TEST(DriveSelectionTest, ShuffleIsASeededPermutation) {
   auto sorted = Indices(a);
   EXPECT_FALSE(std::is_sorted(sorted.begin(), sorted.end()));
   EXPECT_EQ(std::set<std::size_t>(sorted.begin(), sorted.end()).size(), 100U);
-}
-
-TEST(DeskewTest, UndoesAStraightMotion) {
-  Pose T_now_later = Pose::Identity();
-  T_now_later.translation().x() = 1.0;
-  PointCloud cloud;
-  cloud.points = {{10, 0, 0}, {0, 10, 0}, {0, -10, 0}};
-  const PointCloud deskewed = Deskew(cloud, T_now_later);
-  EXPECT_NEAR(deskewed.points[0].x(), 10.0, 1e-3);   // ahead: measured now
-  EXPECT_NEAR(deskewed.points[1].x(), -0.25, 1e-3);  // left: a quarter turn ago
-  EXPECT_NEAR(deskewed.points[2].x(), 0.25, 1e-3);
 }
 
 TEST(SegmentationScoreTest, CountsTheProtocolsClasses) {

@@ -3,16 +3,32 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 namespace atlas {
 namespace {
 
-PointCloud OnePoint(float x, float y, float z) {
-  PointCloud cloud;
-  cloud.points.emplace_back(x, y, z);
-  return cloud;
+std::vector<Eigen::Vector3f> Deskewed(const std::vector<Eigen::Vector3f>& points,
+                                      const Pose& motion) {
+  RangeImage image;
+  for (const Eigen::Vector3f& p : points) {
+    image.x.push_back(p.x());
+    image.y.push_back(p.y());
+    image.z.push_back(p.z());
+    image.source.push_back(static_cast<std::uint32_t>(image.source.size()));
+  }
+  Deskew(image, motion);
+  std::vector<Eigen::Vector3f> result;
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    result.emplace_back(image.x[i], image.y[i], image.z[i]);
+  }
+  return result;
+}
+
+Eigen::Vector3f Deskewed(const Eigen::Vector3f& point, const Pose& motion) {
+  return Deskewed(std::vector{point}, motion).front();
 }
 
 Pose Motion(const Eigen::Vector3d& translation, double angle_rad, const Eigen::Vector3d& axis) {
@@ -23,19 +39,19 @@ Pose Motion(const Eigen::Vector3d& translation, double angle_rad, const Eigen::V
 }
 
 TEST(DeskewTest, AVehicleAtRestChangesNothing) {
-  const PointCloud cloud = OnePoint(3.0F, -20.0F, 1.5F);
-  EXPECT_EQ(Deskew(cloud, Pose::Identity()).points, cloud.points);
-  EXPECT_EQ(Deskew(PointCloud(), Pose::Identity()).size(), 0U);
+  const Eigen::Vector3f point(3.0F, -20.0F, 1.5F);
+  EXPECT_EQ(Deskewed(point, Pose::Identity()), point);
+  EXPECT_TRUE(Deskewed(std::vector<Eigen::Vector3f>(), Pose::Identity()).empty());
 }
 
 TEST(DeskewTest, TheSensorTurnsClockwiseAndItsPoseIsThatOfLookingAhead) {
   // A metre ahead a revolution: what it saw on the left was a quarter of a metre before.
   const Pose ahead = Motion({1.0, 0.0, 0.0}, 0.0, Eigen::Vector3d::UnitZ());
-  EXPECT_NEAR(Deskew(OnePoint(10.0F, 0.0F, 0.0F), ahead).points[0].x(), 10.0F, 2e-3);
-  EXPECT_NEAR(Deskew(OnePoint(0.0F, 10.0F, 0.0F), ahead).points[0].x(), -0.25F, 2e-3);
-  EXPECT_NEAR(Deskew(OnePoint(0.0F, -10.0F, 0.0F), ahead).points[0].x(), 0.25F, 2e-3);
-  EXPECT_NEAR(Deskew(OnePoint(-10.0F, 0.01F, 0.0F), ahead).points[0].x(), -10.5F, 2e-3);
-  EXPECT_NEAR(Deskew(OnePoint(-10.0F, -0.01F, 0.0F), ahead).points[0].x(), -9.5F, 2e-3);
+  EXPECT_NEAR(Deskewed({10.0F, 0.0F, 0.0F}, ahead).x(), 10.0F, 2e-3);
+  EXPECT_NEAR(Deskewed({0.0F, 10.0F, 0.0F}, ahead).x(), -0.25F, 2e-3);
+  EXPECT_NEAR(Deskewed({0.0F, -10.0F, 0.0F}, ahead).x(), 0.25F, 2e-3);
+  EXPECT_NEAR(Deskewed({-10.0F, 0.01F, 0.0F}, ahead).x(), -10.5F, 2e-3);
+  EXPECT_NEAR(Deskewed({-10.0F, -0.01F, 0.0F}, ahead).x(), -9.5F, 2e-3);
 }
 
 TEST(DeskewTest, AnyMotionIsUndoneToWithinAStep) {
@@ -46,7 +62,7 @@ TEST(DeskewTest, AnyMotionIsUndoneToWithinAStep) {
     const Eigen::Vector3d axis(unit(random), unit(random), 3.0);
     const Eigen::Vector3d move(2.0 * unit(random), 0.3 * unit(random), 0.1 * unit(random));
     const double turn_rad = 0.1 * unit(random);
-    PointCloud cloud;
+    std::vector<Eigen::Vector3f> points;
     std::vector<Eigen::Vector3d> truth;
     for (int i = 0; i < 200; ++i) {
       const double azimuth = std::numbers::pi * unit(random);
@@ -54,14 +70,14 @@ TEST(DeskewTest, AnyMotionIsUndoneToWithinAStep) {
       const Eigen::Vector3d then(r * std::cos(azimuth), r * std::sin(azimuth), unit(random));
       const double share = -azimuth / (2.0 * std::numbers::pi);
       truth.emplace_back(Motion(share * move, share * turn_rad, axis) * then);
-      cloud.points.emplace_back(then.cast<float>());
+      points.emplace_back(then.cast<float>());
     }
-    const PointCloud result = Deskew(cloud, Motion(move, turn_rad, axis));
-    ASSERT_EQ(result.size(), cloud.size());
+    const auto result = Deskewed(points, Motion(move, turn_rad, axis));
+    ASSERT_EQ(result.size(), points.size());
     for (std::size_t i = 0; i < truth.size(); ++i) {
       // Half a step of 1024, by the way and by the turn at that range.
       const double step_m = (move.norm() + std::abs(turn_rad) * truth[i].norm()) / 2048.0 + 1e-4;
-      EXPECT_LT((result.points[i].cast<double>() - truth[i]).norm(), step_m);
+      EXPECT_LT((result[i].cast<double>() - truth[i]).norm(), step_m);
     }
   }
 }
@@ -69,7 +85,7 @@ TEST(DeskewTest, AnyMotionIsUndoneToWithinAStep) {
 TEST(DeskewTest, ReturnsExactlyBehindTheVehicleAreInReach) {
   const Pose motion = Motion({1.0, 0.0, 0.0}, 0.05, Eigen::Vector3d::UnitZ());
   for (const float y : {0.0F, -0.0F, 1e-30F, -1e-30F}) {
-    const Eigen::Vector3f p = Deskew(OnePoint(-10.0F, y, 0.0F), motion).points[0];
+    const Eigen::Vector3f p = Deskewed({-10.0F, y, 0.0F}, motion);
     EXPECT_TRUE(p.allFinite());
     EXPECT_LT((p - Eigen::Vector3f(-10.0F, 0.0F, 0.0F)).norm(), 0.8F);
   }
