@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "core/base/hash_random.h"
 #include "core/base/str_cat.h"
-#include "core/simulation/hash_random.h"
 
 namespace atlas {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/simulation/hash_random.h"
+#include "core/base/hash_random.h"
 
 namespace atlas {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "core/simulation/hash_random.h"
+#include "core/base/hash_random.h"
 
 namespace atlas {
 namespace {

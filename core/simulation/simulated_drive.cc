@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/hash_random.h"
 #include "core/base/str_cat.h"
-#include "core/simulation/hash_random.h"
 #include "core/simulation/worlds/props.h"
 
 namespace atlas {

@@ -14,7 +14,6 @@ FLOOR_1 = ["core/base", "core/geometry"]
 FLOOR_2 = FLOOR_1 + ["core/scan"]
 FLOOR_3 = FLOOR_2 + ["core/traversability", "core/grid", "core/column"]
 FLOOR_4 = FLOOR_3 + ["core/keyframe", "core/tile"]
-CORE = FLOOR_4 + ["core/fusion", "core/localization", "core/planning", "core/simulation"]
 WIRE = ["proto/wire", "proto/roadatlas/v1"]
 COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/output", "client/connection"]
 ALLOWED = {
@@ -37,9 +36,9 @@ ALLOWED = {
     "client/connection": FLOOR_1 + WIRE,
     "client/score": FLOOR_1,
     "client/map": FLOOR_4 + ["client/connection"],
-    "client/drive": CORE + ["client/connection", "client/map", "client/score"],
+    "client/drive": FLOOR_4 + ["core/localization", "client/connection", "client/map", "client/score"],
     "client/render": FLOOR_4,
-    "server/service": CORE + ["server/store"],
+    "server/service": FLOOR_4 + ["core/fusion", "server/store"],
     "server/net": FLOOR_1 + WIRE + ["server/service", "server/store"],
     "server/config": FLOOR_1,
     "server": FLOOR_1 + ["server/config", "server/net", "server/service", "server/store",
@@ -48,8 +47,9 @@ ALLOWED = {
     "client/cli/files": FLOOR_1 + ["client/connection"],
     "client/cli/command_line": FLOOR_1 + ["client/cli/output", "client/connection"],
     "client/cli/commands/atlas": FLOOR_1 + COMMAND_ROOMS,
-    "client/cli/commands/map": CORE + COMMAND_ROOMS + ["client/map", "client/render", "client/score"],
-    "client/cli/commands/drive": CORE + COMMAND_ROOMS + ["client/drive", "client/map", "client/score"],
+    "client/cli/commands/map": FLOOR_4 + COMMAND_ROOMS + ["core/planning", "client/map", "client/render", "client/score"],
+    "client/cli/commands/drive": FLOOR_4 + COMMAND_ROOMS + ["core/simulation", "client/drive", "client/map",
+                                                            "client/score"],
     "client/cli/commands": ["client/cli/command_line", "client/cli/commands/atlas", "client/cli/commands/drive",
                             "client/cli/commands/map"],
     "client/cli": FLOOR_1 + ["client/cli/command_line", "client/cli/commands"],

@@ -2,7 +2,7 @@
 #include <array>
 #include <numbers>
 
-#include "core/simulation/hash_random.h"
+#include "core/base/hash_random.h"
 #include "core/simulation/truth_label.h"
 #include "core/simulation/worlds/props.h"
 #include "core/simulation/worlds/simulated_world.h"

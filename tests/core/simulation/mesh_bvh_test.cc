@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/simulation/hash_random.h"
+#include "core/base/hash_random.h"
 #include "core/simulation/worlds/simulated_world.h"
 
 namespace atlas {
