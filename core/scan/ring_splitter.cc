@@ -1,6 +1,7 @@
 #include "core/scan/ring_splitter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -11,11 +12,12 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kTurn = 2.0F * kPi;
-constexpr float kStepBack_rad = 0.05F;       // more than the jitter of a motion-compensated ring
-constexpr float kLeap_rad = 0.1F;            // a gap in which the ring may have changed
-constexpr float kMinLeapSlope = 0.0044F;     // 0.25 deg: less than any two rings are apart
-constexpr float kLeapSpreads = 2.0F;         // a ring change stands out of the spread within rings
-constexpr float kBorder_rad = 0.02F;         // where a ring's first and last returns may mix
+constexpr float kStepBack_rad = 0.05F;    // more than the jitter of a motion-compensated ring
+constexpr float kLeap_rad = 0.1F;         // a gap in which the ring may have changed
+constexpr float kMinLeapSlope = 0.0044F;  // 0.25 deg: less than any two rings are apart
+constexpr float kLeapSpreads = 2.0F;      // a ring change stands out of the spread within rings
+constexpr float kBorder_rad = 0.02F;      // where a ring's first and last returns may mix
+constexpr float kUnknownOrigin = -1.0F;
 constexpr std::uint32_t kConfirmations = 3;  // a step back lasts at least this many returns
 
 // Azimuth in the direction of rotation and slope (tangent of the elevation) of the returns from
@@ -93,7 +95,7 @@ class Cutter {
     const float before = Turned(i - 1);
     const float now = Turned(i);
     if (now < before - kStepBack_rad) {
-      const bool is_border = before - now > kTurn - kBorder_rad;
+      const bool is_border = before - now > kTurn - kLeap_rad;
       suspicious_borders_ +=
           static_cast<int>(is_border && std::abs(slope_[i] - slope_[i - 1]) < 1e-3F);
       return StaysBehind(i, before);
@@ -177,14 +179,41 @@ float LeapSlope(const Directions& directions, const std::vector<std::uint32_t>& 
   return std::max(kMinLeapSlope, kLeapSpreads * widest);
 }
 
+// Where rings begin, if they do so at one azimuth: everywhere else they pass smoothly, there the
+// slope leaps.
+float SearchOrigin(const Directions& directions) {
+  constexpr int kBins = 4096;  // narrower than the gap between two returns
+  constexpr float kBinsPerRad = static_cast<float>(kBins) / kTurn;
+  std::array<int, kBins> leaps_over_passes{};  // at the bins' lower edges
+  for (std::size_t i = 1; i < directions.slope.size(); ++i) {
+    float ahead = directions.azimuth_rad[i] - directions.azimuth_rad[i - 1];
+    ahead += ahead < -kPi ? kTurn : 0.0F;
+    if (ahead <= 0.0F || ahead >= kLeap_rad) {
+      continue;
+    }
+    const int first = static_cast<int>(directions.azimuth_rad[i - 1] * kBinsPerRad) + 1;
+    const int last = static_cast<int>((directions.azimuth_rad[i - 1] + ahead) * kBinsPerRad);
+    const bool is_leap = std::abs(directions.slope[i] - directions.slope[i - 1]) > kMinLeapSlope;
+    for (int bin = first; bin <= last; ++bin) {
+      leaps_over_passes[static_cast<std::size_t>(bin % kBins)] += is_leap ? 1 : -1;
+    }
+  }
+  const auto best = std::max_element(leaps_over_passes.begin(), leaps_over_passes.end());
+  return static_cast<float>(best - leaps_over_passes.begin()) / kBinsPerRad;
+}
+
 std::vector<std::uint32_t> FindCuts(const Directions& directions) {
   constexpr float kNever = 1e9F;
   float origin_rad = 0.0F;
-  Cutter coarse(directions, origin_rad, kNever);
-  std::vector<std::uint32_t> cuts = coarse.Cuts();
-  if (2 * coarse.suspicious_borders() > static_cast<int>(cuts.size())) {
-    origin_rad = kPi;  // rings begin at the back
-    cuts = Cutter(directions, origin_rad, kNever).Cuts();
+  std::vector<std::uint32_t> cuts;
+  // Drivers begin ahead or at the back, as a rule.
+  for (const float guess_rad : {0.0F, kPi, kUnknownOrigin}) {
+    origin_rad = guess_rad == kUnknownOrigin ? SearchOrigin(directions) : guess_rad;
+    Cutter coarse(directions, origin_rad, kNever);
+    cuts = coarse.Cuts();
+    if (2 * coarse.suspicious_borders() <= static_cast<int>(cuts.size())) {
+      break;
+    }
   }
   return Cutter(directions, origin_rad, LeapSlope(directions, cuts)).Cuts();
 }

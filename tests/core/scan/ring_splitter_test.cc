@@ -22,7 +22,7 @@ using testing::RoundWallRange;
 struct Storage {
   bool is_top_first = false;
   bool is_clockwise = false;
-  bool begins_at_the_back = false;
+  double begin_rad = 0.0;
 };
 
 struct Sample {
@@ -35,8 +35,7 @@ constexpr int kColumns = 900;
 // Where column c of a ring points, in the order of the file.
 double AzimuthOf(int column, const Storage& storage) {
   const double turned = (column + 0.5) * 2.0 * std::numbers::pi / kColumns;
-  const double start = storage.begins_at_the_back ? std::numbers::pi : 0.0;
-  return start + (storage.is_clockwise ? -turned : turned);
+  return storage.begin_rad + (storage.is_clockwise ? -turned : turned);
 }
 
 Sample MakeScan(const std::vector<double>& elevations,
@@ -67,8 +66,10 @@ std::optional<double> Yard(const Eigen::Vector3d& direction) {
 
 std::vector<Storage> AllStorages() {
   std::vector<Storage> storages;
-  for (int bits = 0; bits < 8; ++bits) {
-    storages.push_back({(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0});
+  for (const double begin_rad : {0.0, std::numbers::pi, 1.0, 2.5, 4.3, 6.2}) {
+    for (int bits = 0; bits < 4; ++bits) {
+      storages.push_back({(bits & 1) != 0, (bits & 2) != 0, begin_rad});
+    }
   }
   return storages;
 }
@@ -105,7 +106,7 @@ TEST(RingSplitterTest, EveryStorageOrderMakesOneRunARing) {
   for (const Storage& storage : AllStorages()) {
     for (const auto& elevations : {Rings(16, -15, 2), Rings(64, -24.8, 0.42)}) {
       SCOPED_TRACE(::testing::Message() << storage.is_top_first << storage.is_clockwise
-                                        << storage.begins_at_the_back << elevations.size());
+                                        << storage.begin_rad << ' ' << elevations.size());
       const Sample sample = MakeScan(elevations, storage, Yard);
       const RingSplit split = SplitRings(sample.cloud, EgoBox());
       ExpectWellFormed(split);
@@ -129,7 +130,7 @@ TEST(RingSplitterTest, RingsInTheSkyHaveNoRunAndMoveNoOther) {
   };
   for (const Storage& storage : AllStorages()) {
     SCOPED_TRACE(::testing::Message()
-                 << storage.is_top_first << storage.is_clockwise << storage.begins_at_the_back);
+                 << storage.is_top_first << storage.is_clockwise << storage.begin_rad);
     const Sample sample = MakeScan(Rings(16, -15, 2), storage, world);
     const RingSplit split = SplitRings(sample.cloud, EgoBox());
     ExpectWellFormed(split);
