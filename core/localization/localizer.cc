@@ -74,7 +74,9 @@ void Localizer::Remember(const LocalizationResult& result) {
   }
   if (result.health == LocalizationHealth::kLost) {
     ++lost_;
-    motion_.reset();  // the vehicle is looked for where it was lost
+    if (lost_ > options_.max_coasting) {
+      motion_.reset();  // looked for where it got to
+    }
   } else {
     const bool is_motion_known = !is_first_ && lost_ == 0;
     if (is_motion_known && (motion_ || result.health == LocalizationHealth::kGood)) {

@@ -35,10 +35,11 @@ struct LocalizerOptions {
   RegistrationOptions registration;
   double window_margin_m = 12.0;   // beyond the features' range; the window is renewed half-way
   double max_weak_sigma_m = 0.10;  // of the worst horizontal direction
-  double min_fit = 0.15;           // of RegistrationResult; less: lost
+  double min_fit = 0.25;           // of RegistrationResult; less: lost
   // How well the motion model knows the next pose, once the speed is known.
   double predicted_sigma_m = 0.2;
   double predicted_sigma_rad = 0.01;
+  int max_coasting = 10;  // scans that a lost vehicle is taken to go on as it did
   // While the speed is unknown, starts are tried this far ahead of the last pose.
   double search_ahead_m = 4.0;
   double search_step_m = 0.5;

@@ -230,6 +230,11 @@ const SurfacePlane* MapWindow::NearestSurface(const Eigen::Vector3f& p,
   return best;
 }
 
+bool MapWindow::IsMapped(const Eigen::Vector3f& p) const {
+  const CellRef cell = CellAt(p.x(), p.y());
+  return Contains(cell) && surface_begin_[Index(cell)] != surface_begin_[Index(cell) + 1];
+}
+
 bool MapWindow::IsOccupied(const Eigen::Vector3f& p) const {
   const int segment = SegmentAt(p.z());
   const CellRef cell = CellAt(p.x(), p.y());

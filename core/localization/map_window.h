@@ -58,6 +58,8 @@ class MapWindow {
   const SurfacePlane* NearestSurface(const Eigen::Vector3f& p,
                                      float reach_m,
                                      float* height_m) const;
+  // Whether the map says anything about the cell of `p`, at any height.
+  bool IsMapped(const Eigen::Vector3f& p) const;
   // Whether an occupied segment stands at `p`.
   bool IsOccupied(const Eigen::Vector3f& p) const;
 

@@ -17,6 +17,7 @@ struct NormalEquations {
   Vector6d g = Vector6d::Zero();
   int columns = 0;
   int ground = 0;
+  int mapped = 0;    // features where the map says something
   double fit = 0.0;  // sum of robust weights
 
   // Residual along the unit vector `direction` (world) of a point at `arm` from the sensor.
@@ -69,6 +70,7 @@ class Problem {
                  NormalEquations& equations) const {
     const Eigen::Vector3f p = arm + t;
     const ColumnLine* line = map_.NearestLine(p, stage.radius_m);
+    equations.mapped += line != nullptr || map_.IsMapped(p) ? 1 : 0;
     if (line == nullptr) {
       return;
     }
@@ -93,6 +95,7 @@ class Problem {
                  const Stage& stage,
                  NormalEquations& equations) const {
     float height_m = 0.0F;
+    equations.mapped += map_.IsMapped(arm + t) ? 1 : 0;
     const SurfacePlane* plane = map_.NearestSurface(arm + t, stage.reach_m, &height_m);
     if (plane == nullptr) {
       return;
@@ -150,6 +153,9 @@ Pose Moved(const Pose& pose, const Vector6d& step) {
   return moved;
 }
 
+// Mapped features that a fit needs.
+constexpr int kEnough = 30;
+
 double Share(int part, std::size_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -184,8 +190,7 @@ RegistrationResult Register(const MapWindow& map,
   const NormalEquations last = problem.Linearize(result.T_world_level, fine);
   result.information = last.H.selfadjointView<Eigen::Lower>();
   result.matched_columns = last.columns;
-  const std::size_t points = features.columns.size() + features.ground.size();
-  result.fit = points == 0 ? 0.0 : last.fit / static_cast<double>(points);
+  result.fit = last.mapped < kEnough ? 0.0 : last.fit / last.mapped;
   result.column_inliers = Share(last.columns, features.columns.size());
   result.ground_inliers = Share(last.ground, features.ground.size());
   return result;

@@ -35,7 +35,9 @@ struct RegistrationResult {
   double column_inliers = 0.0;  // share of column points that found a line, 0..1
   double ground_inliers = 0.0;
   int matched_columns = 0;
-  double fit = 0.0;  // mean robust weight over all points, unmatched ones 0: 0..1
+  // Mean robust weight, 0..1, of the features that fall on cells the map knows, unmatched ones 0;
+  // 0 where too few do to tell. What was never mapped speaks neither for nor against a pose.
+  double fit = 0.0;
   bool is_converged = false;
 };
 

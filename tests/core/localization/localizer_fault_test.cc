@@ -86,19 +86,19 @@ TEST_F(LocalizerFaultTest, WithoutAMapItIsLostWhereItStarted) {
   }
 }
 
-TEST_F(LocalizerFaultTest, BlindItIsLostWhereItWasExpectedAndFoundAgainThere) {
+TEST_F(LocalizerFaultTest, BlindItIsLostGoesOnAsItDidAndIsFoundThere) {
   localizer_.Start(OnStreet(-10.0));
   for (int i = 0; i < 4; ++i) {
     At(OnStreet(-10.0 + 1.2 * i));
   }
-  const Pose expected = OnStreet(-10.0 + 1.2 * 4);
   for (int i = 0; i < 3; ++i) {
+    const Pose expected = OnStreet(-10.0 + 1.2 * (4 + i));
     const LocalizationResult result = Blind();
     EXPECT_EQ(result.health, LocalizationHealth::kLost);
     EXPECT_LT(ErrorOf(result.T_world_sensor, expected).horizontal_m, 0.15) << i;
     EXPECT_LT(ErrorOf(result.T_world_sensor, expected).angle_rad, 1.0 * kDegree) << i;
   }
-  const Pose moved = OnStreet(-10.0 + 1.2 * 5);
+  const Pose moved = OnStreet(-10.0 + 1.2 * 7);
   const LocalizationResult found = At(moved);
   EXPECT_EQ(found.health, LocalizationHealth::kGood);
   EXPECT_LT(ErrorOf(found.T_world_sensor, moved).horizontal_m, 0.06);
@@ -119,15 +119,32 @@ TEST_F(LocalizerFaultTest, OnAWrongMapItDoesNotSpin) {
     At(OnStreet(-10.0 + 0.5 * i));
   }
   source_.tiles = WrongTiles();
-  const Pose expected = OnStreet(-8.0);
   for (int i = 0; i < 5; ++i) {
+    const Pose expected = OnStreet(-8.0 + 0.5 * i);
     const LocalizationResult result = At(expected);
     EXPECT_EQ(result.health, LocalizationHealth::kLost) << i;
     EXPECT_LT(ErrorOf(result.T_world_sensor, expected).angle_rad, 1.0 * kDegree) << i;
     EXPECT_LT(ErrorOf(result.T_world_sensor, expected).horizontal_m, 0.15) << i;
   }
   source_.tiles = StreetMap().Tiles();
-  EXPECT_EQ(At(expected).health, LocalizationHealth::kGood);
+  EXPECT_EQ(At(OnStreet(-5.5)).health, LocalizationHealth::kGood);
+}
+
+TEST_F(LocalizerFaultTest, AVehicleThatBrakedWhileBlindIsFound) {
+  // It braked while it was blind, and was taken to go on for four scans.
+  localizer_.Start(OnStreet(-10.0));
+  for (int i = 0; i < 4; ++i) {
+    At(OnStreet(-10.0 + 0.5 * i));
+  }
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(Blind().health, LocalizationHealth::kLost);
+  }
+  LocalizationResult result;
+  for (int i = 0; i < 3; ++i) {
+    result = At(OnStreet(-8.5));
+  }
+  EXPECT_EQ(result.health, LocalizationHealth::kGood);
+  EXPECT_LT(ErrorOf(result.T_world_sensor, OnStreet(-8.5)).horizontal_m, 0.06);
 }
 
 TEST_F(LocalizerFaultTest, AMissingTileLeavesTheOthers) {
