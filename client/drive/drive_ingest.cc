@@ -145,7 +145,7 @@ class Ingest {
   // What is in flight is waited for, so that it is either there or refused when this returns.
   Status FinishAfter(const Status& failure) {
     const Status finished = uploader_.Finish();
-    return finished.ok() || finished == failure
+    return finished.ok() || finished.code() == failure.code()
                ? failure
                : Status(failure.code(), failure.message() + "; and " + finished.message());
   }

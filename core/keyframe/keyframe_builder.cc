@@ -9,6 +9,9 @@
 namespace atlas {
 namespace {
 
+constexpr double kMinSensorHeight_m = 0.1;
+constexpr double kMaxSensorHeight_m = 10.0;
+
 GridGeometry GridFor(const MapProfile& map, double max_range_m) {
   return {map.cell_size_um, static_cast<std::int32_t>(std::ceil(max_range_m / map.cell_size_m()))};
 }
@@ -28,7 +31,7 @@ Status KeyframeBuilderOptions::Validate(const MapProfile& map) const {
         StrCat("maximum range is ", max_range_m,
                " m, expected 1 to 100 m and at most 1024 cells of ", map.cell_size_m(), " m"));
   }
-  if (!(sensor_height_m >= 0.1 && sensor_height_m <= 10.0)) {
+  if (!(sensor_height_m >= kMinSensorHeight_m && sensor_height_m <= kMaxSensorHeight_m)) {
     return Status(StatusCode::kInvalidArgument,
                   StrCat("sensor height is ", sensor_height_m, " m, expected 0.1 to 10"));
   }
@@ -118,6 +121,11 @@ Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans) {
   }
   const auto median = heights_m.begin() + static_cast<std::ptrdiff_t>(heights_m.size() / 2);
   std::nth_element(heights_m.begin(), median, heights_m.end());
+  if (!(*median >= kMinSensorHeight_m && *median <= kMaxSensorHeight_m)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("what looks like ground is ", *median,
+                        " m below the sensor, expected 0.1 to 10: give the sensor's height"));
+  }
   return static_cast<double>(*median);
 }
 

@@ -58,7 +58,8 @@ class KeyframeBuilder {
 
 // The height of the sensor above the ground it drives on, from segmented scans: the median over the
 // ground within 12 m ahead and behind, a metre off its axis at most (pavements beside a street lie
-// a kerb higher), else all around. kInvalidData when no ground was seen.
+// a kerb higher), else all around. kInvalidData when no ground was seen, or none where a vehicle's
+// is.
 Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans);
 
 }  // namespace atlas

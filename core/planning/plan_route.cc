@@ -13,7 +13,7 @@
 namespace atlas {
 namespace {
 
-constexpr double kWorld_m = 1e6;
+constexpr double kWorld_m = 1e7;  // as for poses
 
 class Snapper {
  public:
@@ -118,7 +118,7 @@ Status CheckPoint(const char* what, const Eigen::Vector3d& point) {
   }
   return Status(StatusCode::kInvalidArgument,
                 StrCat("plan: ", what, " (", point.x(), ", ", point.y(), ", ", point.z(),
-                       "), expected finite metres within +-1000 km"));
+                       "), expected finite metres within +-10000 km"));
 }
 
 Status CheckRequest(const MapProfile& profile, const PlanRequest& request) {

@@ -240,7 +240,7 @@ RingSplit SplitRings(const PointCloud& cloud, const EgoBox& ego) {
   for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
     if (cuts[k + 1] > cuts[k]) {
       const SlopeSpread spread = MeasureSpread(directions.slope, cuts[k], cuts[k + 1]);
-      split.runs.push_back({cuts[k], cuts[k + 1], std::atan(spread.median)});
+      split.runs.push_back({cuts[k], cuts[k + 1], std::atan(spread.median), spread.width});
     }
   }
   split.azimuth_rad = std::move(directions.azimuth_rad);

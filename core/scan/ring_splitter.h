@@ -17,6 +17,7 @@ struct RingRun {
   std::uint32_t begin = 0;  // [begin, end) of RingSplit's arrays
   std::uint32_t end = 0;
   float elevation_rad = 0.0F;  // median
+  float spread = 0.0F;         // of the elevation's tangent, 5th to 95th percentile
 
   std::uint32_t size() const { return end - begin; }
 };

@@ -18,6 +18,18 @@ constexpr float kSpacing32_rad = 0.6F * kDeg;
 constexpr std::uint32_t kMinRunReturns = 8;  // fewer do not tell where a ring points
 constexpr float kNewRow = 0.6F;  // of the spacing: farther from every row is another row
 
+// Whether the returns are in another order than ring after ring: in more pieces than the richest
+// sensor has rings, each cut several times, or mostly in pieces that no ring is as wide as.
+bool IsScattered(const RingSplit& split) {
+  constexpr std::size_t kMostPieces = 4 * 64;
+  constexpr float kWidest = 0.2F;  // 11 degrees; those of an HDL-64E reach 5
+  std::size_t wide = 0;
+  for (const RingRun& run : split.runs) {
+    wide += run.spread > kWidest ? run.size() : 0;
+  }
+  return split.runs.size() > kMostPieces || 2 * wide > split.index.size();
+}
+
 // Bottom-first copies of the runs that are long enough.
 std::vector<float> RunElevations(const RingSplit& split) {
   std::vector<float> elevations;
@@ -66,7 +78,10 @@ std::vector<float> FillEmptyRows(std::vector<float> rows, int channels, float sp
 }  // namespace
 
 void SensorLayoutEstimator::Add(const PointCloud& cloud) {
-  std::vector<float> seen = RunElevations(SplitRings(cloud, ego_));
+  const RingSplit split = SplitRings(cloud, ego_);
+  scans_ += split.runs.empty() ? 0 : 1;
+  scattered_scans_ += IsScattered(split) ? 1 : 0;
+  std::vector<float> seen = RunElevations(split);
   std::sort(seen.begin(), seen.end());
   if (seen.size() > elevation_rad_.size()) {
     std::swap(seen, elevation_rad_);  // the richest scan is the template
@@ -90,6 +105,11 @@ Result<SensorLayout> SensorLayoutEstimator::Estimate() const {
   if (elevation_rad_.size() < 2) {
     return Error(StatusCode::kInvalidData,
                  "no scan shows two rings: expected returns stored ring after ring");
+  }
+  if (2 * scattered_scans_ > scans_) {
+    return Error(
+        StatusCode::kInvalidData,
+        "returns are in no order, or stored column after column: expected ring after ring");
   }
   std::vector<float> rows = elevation_rad_;
   const float mean_spacing = (rows.back() - rows.front()) / static_cast<float>(rows.size() - 1);

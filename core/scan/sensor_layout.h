@@ -26,12 +26,14 @@ class SensorLayoutEstimator {
   explicit SensorLayoutEstimator(const EgoBox& ego = {}) : ego_(ego) {}
 
   void Add(const PointCloud& cloud);
-  // Snapped to 16, 32 or 64 channels by angular spacing, empty rings counted. kInvalidData when no
-  // scan had two rings: returns are then not stored ring after ring.
+  // Snapped to 16, 32 or 64 channels by angular spacing, empty rings counted. kInvalidData when
+  // returns are not stored ring after ring: no scan had two rings, or most fell into tiny pieces.
   Result<SensorLayout> Estimate() const;
 
  private:
   EgoBox ego_;
+  int scans_ = 0;                     // with returns from the world
+  int scattered_scans_ = 0;           // whose runs are no rings
   std::vector<float> elevation_rad_;  // rows found so far, lowest first
 };
 

@@ -86,8 +86,11 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKe
     return AddKeyframe(connection, keyframe, *session);
   }
   if (!IsSameUpload(**stored, keyframe)) {
-    return Error(StatusCode::kConflict,
-                 StrCat("keyframe ", keyframe.key, " is in the atlas with other content"));
+    return Error(
+        StatusCode::kConflict,
+        StrCat("keyframe ", keyframe.key,
+               " is in the atlas with other content: another scan, sensor height, range or "
+               "number of rings"));
   }
   return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
 }

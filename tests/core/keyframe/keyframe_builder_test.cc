@@ -8,6 +8,7 @@
 
 #include "core/geometry/nibble.h"
 #include "core/keyframe/keyframe_codec.h"
+#include "tests/core/support/shape_world.h"
 #include "tests/core/support/synthetic_scan.h"
 
 namespace atlas {
@@ -133,6 +134,16 @@ TEST_F(KeyframeBuilderTest, OptionsOutOfRangeAreNamed) {
   options.max_range_m = 20.0;
   options.sensor_height_m = std::nan("");
   EXPECT_EQ(options.Validate(profile_).code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(KeyframeBuilderTest, GroundAboveTheSensorTellsNoHeight) {
+  LeveledScan scan;
+  for (int i = 0; i < 200; ++i) {
+    testing::AddReturn(scan, {5.0F, 0.004F * static_cast<float>(i), 0.2F}, true);
+  }
+  const auto height = EstimateSensorHeight(std::span(&scan, 1));
+  ASSERT_FALSE(height.has_value());
+  EXPECT_EQ(height.error().code(), StatusCode::kInvalidData);
 }
 
 TEST_F(KeyframeBuilderTest, SensorHeightIsTheMedianOfTheGround) {

@@ -1,6 +1,8 @@
 #include "core/scan/sensor_layout.h"
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -96,6 +98,27 @@ TEST(SensorLayoutTest, ScansOfOneDriveAddUp) {
 TEST(SensorLayoutTest, RefusesScansWithoutRings) {
   SensorLayoutEstimator estimator;
   EXPECT_EQ(estimator.Estimate().error().code(), StatusCode::kInvalidData);
+}
+
+TEST(SensorLayoutTest, RefusesScansInAnotherOrder) {
+  PointCloud by_column;
+  for (int column = 0; column < 900; ++column) {
+    for (int ring = 0; ring < 16; ++ring) {
+      const float azimuth = static_cast<float>(column) * 0.00698F;
+      const float slope = std::tan(static_cast<float>(2 * ring - 15) * 0.01745F);
+      by_column.points.emplace_back(10.0F * std::cos(azimuth), 10.0F * std::sin(azimuth),
+                                    10.0F * slope);
+    }
+  }
+  PointCloud shuffled = by_column;
+  std::shuffle(shuffled.points.begin(), shuffled.points.end(), std::mt19937(3));
+  for (const PointCloud& cloud : {by_column, shuffled}) {
+    SensorLayoutEstimator estimator;
+    estimator.Add(cloud);
+    const auto layout = estimator.Estimate();
+    ASSERT_FALSE(layout.has_value());
+    EXPECT_EQ(layout.error().code(), StatusCode::kInvalidData);
+  }
 }
 
 TEST(RangeImageTest, KeepsEveryFourthRingFromTheLowest) {
