@@ -53,7 +53,7 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
   const Pose T_world_level = LevelFrame(predicted);
   LocalizationResult result;
   result.registration = Track(features, T_world_level);
-  if (!is_first_ && IsDoubtful(result.registration)) {
+  if (IsDoubtful(result.registration)) {
     if (auto found = Search(features, T_world_level, result.registration)) {
       result.registration = *std::move(found);
     }
@@ -139,7 +139,7 @@ RegistrationResult Localizer::Track(const ScanFeatures& features, const Pose& T_
 }
 
 bool Localizer::IsDoubtful(const RegistrationResult& result) const {
-  return lost_ > 0 || result.fit < options_.min_fit ||
+  return lost_ > 0 || result.fit < (is_first_ ? options_.good_fit : options_.min_fit) ||
          result.fit < options_.doubtful_fit * usual_fit_;
 }
 
@@ -172,8 +172,9 @@ LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {
   const Eigen::Matrix2d horizontal = result.information.topLeftCorner<2, 2>();
   const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues()(0);
   const double sigma_m = least > 0.0 ? 1.0 / std::sqrt(least) : 1e9;
-  return sigma_m > options_.max_weak_sigma_m ? LocalizationHealth::kWeak
-                                             : LocalizationHealth::kGood;
+  return sigma_m > options_.max_weak_sigma_m || result.fit < options_.good_fit
+             ? LocalizationHealth::kWeak
+             : LocalizationHealth::kGood;
 }
 
 }  // namespace atlas

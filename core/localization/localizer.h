@@ -36,6 +36,8 @@ struct LocalizerOptions {
   double window_margin_m = 12.0;   // beyond the features' range; the window is renewed half-way
   double max_weak_sigma_m = 0.10;  // of the worst horizontal direction
   double min_fit = 0.25;           // of RegistrationResult; less: lost
+  // Less is weak: wrong places within a few metres reach 0.44, right ones 0.46 and more.
+  double good_fit = 0.45;
   // How well the motion model knows the next pose, once the speed is known.
   double predicted_sigma_m = 0.2;
   double predicted_sigma_rad = 0.01;
