@@ -64,10 +64,18 @@ void AtlasVerifier::Mismatch(const TileId& id, const std::string& what) {
 
 Status AtlasVerifier::VerifySessions() {
   const auto sessions = store_.ListSessions();
-  return sessions ? Status() : Note(sessions.error());
+  if (!sessions) {
+    return Note(sessions.error());
+  }
+  for (const SessionRecord& session : *sessions) {
+    expected_keyframes_ += session.keyframes;
+  }
+  return {};
 }
 
+// Uploads go on meanwhile: there may be more rows than the sessions knew of, never fewer.
 Status AtlasVerifier::VerifyKeyframes() {
+  std::uint64_t rows = 0;
   std::int64_t after = 0;
   while (true) {
     const auto ids = store_.ListKeyframeIds(after, kPage);
@@ -75,8 +83,13 @@ Status AtlasVerifier::VerifyKeyframes() {
       return ids.error();
     }
     if (ids->empty()) {
-      return {};
+      return rows >= expected_keyframes_
+                 ? Status()
+                 : Note(Status(StatusCode::kInvalidData,
+                               StrCat("the sessions count ", expected_keyframes_,
+                                      " keyframes, and ", rows, " are there")));
     }
+    rows += ids->size();
     for (const std::int64_t id : *ids) {
       ATLAS_RETURN_IF_ERROR(options_.check_stop());
       ++report_.checked;

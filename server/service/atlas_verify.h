@@ -51,6 +51,7 @@ class AtlasVerifier {
   AtlasStore& store_;
   Options options_;
   TileBuilder builder_;
+  std::uint64_t expected_keyframes_ = 0;  // what the sessions counted when it began
   VerifyReport report_;
 };
 

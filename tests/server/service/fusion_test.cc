@@ -110,6 +110,19 @@ TEST_F(AtlasTest, VerifyCountsDamagedTilesAndKeyframes) {
   EXPECT_EQ(service_->Digest(Long()).error().code(), StatusCode::kInvalidData);
 }
 
+TEST_F(AtlasTest, VerifyNoticesKeyframesThatVanished) {
+  Open(1);
+  UploadDrive(4);
+  Digest();
+  Tamper("data", "DELETE FROM keyframes WHERE id = 2");
+  Open(1);
+  const auto report = service_->Verify(false, Long());
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->damaged, 1u);
+  ASSERT_EQ(report->findings.size(), 1u);
+  EXPECT_EQ(report->findings[0], "the sessions count 4 keyframes, and 3 are there");
+}
+
 TEST_F(AtlasTest, RebuildFindsTilesThatAreNotWhatTheirKeyframesMake) {
   Open(1);
   UploadDrive(4);
