@@ -1,5 +1,6 @@
 #include "core/fusion/column_evidence.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -55,7 +56,7 @@ Lanes Clamped(Lanes lanes, Lanes low, Lanes high) {
 }
 
 // Sums stay within 16 bits: |evidence| <= 16384, |added| <= 64.
-void AddLanes(Lanes added, const ColumnEvidence::Clamp& clamp, std::int16_t* evidence) {
+void AddLanes(Lanes added, const EvidenceClamp& clamp, std::int16_t* evidence) {
   const Lanes before = Load(evidence);
   const Lanes usual = Lanes{} - clamp.usual;
   const Lanes reached = before < usual ? before : usual;  // a mere miss goes no deeper
@@ -63,35 +64,82 @@ void AddLanes(Lanes added, const ColumnEvidence::Clamp& clamp, std::int16_t* evi
   Store(added == Lanes{} + EvidenceOfState(kNibbleFree) ? Lanes{} - clamp.driven : sum, evidence);
 }
 
+// Eight nibbles from nibble `first` on, those outside 0.
+std::uint32_t NibblesFrom(std::uint64_t nibbles, std::int64_t first) {
+  if (first >= 16 || first <= -8) {
+    return 0;
+  }
+  return static_cast<std::uint32_t>(first >= 0 ? nibbles >> (4 * first) : nibbles << (-4 * first));
+}
+
+// Bit k: nibble k is not 0.
+std::uint32_t SeenBits(std::uint32_t nibbles) {
+  std::uint32_t bits = (nibbles | (nibbles >> 1) | (nibbles >> 2) | (nibbles >> 3)) & 0x1111'1111u;
+  bits = (bits | (bits >> 3)) & 0x0303'0303u;
+  bits = (bits | (bits >> 6)) & 0x000F'000Fu;
+  return (bits | (bits >> 12)) & 0xFFu;
+}
+
 }  // namespace
 
-void ColumnEvidence::AddNibbles(std::uint64_t nibbles, const Clamp& clamp) {
-  seen |= nibbles;
-  AddLanes(LanesOf(static_cast<std::uint32_t>(nibbles)), clamp, evidence.data());
-  if ((nibbles >> 32) != 0) {
-    AddLanes(LanesOf(static_cast<std::uint32_t>(nibbles >> 32)), clamp, evidence.data() + kLanes);
-  }
-}
-
-void ColumnEvidence::Add(const ColumnEvidence& other, std::int16_t say, std::int16_t clamp) {
-  seen |= other.seen;
-  const Lanes all_say = Lanes{} + say;
-  const Lanes all_clamp = Lanes{} + clamp;
-  for (std::size_t half = 0; half < kSegments; half += kLanes) {
-    const Lanes added = Clamped(Load(other.evidence.data() + half), -all_say, all_say);
-    Store(Clamped(Load(evidence.data() + half) + added, -all_clamp, all_clamp),
-          evidence.data() + half);
-  }
-}
-
-std::uint64_t NibblesOfEvidence(const ColumnEvidence& column) {
-  std::uint64_t nibbles = 0;
-  for (std::size_t k = 0; k < ColumnEvidence::kSegments; ++k) {
-    if (((column.seen >> (4 * k)) & 15) != 0) {
-      nibbles |= std::uint64_t{NibbleFromEvidence(column.evidence[k])} << (4 * k);
+void AddNibbles(std::uint64_t nibbles,
+                std::int64_t offset,
+                const EvidenceClamp& clamp,
+                std::span<std::int16_t> evidence,
+                std::uint32_t& seen) {
+  for (std::size_t first = 0; first < evidence.size(); first += kLanes) {
+    const std::uint32_t here = NibblesFrom(nibbles, static_cast<std::int64_t>(first) - offset);
+    if (here != 0) {
+      AddLanes(LanesOf(here), clamp, evidence.data() + first);
+      seen |= SeenBits(here) << first;
     }
   }
-  return nibbles;
+}
+
+std::int16_t FoldEvidence(int sum, int said, const FoldClamp& clamp) {
+  if (said == 0) {
+    return static_cast<std::int16_t>(sum);
+  }
+  const int say = std::clamp<int>(said, -clamp.stretch, clamp.stretch);
+  const int carried = std::clamp<int>(sum, -clamp.carry, clamp.carry);
+  return static_cast<std::int16_t>(std::clamp<int>(carried + say, -clamp.evidence, clamp.evidence));
+}
+
+void ColumnSum::Fold(std::span<const std::int16_t> said,
+                     std::uint32_t said_seen,
+                     std::int64_t offset,
+                     const FoldClamp& clamp) {
+  // What lies in between is a whole column wherever altitudes agree as they should.
+  std::array<std::int16_t, kSegments> column{};
+  const auto size = static_cast<std::int64_t>(said.size());
+  const std::int64_t begin = std::clamp<std::int64_t>(offset, 0, size);
+  const std::int64_t end = std::clamp<std::int64_t>(offset + std::int64_t{kSegments}, begin, size);
+  if (begin == end) {
+    return;
+  }
+  std::memcpy(column.data() + (begin - offset), said.data() + begin,
+              static_cast<std::size_t>(end - begin) * sizeof(std::int16_t));
+  seen_ |= offset >= 0 ? said_seen >> offset : said_seen << -offset;
+  const Lanes stretch = Lanes{} + clamp.stretch;
+  const Lanes carry = Lanes{} + clamp.carry;
+  const Lanes all = Lanes{} + clamp.evidence;
+  for (std::size_t half = 0; half < kSegments; half += kLanes) {
+    const Lanes says = Load(column.data() + half);
+    const Lanes before = Load(evidence_.data() + half);
+    const Lanes sum =
+        Clamped(Clamped(before, -carry, carry) + Clamped(says, -stretch, stretch), -all, all);
+    Store(says == Lanes{} ? before : sum, evidence_.data() + half);
+  }
+}
+
+std::uint64_t ColumnSum::Nibbles(std::uint64_t mask) const {
+  std::uint64_t nibbles = 0;
+  for (std::size_t k = 0; k < kSegments; ++k) {
+    if (((seen_ >> k) & 1u) != 0) {
+      nibbles |= std::uint64_t{NibbleFromEvidence(evidence_[k])} << (4 * k);
+    }
+  }
+  return nibbles & mask;
 }
 
 }  // namespace atlas

@@ -1,18 +1,14 @@
-// Occupancy and columns of one cell's layers. Each session's observations fold in time order to one
-// increment; increments fold in the order of their last observation. Both folds saturate, so that
-// no session has more than its say and no evidence becomes certainty.
+// Occupancy and columns of one cell's layers: the say of each stretch, in the order in which they
+// saw the layer last. The fold saturates, so that no stretch has more than its say, no evidence
+// becomes certainty, and what was seen last counts.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "core/fusion/cell_layers.h"
-#include "core/fusion/column_evidence.h"
-#include "core/fusion/fusion_input.h"
-#include "core/fusion/observation.h"
-#include "core/tile/column_lattice.h"
+#include "core/fusion/segment_view.h"
 #include "core/tile/tile.h"
 
 namespace atlas {
@@ -20,47 +16,25 @@ namespace atlas {
 // Reused from cell to cell.
 class EvidenceFolder {
  public:
-  // Both must outlive the folder.
-  EvidenceFolder(const FusionInput& input, const MapProfile& profile);
+  // `profile` must outlive the folder.
+  explicit EvidenceFolder(const MapProfile& profile) : profile_(profile) {}
 
-  // Appends the cell's layers to `out`, complete, and remembers the sessions that took part.
-  void Fold(std::span<const Observation> observations,
+  // Appends the cell's layers to `out`, complete. Segments in canonical order with the layer of
+  // each, or kNoLayer.
+  void Fold(std::span<const SegmentView> segments,
             std::span<const std::uint32_t> labels,
             std::span<const CellLayer> layers,
             std::vector<TileLayer>& out);
 
-  // By session: whether an observation of it was used in any cell so far.
-  const std::vector<bool>& contributed() const { return contributed_; }
-
  private:
-  // What one session says about one layer.
-  struct Increment {
-    std::uint32_t layer = 0;
-    std::uint32_t last_time_rank = 0;
-    std::int16_t occupancy = 0;
-    bool has_column = false;
-    ColumnEvidence column;
-  };
+  void SortByTime(std::span<const SegmentView> segments);
+  TileLayer FoldLayer(std::span<const SegmentView> segments,
+                      std::span<const std::uint32_t> labels,
+                      std::span<const CellLayer> layers,
+                      std::uint32_t layer) const;
 
-  void PrepareSpans(std::span<const CellLayer> layers);
-  void FoldSession(std::span<const Observation> observations,
-                   std::span<const std::uint32_t> labels,
-                   std::uint32_t session);
-  void FoldObservation(const Observation& observation, std::uint32_t layer);
-  Increment& IncrementOf(std::uint32_t layer);
-  void SortByTime(std::span<const Observation> observations);
-  void Publish(std::span<const CellLayer> layers, std::vector<TileLayer>& out);
-
-  const FusionInput& input_;
   const MapProfile& profile_;
-  std::array<std::int16_t, 3> occupancy_units_;  // by Occupancy
-
-  std::vector<ColumnSpan> spans_;
-  std::vector<Increment> increments_;
-  std::vector<std::uint32_t> slots_;  // by layer: its increment of this session, or kNoLayer
-  std::vector<std::uint32_t> time_order_;
-  std::vector<ColumnEvidence> columns_;
-  std::vector<bool> contributed_;
+  std::vector<std::uint32_t> order_;
 };
 
 }  // namespace atlas

@@ -3,15 +3,14 @@
 
 #include <cstdint>
 
-#include "core/keyframe/keyframe.h"
+#include "core/geometry/keyframe_cell.h"
 
 namespace atlas {
 
 struct Observation {
   std::int32_t altitude_mm = 0;  // world frame
-  std::uint32_t frame = 0;       // index into FusionInput::frames
-  std::uint64_t column = 0;      // the keyframe's nibbles; 0: none
   std::int32_t column_base = 0;  // world lattice index of the lowest nibble's segment, if any
+  std::uint64_t column = 0;      // the keyframe's nibbles; 0: none
   std::uint16_t distance_step = 0;
   AltitudeSource source = AltitudeSource::kNone;
   Occupancy occupancy = Occupancy::kUnknown;

@@ -4,92 +4,117 @@
 #include <cassert>
 #include <utility>
 
-#include "core/fusion/block_gatherer.h"
-#include "core/fusion/cell_layers.h"
-#include "core/fusion/evidence_folder.h"
-#include "core/fusion/fusion_input.h"
-#include "core/fusion/sigma_table.h"
+#include "core/fusion/fusion_stretch.h"
+#include "core/fusion/paper_survey.h"
+#include "core/fusion/stretch_survey.h"
+#include "core/fusion/tile_combiner.h"
 
 namespace atlas {
 namespace {
 
-// The layers of a tile while its blocks are worked through: cells in the order of the blocks.
-struct BlockwiseLayers {
-  struct Range {
-    std::uint32_t begin = 0;
-    std::uint32_t count = 0;
-  };
-  std::vector<TileLayer> layers;
-  std::vector<Range> cells;  // by cell of the tile, row-major
-};
+std::int32_t MaxRadiusCells(std::span<const FrameOnMap> frames) {
+  std::int32_t radius = 1;
+  for (const FrameOnMap& frame : frames) {
+    radius = std::max(radius, frame.grid.radius_cells);
+  }
+  return radius;
+}
+
+// How many rows can be surveyed at once: where most cells have a segment or two of each stretch;
+// in preset paper all observations are kept for a while.
+std::int32_t RowsWithin(std::size_t max_bytes,
+                        std::span<const FusionStretch> stretches,
+                        const MapProfile& profile) {
+  constexpr std::size_t kCellBytes = 128;        // of a stretch
+  constexpr std::size_t kObservationBytes = 48;  // preset paper
+  constexpr std::size_t kMinRows = 16;           // fewer would ask for the keyframes too often
+  std::size_t longest = 0;
+  for (const FusionStretch& stretch : stretches) {
+    longest = std::max(longest, stretch.frames.size());
+  }
+  const std::size_t cell_bytes =
+      stretches.size() * kCellBytes +
+      (profile.preset == FusionPreset::kPaper ? longest * kObservationBytes : 0);
+  return static_cast<std::int32_t>(std::clamp<std::size_t>(
+      max_bytes / (cell_bytes * profile.tile_cells), kMinRows, profile.tile_cells));
+}
 
 class TileFuser {
  public:
-  TileFuser(const TileId& id, const FusionInput& input, const MapProfile& profile)
-      : side_(profile.tile_cells),
-        sigmas_(profile, input.max_radius_cells),
-        gatherer_(id, input, sigmas_, profile),
-        layer_builder_(input, sigmas_, profile),
-        folder_(input, profile) {
-    result_.cells.resize(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
-  }
+  TileFuser(std::span<const FrameOnMap> frames,
+            const KeyframeSource& source,
+            const MapProfile& profile)
+      : frames_(frames),
+        source_(source),
+        profile_(profile),
+        sigmas_(profile, MaxRadiusCells(frames)) {}
 
-  Status Run(const KeyframeSource& source, std::size_t max_bytes) {
-    const std::int32_t blocks = side_ / BlockGatherer::kBlockCells;
-    const std::int32_t band = gatherer_.RowsWithin(max_bytes);
-    for (std::int32_t first = 0; first < blocks; first += band) {
-      const std::int32_t rows = std::min(band, blocks - first);
-      ATLAS_RETURN_IF_ERROR(gatherer_.Gather(first, rows, source));
-      for (std::int32_t y = first; y < first + rows; ++y) {
-        for (std::int32_t x = 0; x < blocks; ++x) {
-          FuseBlock(x, y);
-        }
-      }
+  Status Fuse(std::span<const FusionStretch> stretches, std::size_t max_bytes, Tile& tile) {
+    const std::int32_t side = profile_.tile_cells;
+    const std::int32_t rows = RowsWithin(max_bytes, stretches, profile_);
+    TileCombiner combiner(sigmas_, profile_, std::size_t{stretches.back().session} + 1);
+    for (std::int32_t first = 0; first < side; first += rows) {
+      const TileBand band{tile.id, first, std::min(rows, side - first)};
+      ATLAS_RETURN_IF_ERROR(FuseBand(band, stretches, combiner, tile));
     }
+    NameContributors(stretches, combiner.contributed(), tile);
     return {};
   }
 
-  const BlockwiseLayers& result() const { return result_; }
-
-  const std::vector<bool>& contributed() const { return folder_.contributed(); }
-
  private:
-  void FuseBlock(std::int32_t block_x, std::int32_t block_y) {
-    for (std::int32_t y = 0; y < BlockGatherer::kBlockCells; ++y) {
-      for (std::int32_t x = 0; x < BlockGatherer::kBlockCells; ++x) {
-        const auto row = static_cast<std::uint32_t>(block_y * BlockGatherer::kBlockCells + y);
-        const auto column = static_cast<std::uint32_t>(block_x * BlockGatherer::kBlockCells + x);
-        FuseCell(gatherer_.Observations(block_x, block_y, x, y),
-                 result_.cells[std::size_t{row} * static_cast<std::uint32_t>(side_) + column]);
+  Status FuseBand(const TileBand& band,
+                  std::span<const FusionStretch> stretches,
+                  TileCombiner& combiner,
+                  Tile& tile) const {
+    std::vector<StretchSurvey> surveys;
+    surveys.reserve(stretches.size());
+    std::vector<SurveyedStretch> surveyed;
+    for (const FusionStretch& stretch : stretches) {
+      auto survey = Survey(band, stretch);
+      if (!survey) {
+        return survey.error();
+      }
+      surveys.push_back(*std::move(survey));
+      surveyed.push_back({&surveys.back(), stretch.session, stretch.vehicle});
+    }
+    combiner.Combine(band, surveyed, tile);
+    return {};
+  }
+
+  Result<StretchSurvey> Survey(const TileBand& band, const FusionStretch& stretch) const {
+    PaperSurvey paper(band, sigmas_, profile_);
+    StretchSurvey survey(band, profile_);
+    const bool is_paper = profile_.preset == FusionPreset::kPaper;
+    for (const std::size_t i : stretch.frames) {
+      const auto keyframe = source_(i);
+      if (!keyframe) {
+        return Error(keyframe.error());
+      }
+      if (is_paper) {
+        paper.Add(frames_[i], **keyframe);
+      } else {
+        survey.Add(frames_[i], **keyframe, sigmas_);
+      }
+    }
+    return is_paper ? paper.Finish() : std::move(survey);
+  }
+
+  static void NameContributors(std::span<const FusionStretch> stretches,
+                               const std::vector<bool>& contributed,
+                               Tile& tile) {
+    for (const FusionStretch& stretch : stretches) {
+      const bool is_new = tile.contributors.empty() || tile.contributors.back() != *stretch.key;
+      if (contributed[stretch.session] && is_new) {
+        tile.contributors.push_back(*stretch.key);  // in canonical order
       }
     }
   }
 
-  void FuseCell(std::span<const Observation> observations, BlockwiseLayers::Range& range) {
-    range.begin = static_cast<std::uint32_t>(result_.layers.size());
-    if (!observations.empty()) {
-      layer_builder_.Build(observations);
-      folder_.Fold(observations, layer_builder_.labels(), layer_builder_.layers(), result_.layers);
-    }
-    range.count = static_cast<std::uint32_t>(result_.layers.size()) - range.begin;
-  }
-
-  std::int32_t side_;
+  std::span<const FrameOnMap> frames_;
+  const KeyframeSource& source_;
+  const MapProfile& profile_;
   SigmaTable sigmas_;
-  BlockGatherer gatherer_;
-  CellLayerBuilder layer_builder_;
-  EvidenceFolder folder_;
-  BlockwiseLayers result_;
 };
-
-void AppendCells(const BlockwiseLayers& blockwise, Tile& tile) {
-  tile.layers.reserve(blockwise.layers.size());
-  for (std::size_t cell = 0; cell < blockwise.cells.size(); ++cell) {
-    const auto first = blockwise.layers.begin() + blockwise.cells[cell].begin;
-    tile.layers.insert(tile.layers.end(), first, first + blockwise.cells[cell].count);
-    tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
-  }
-}
 
 }  // namespace
 
@@ -99,20 +124,14 @@ Result<Tile> FuseTile(const TileId& id,
                       const MapProfile& profile,
                       std::size_t max_bytes) {
   assert(id.level == 0);
-  const FusionInput input = PrepareFusion(id, frames, profile);
   Tile tile = EmptyTile(id, profile);
-  if (input.frames.empty()) {
+  const std::vector<FusionStretch> stretches = CutStretches(id, frames, profile);
+  if (stretches.empty()) {
     return tile;
   }
-  TileFuser fuser(id, input, profile);
-  if (Status status = fuser.Run(source, max_bytes); !status.ok()) {
+  TileFuser fuser(frames, source, profile);
+  if (Status status = fuser.Fuse(stretches, max_bytes, tile); !status.ok()) {
     return Error(std::move(status));
-  }
-  AppendCells(fuser.result(), tile);
-  for (std::size_t i = 0; i < input.sessions.size(); ++i) {
-    if (fuser.contributed()[i]) {
-      tile.contributors.push_back(*input.sessions[i].key);  // sessions are sorted
-    }
   }
   return tile;
 }
@@ -128,8 +147,7 @@ Tile FuseTile(const TileId& id,
   const auto in_memory = [keyframes](std::size_t i) -> Result<std::shared_ptr<const Keyframe>> {
     return keyframes[i].keyframe;
   };
-  constexpr std::size_t kCacheBytes = std::size_t{1} << 20;       // asking again costs nothing here
-  return *FuseTile(id, frames, in_memory, profile, kCacheBytes);  // memory does not fail
+  return *FuseTile(id, frames, in_memory, profile);  // memory does not fail
 }
 
 }  // namespace atlas

@@ -6,7 +6,7 @@
 namespace atlas {
 namespace {
 
-constexpr std::uint8_t kProfileVersion = 1;
+constexpr std::uint8_t kProfileVersion = 2;
 
 Status OutOfRange(const char* field, double value, const char* range) {
   return Status(StatusCode::kInvalidArgument,
@@ -63,14 +63,33 @@ Status ValidateFusion(const MapProfile& profile) {
   if (profile.miss_units >= 0 || profile.miss_units < -127) {
     return OutOfRange("miss evidence", profile.miss_units, "-127 to -1");
   }
-  if (profile.session_clamp < 1 || profile.session_clamp > 127) {
-    return OutOfRange("session clamp", profile.session_clamp, "1 to 127");
+  if (profile.stretch_keyframes < 16 || profile.stretch_keyframes > 4'096) {
+    return OutOfRange("keyframes per stretch", profile.stretch_keyframes, "16 to 4096");
+  }
+  if (profile.stretch_clamp < 1 || profile.stretch_clamp > 127) {
+    return OutOfRange("stretch clamp", profile.stretch_clamp, "1 to 127");
   }
   if (profile.evidence_clamp < 1 || profile.evidence_clamp > 127) {
     return OutOfRange("evidence clamp", profile.evidence_clamp, "1 to 127");
   }
-  if (profile.driven_clamp < profile.session_clamp || profile.driven_clamp > 16'384) {
-    return OutOfRange("driven clamp", profile.driven_clamp, "the session clamp to 16384");
+  if (profile.carry_clamp < 0 || profile.carry_clamp > profile.evidence_clamp) {
+    return OutOfRange("carry clamp", profile.carry_clamp, "0 to the evidence clamp");
+  }
+  if (profile.driven_clamp < profile.stretch_clamp || profile.driven_clamp > 16'384) {
+    return OutOfRange("driven clamp", profile.driven_clamp, "the stretch clamp to 16384");
+  }
+  return {};
+}
+
+Status ValidateBounded(const MapProfile& profile) {
+  if (profile.band_mm < 500) {
+    return OutOfRange("height of a band in mm", profile.band_mm, "500 to 65535");
+  }
+  if (profile.band_segments < 1) {
+    return OutOfRange("segments of a band", profile.band_segments, "1 to 255");
+  }
+  if (profile.band_vehicle_segments < 1) {
+    return OutOfRange("a vehicle's segments of a band", profile.band_vehicle_segments, "1 to 255");
   }
   return {};
 }
@@ -99,7 +118,8 @@ std::optional<GeodeticOrigin> DecodeOrigin(ByteReader& in) {
 
 Status MapProfile::Validate() const {
   ATLAS_RETURN_IF_ERROR(ValidateGrid(*this));
-  return ValidateFusion(*this);
+  ATLAS_RETURN_IF_ERROR(ValidateFusion(*this));
+  return ValidateBounded(*this);
 }
 
 Bytes MapProfile::Encode() const {
@@ -122,11 +142,16 @@ Bytes MapProfile::Encode() const {
   out.U16(other_layer_mm);
   out.U16(layer_span_mm);
   out.U16(slab_margin_mm);
+  out.U16(stretch_keyframes);
   out.U16(sequence_gap);
+  out.U16(band_mm);
+  out.U8(band_segments);
+  out.U8(band_vehicle_segments);
   out.I16(hit_units);
   out.I16(miss_units);
-  out.I16(session_clamp);
+  out.I16(stretch_clamp);
   out.I16(evidence_clamp);
+  out.I16(carry_clamp);
   out.I16(driven_clamp);
   EncodeOrigin(origin, out);
   return out.Take();
@@ -156,11 +181,16 @@ Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
   profile.other_layer_mm = in.U16();
   profile.layer_span_mm = in.U16();
   profile.slab_margin_mm = in.U16();
+  profile.stretch_keyframes = in.U16();
   profile.sequence_gap = in.U16();
+  profile.band_mm = in.U16();
+  profile.band_segments = in.U8();
+  profile.band_vehicle_segments = in.U8();
   profile.hit_units = in.I16();
   profile.miss_units = in.I16();
-  profile.session_clamp = in.I16();
+  profile.stretch_clamp = in.I16();
   profile.evidence_clamp = in.I16();
+  profile.carry_clamp = in.I16();
   profile.driven_clamp = in.I16();
   profile.origin = DecodeOrigin(in);
   if (!in.ok() || in.remaining() != 0) {

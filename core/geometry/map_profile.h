@@ -14,7 +14,7 @@ namespace atlas {
 enum class FusionPreset : std::uint8_t {
   kPaper = 0,    // the paper's rules to the letter
   kStrict = 1,   // with gates on what is one layer; the default
-  kBounded = 2,  // strict over a bounded choice of observations
+  kBounded = 2,  // strict over the latest stretches: its cost does not grow with the passes
 };
 
 // WGS84 coordinates of the world frame's origin.
@@ -53,14 +53,24 @@ struct MapProfile {
   std::uint16_t other_layer_mm = 2'000;  // farther than this: two layers
   std::uint16_t layer_span_mm = 1'500;   // no layer is thicker
   std::uint16_t slab_margin_mm = 700;    // columns end this far below the next layer
-  std::uint16_t sequence_gap = 3;        // a segment bridges this difference in sequence number
+  // A session is surveyed in stretches of this many sequence numbers: what a pose correction costs.
+  std::uint16_t stretch_keyframes = 256;
+  std::uint16_t sequence_gap = 3;  // preset paper: a segment bridges this difference in sequence
+
+  // Preset bounded: of each cell and band of altitude, the segments that were seen last.
+  std::uint16_t band_mm = 2'000;
+  std::uint8_t band_segments = 16;
+  std::uint8_t band_vehicle_segments = 4;  // of one vehicle
 
   // Evidence in units of ln(9)/64, so that +-64 is the probability 0.9 / 0.1 that a nibble ends at.
   std::int16_t hit_units = 25;       // p = 0.7
   std::int16_t miss_units = -12;     // p = 0.4
-  std::int16_t session_clamp = 64;   // one session's say in a cell
-  std::int16_t evidence_clamp = 64;  // all sessions together
-  // Where the vehicle itself was (kNibbleFree) its session's evidence falls to minus this: seven
+  std::int16_t stretch_clamp = 64;   // one stretch's say in a cell
+  std::int16_t evidence_clamp = 64;  // all stretches together
+  // Beside what a later stretch says, all before it counts for this much: so that one stretch can
+  // turn what many agreed on, a car that left after years, into its opposite.
+  std::int16_t carry_clamp = 48;
+  // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: seven
   // hits more than misses fill it again, so that what merely follows the vehicle does not.
   std::int16_t driven_clamp = 192;
 

@@ -25,6 +25,7 @@ struct TileLayer {
   std::int8_t occupancy = 0;  // evidence of an obstacle, units of ln(9)/64 (nibble.h)
   std::uint8_t flags = 0;
   std::uint16_t observations = 0;  // keyframes that saw it, saturating
+  std::uint32_t confirmed_s = 0;   // seconds since 1970 when a keyframe saw it last
   std::uint64_t column = 0;        // nibbles, lowest segment first; 0 = no data
 
   bool is_traversable() const { return (flags & kTraversable) != 0; }

@@ -16,10 +16,12 @@ TileContainer MakeContainer(const Tile& tile, const MapProfile& profile) {
   TileContainer container;
   container.key = tile.id.Key();
   container.profile_hash = profile.Hash();
+  container.preset = static_cast<std::uint8_t>(profile.preset);
   container.sections = {
       {SectionId(TileSection::kContributors), EncodeContributors(tile)},
       {SectionId(TileSection::kSurface), EncodeSurface(tile, profile)},
       {SectionId(TileSection::kColumns), EncodeColumns(tile, profile)},
+      {SectionId(TileSection::kConfirmed), EncodeConfirmed(tile, profile)},
   };
   return container;
 }
@@ -32,8 +34,11 @@ Status DecodeSections(const TileContainer& container, const MapProfile& profile,
   }
   ATLAS_RETURN_IF_ERROR(DecodeContributors(contributors->content, tile));
   ATLAS_RETURN_IF_ERROR(DecodeSurface(surface->content, profile, tile));
-  const auto* columns = container.Find(SectionId(TileSection::kColumns));
-  return columns == nullptr ? Status() : DecodeColumns(columns->content, profile, tile);
+  if (const auto* columns = container.Find(SectionId(TileSection::kColumns))) {
+    ATLAS_RETURN_IF_ERROR(DecodeColumns(columns->content, profile, tile));
+  }
+  const auto* confirmed = container.Find(SectionId(TileSection::kConfirmed));
+  return confirmed == nullptr ? Status() : DecodeConfirmed(confirmed->content, profile, tile);
 }
 
 }  // namespace
@@ -56,7 +61,8 @@ Result<Tile> DecodeTile(ByteSpan blob, const MapProfile& profile) {
   if (!id) {
     return Error(id.error());
   }
-  if (container->profile_hash != profile.Hash()) {
+  if (container->profile_hash != profile.Hash() ||
+      container->preset != static_cast<std::uint8_t>(profile.preset)) {
     return Error(StatusCode::kInvalidData, StrCat("tile ", *id, ": made for another map profile"));
   }
   Tile tile;

@@ -13,7 +13,12 @@
 namespace atlas {
 
 // Frozen numbers.
-enum class TileSection : std::uint16_t { kContributors = 1, kSurface = 2, kColumns = 3 };
+enum class TileSection : std::uint16_t {
+  kContributors = 1,
+  kSurface = 2,
+  kColumns = 3,
+  kConfirmed = 4,
+};
 
 inline constexpr std::size_t kMaxTileBytes = 32u << 20;  // blob and payload alike
 
@@ -31,7 +36,7 @@ struct EncodedTile {
 EncodedTile EncodeTile(const Tile& tile, const MapProfile& profile);
 
 // kInvalidData on damage or on a blob of another profile; kUnsupported on a newer version. Sections
-// with unknown numbers are skipped; a blob without columns decodes to empty ones.
+// with unknown numbers are skipped; without columns or times those are 0.
 Result<Tile> DecodeTile(ByteSpan blob, const MapProfile& profile);
 
 // The canonical payload of a blob, checksums verified.

@@ -11,7 +11,7 @@ namespace atlas {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x31544152;  // "RAT1"
-constexpr std::uint8_t kVersion = 1;
+constexpr std::uint8_t kVersion = 2;
 constexpr std::size_t kMaxSections = 64;
 constexpr int kCompressionLevel = 3;  // measured: docs/formats/tile.md
 
@@ -31,11 +31,14 @@ Status ReadVersion(ByteReader& in) {
     return Damaged("does not start with RAT1");
   }
   const std::uint8_t version = in.U8();
-  if (version > kVersion) {
-    return Status(StatusCode::kUnsupported, StrCat("tile: version ", int{version},
-                                                   ", this build reads up to ", int{kVersion}));
+  if (!in.ok() || version == 0) {
+    return Damaged("version 0 or a truncated header");
   }
-  return version == 0 ? Damaged("version 0 or a truncated header") : Status();
+  if (version != kVersion) {
+    return Status(StatusCode::kUnsupported,
+                  StrCat("tile: version ", int{version}, ", this build reads ", int{kVersion}));
+  }
+  return {};
 }
 
 Status ReadTable(ByteReader& in, std::vector<TableEntry>& table) {
@@ -86,6 +89,7 @@ Status ReadContainer(ByteSpan blob, TileContainer& container) {
   ATLAS_RETURN_IF_ERROR(ReadVersion(in));
   container.key = in.U64();
   container.profile_hash = in.U64();
+  container.preset = in.U8();
   std::vector<TableEntry> table;
   ATLAS_RETURN_IF_ERROR(ReadTable(in, table));
   ATLAS_RETURN_IF_ERROR(CheckHeaderHash(blob, in));
@@ -125,6 +129,7 @@ Bytes EncodeContainer(const TileContainer& container) {
   out.U8(kVersion);
   out.U64(container.key);
   out.U64(container.profile_hash);
+  out.U8(container.preset);
   out.U16(static_cast<std::uint16_t>(container.sections.size()));
   Bytes bodies;
   for (const TileContainer::Section& section : container.sections) {

@@ -14,6 +14,7 @@ namespace atlas {
 struct TileContainer {
   std::uint64_t key = 0;           // TileId::Key()
   std::uint64_t profile_hash = 0;  // MapProfile::Hash()
+  std::uint8_t preset = 0;         // FusionPreset, the profile's: for whoever has only the blob
   struct Section {
     std::uint16_t id = 0;
     Bytes content;  // uncompressed
@@ -29,7 +30,7 @@ Bytes EncodeContainerPayload(const TileContainer& container);
 // The blob, each section compressed.
 Bytes EncodeContainer(const TileContainer& container);
 
-// Verifies every checksum and size. kUnsupported on a newer version, kInvalidData otherwise.
+// Verifies every checksum and size. kUnsupported on another version, kInvalidData otherwise.
 Result<TileContainer> DecodeContainer(ByteSpan blob);
 
 }  // namespace atlas

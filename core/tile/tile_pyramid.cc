@@ -50,7 +50,7 @@ void CombineAltitudes(std::span<const ChildLayer> group, TileLayer& parent) {
   parent.sigma_100um = RoundSigma100um((half_units + 1) / 2);
 }
 
-// Occupancy, flags and observations.
+// Occupancy, flags, observations and the time.
 void CombineEvidence(std::span<const ChildLayer> group, TileLayer& parent) {
   unsigned cells = 0;
   unsigned all_flags = ~0u;
@@ -63,6 +63,7 @@ void CombineEvidence(std::span<const ChildLayer> group, TileLayer& parent) {
     any_flags |= layer->flags;
     parent.occupancy = std::max(parent.occupancy, layer->occupancy);
     parent.observations = std::min(parent.observations, layer->observations);
+    parent.confirmed_s = std::max(parent.confirmed_s, layer->confirmed_s);
   }
   constexpr unsigned kAllCells = 15;
   const unsigned traversable = cells == kAllCells ? all_flags & TileLayer::kTraversable : 0;

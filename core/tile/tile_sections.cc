@@ -186,6 +186,19 @@ Bytes EncodeColumns(const Tile& tile, const MapProfile& profile) {
   return out.Take();
 }
 
+Bytes EncodeConfirmed(const Tile& tile, const MapProfile& profile) {
+  std::vector<std::uint32_t> differences;
+  differences.reserve(tile.layers.size());
+  VisitWithPredictor(tile.cell_begin, profile.tile_cells, std::span(tile.layers),
+                     [&](const TileLayer& layer, const TileLayer& previous) {
+                       differences.push_back(Zigzag(
+                           static_cast<std::int32_t>(layer.confirmed_s - previous.confirmed_s)));
+                     });
+  ByteWriter out;
+  WritePlanes(differences, 4, out);
+  return out.Take();
+}
+
 Status DecodeContributors(ByteSpan section, Tile& tile) {
   ByteReader in(section);
   const std::uint64_t count = in.Varint();
@@ -248,6 +261,22 @@ Status DecodeColumns(ByteSpan section, const MapProfile& profile, Tile& tile) {
   for (std::size_t i = 0; i < tile.layers.size(); ++i) {
     tile.layers[i].column = has_column[i] != 0 ? columns[next++] : 0;
   }
+  return {};
+}
+
+Status DecodeConfirmed(ByteSpan section, const MapProfile& profile, Tile& tile) {
+  ByteReader in(section);
+  const std::vector<std::uint32_t> differences = ReadPlanes(in, tile.layers.size(), 4);
+  if (!in.ok() || in.remaining() != 0) {
+    return Damaged("times are truncated or bytes are left");
+  }
+  std::size_t next = 0;
+  VisitWithPredictor(tile.cell_begin, profile.tile_cells, std::span(tile.layers),
+                     [&](TileLayer& layer, const TileLayer& previous) {
+                       layer.confirmed_s = previous.confirmed_s +
+                                           static_cast<std::uint32_t>(Unzigzag(differences[next]));
+                       ++next;
+                     });
   return {};
 }
 

@@ -1,4 +1,4 @@
-// The three sections of a tile: who contributed, the surface layers, the columns
+// The sections of a tile: who contributed, the surface layers, the columns, when each was confirmed
 // (docs/formats/tile.md).
 #pragma once
 
@@ -11,11 +11,13 @@ namespace atlas {
 Bytes EncodeContributors(const Tile& tile);
 Bytes EncodeSurface(const Tile& tile, const MapProfile& profile);
 Bytes EncodeColumns(const Tile& tile, const MapProfile& profile);
+Bytes EncodeConfirmed(const Tile& tile, const MapProfile& profile);
 
-// Each fills its part of `tile` or says what is wrong (kInvalidData). Columns come after the
-// surface.
+// Each fills its part of `tile` or says what is wrong (kInvalidData). Columns and times come
+// after the surface.
 Status DecodeContributors(ByteSpan section, Tile& tile);
 Status DecodeSurface(ByteSpan section, const MapProfile& profile, Tile& tile);
 Status DecodeColumns(ByteSpan section, const MapProfile& profile, Tile& tile);
+Status DecodeConfirmed(ByteSpan section, const MapProfile& profile, Tile& tile);
 
 }  // namespace atlas

@@ -31,42 +31,53 @@ TEST(TileEvidenceTest, AMovingObjectIsGoneAfterMisses) {
   EXPECT_LT(layer.column & 15, kNibbleUnknown);
 }
 
-TEST(TileEvidenceTest, SessionsFoldInTheOrderOfTheirLastObservation) {
-  // Full evidence for, then full evidence against: neutral. The other way round as well, but three
-  // sessions for, saturating, then one against leaves nothing of the three.
-  const auto session = [](const char* name, std::uint32_t first, Occupancy occupancy) {
-    std::vector<PlacedKeyframe> keyframes;
-    for (std::uint32_t i = 0; i < 20; ++i) {
-      keyframes.push_back(See({.occupancy = occupancy}, {"car", name, first + i}));
-    }
-    return keyframes;
-  };
-  const auto occupancy_of = [&](std::uint32_t time_of_misses) {
-    std::vector<PlacedKeyframe> all;
-    for (const auto& part :
-         {session("x", 0, Occupancy::kObstacle), session("y", 100, Occupancy::kObstacle),
-          session("a", time_of_misses, Occupancy::kFree)}) {
-      all.insert(all.end(), part.begin(), part.end());
-    }
-    return Middle(all)[0].occupancy;
-  };
-  EXPECT_EQ(occupancy_of(200), 0);  // 64, 64 (clamped), 0
-  EXPECT_EQ(occupancy_of(50), 64);  // 64, 0, 64
+std::vector<PlacedKeyframe> Session(const char* name, std::uint32_t first, Occupancy occupancy) {
+  std::vector<PlacedKeyframe> keyframes;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    keyframes.push_back(See({.occupancy = occupancy}, {"car", name, first + i}));
+  }
+  return keyframes;
 }
 
-TEST(TileEvidenceTest, EvidenceFoldsByTimeNotBySequence) {
+std::int8_t OccupancyOf(const std::vector<std::vector<PlacedKeyframe>>& sessions) {
+  std::vector<PlacedKeyframe> all;
+  for (const auto& session : sessions) {
+    all.insert(all.end(), session.begin(), session.end());
+  }
+  return Middle(all)[0].occupancy;
+}
+
+TEST(TileEvidenceTest, WhatWasSeenLastDecides) {
+  // However many sessions agreed, a later one with all its say turns them: 64, then 48 carried.
+  const auto x = Session("x", 0, Occupancy::kObstacle);
+  const auto y = Session("y", 100, Occupancy::kObstacle);
+  EXPECT_EQ(OccupancyOf({x, y}), 64);
+  EXPECT_EQ(OccupancyOf({x, y, Session("a", 200, Occupancy::kFree)}), 48 - 64);
+  EXPECT_EQ(OccupancyOf({x, Session("a", 50, Occupancy::kFree), y}), 48);  // 64, -16, 48
+  EXPECT_EQ(OccupancyOf({x, Session("a", 50, Occupancy::kUnknown)}), 64);  // says nothing
+}
+
+TEST(TileEvidenceTest, AStretchFoldsInTheOrderOfItsSequence) {
   // Hits saturate at +64 in four; one miss before or after them differs.
-  const auto occupancy_with_miss_at = [](std::int64_t time_ms) {
+  const auto occupancy_with_miss_at = [](std::uint32_t sequence) {
     std::vector<PlacedKeyframe> keyframes;
-    for (std::uint32_t i = 0; i < 4; ++i) {
+    for (std::uint32_t i = 1; i < 5; ++i) {
       keyframes.push_back(See({.occupancy = Occupancy::kObstacle}, {"car", "a", i}));
     }
-    keyframes.push_back(See({.occupancy = Occupancy::kFree}, {"car", "a", 9}));
-    keyframes.back().time_ms = time_ms;
+    keyframes.push_back(See({.occupancy = Occupancy::kFree}, {"car", "a", sequence}));
     return Middle(keyframes)[0].occupancy;
   };
-  EXPECT_EQ(occupancy_with_miss_at(1'000), 64 - 12);
-  EXPECT_EQ(occupancy_with_miss_at(-1), 64);
+  EXPECT_EQ(occupancy_with_miss_at(9), 64 - 12);
+  EXPECT_EQ(occupancy_with_miss_at(0), 64);
+}
+
+TEST(TileEvidenceTest, ALayerKnowsWhenItWasConfirmed) {
+  const auto layers =
+      Middle({See({.z_m = 0.0}, {"car", "a", 35}), See({.z_m = 5.5}, {"car", "b", 10}),
+              See({.z_m = 0.0}, {"car", "c", 21})});
+  ASSERT_EQ(layers.size(), 2u);
+  EXPECT_EQ(layers[0].confirmed_s, 3u);  // 100 ms a sequence number
+  EXPECT_EQ(layers[1].confirmed_s, 1u);
 }
 
 TEST(TileEvidenceTest, ColumnsStandOnTheWorldsLattice) {

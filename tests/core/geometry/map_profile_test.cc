@@ -21,7 +21,7 @@ TEST(MapProfileTest, ReadsBack) {
 }
 
 TEST(MapProfileTest, GoldenFile) {
-  const Bytes golden = testing::GoldenFile("profile_v1.bin", GoldenProfile().Encode());
+  const Bytes golden = testing::GoldenFile("profile_v2.bin", GoldenProfile().Encode());
   EXPECT_EQ(MapProfile::Decode(golden).value(), GoldenProfile());
   EXPECT_EQ(GoldenProfile().Encode(), golden);
 }
@@ -42,7 +42,7 @@ TEST(MapProfileTest, RefusesTruncationTrailingBytesAndNewerVersions) {
   bytes.push_back(0);
   EXPECT_FALSE(MapProfile::Decode(bytes).has_value());
   bytes.pop_back();
-  bytes[0] = 2;
+  bytes[0] = 3;
   EXPECT_EQ(MapProfile::Decode(bytes).error().code(), StatusCode::kUnsupported);
 }
 
@@ -96,9 +96,29 @@ TEST(MapProfileTest, NamesTheFieldOutOfRange) {
        [](MapProfile& p) {
          p.miss_units = 1;
        }},
-      {"session clamp",
+      {"keyframes per stretch",
        [](MapProfile& p) {
-         p.session_clamp = 128;
+         p.stretch_keyframes = 8;
+       }},
+      {"height of a band",
+       [](MapProfile& p) {
+         p.band_mm = 100;
+       }},
+      {"segments of a band",
+       [](MapProfile& p) {
+         p.band_segments = 0;
+       }},
+      {"a vehicle's segments",
+       [](MapProfile& p) {
+         p.band_vehicle_segments = 0;
+       }},
+      {"stretch clamp",
+       [](MapProfile& p) {
+         p.stretch_clamp = 128;
+       }},
+      {"carry clamp",
+       [](MapProfile& p) {
+         p.carry_clamp = 65;
        }},
       {"evidence clamp",
        [](MapProfile& p) {

@@ -24,11 +24,16 @@ inline MapProfile GoldenProfile() {
   profile.other_layer_mm = 2'000;
   profile.layer_span_mm = 1'500;
   profile.slab_margin_mm = 700;
+  profile.stretch_keyframes = 256;
   profile.sequence_gap = 3;
+  profile.band_mm = 2'000;
+  profile.band_segments = 16;
+  profile.band_vehicle_segments = 4;
   profile.hit_units = 25;
   profile.miss_units = -12;
-  profile.session_clamp = 64;
+  profile.stretch_clamp = 64;
   profile.evidence_clamp = 64;
+  profile.carry_clamp = 48;
   profile.driven_clamp = 192;
   profile.origin = GeodeticOrigin{49'013'000'000, -8'400'000'000, 115'000};
   return profile;

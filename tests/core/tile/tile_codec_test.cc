@@ -103,7 +103,7 @@ TEST(TileCodecTest, RefusesTrailingBytesOtherProfilesAndNewerVersions) {
   blob.push_back(0);
   EXPECT_EQ(DecodeError(blob), StatusCode::kInvalidData);
   blob.pop_back();
-  blob[4] = 2;
+  blob[4] = 3;
   EXPECT_EQ(DecodeError(blob), StatusCode::kUnsupported);
 }
 
@@ -157,7 +157,7 @@ TEST(TileCodecTest, RefusesLayersAndContributorsOutOfOrder) {
 TEST(TileCodecTest, GoldenFileReadsAndEncodesEqual) {
   const MapProfile profile = testing::GoldenProfile();
   const Tile tile = RandomTile({2, -5, 77}, profile, 42);
-  const Bytes golden = testing::GoldenFile("tile_v1.bin", EncodeTile(tile, profile).blob);
+  const Bytes golden = testing::GoldenFile("tile_v2.bin", EncodeTile(tile, profile).blob);
   const auto decoded = DecodeTile(golden, profile);
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message();
   EXPECT_EQ(*decoded, tile);

@@ -1,0 +1,29 @@
+// A segment beside those of other stretches in one cell.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/fusion/segment.h"
+
+namespace atlas {
+
+struct SegmentView {
+  const Segment* segment = nullptr;
+  std::span<const std::int16_t> column;
+  std::int64_t last_time_ms = 0;  // of the keyframe that saw it last
+  std::uint32_t stretch = 0;      // its place in canonical order
+  std::uint32_t session = 0;      // FusionStretch's numbers
+  std::uint32_t vehicle = 0;
+};
+
+// By the keyframe that saw it last: its time, then vehicle, session and sequence.
+inline bool WasSeenEarlier(const SegmentView& a, const SegmentView& b) {
+  if (a.last_time_ms != b.last_time_ms) {
+    return a.last_time_ms < b.last_time_ms;
+  }
+  return a.stretch != b.stretch ? a.stretch < b.stretch
+                                : a.segment->last_frame < b.segment->last_frame;
+}
+
+}  // namespace atlas

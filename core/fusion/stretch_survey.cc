@@ -1,0 +1,126 @@
+#include "core/fusion/stretch_survey.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cstdlib>
+#include <limits>
+
+#include "core/tile/column_lattice.h"
+
+namespace atlas {
+namespace {
+
+std::int16_t AddSaturating(int a, int b, int clamp) {
+  return static_cast<std::int16_t>(std::clamp(a + b, -clamp, clamp));
+}
+
+void SetRepresentative(const Observation& observation, Segment& segment) {
+  segment.altitude_mm = observation.altitude_mm;
+  segment.distance_step = observation.distance_step;
+  segment.source = observation.source;
+}
+
+}  // namespace
+
+StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
+    : profile_(profile),
+      band_(band),
+      lanes_(ColumnLanes(profile.column_segments)),
+      clamp_{profile.stretch_clamp, profile.driven_clamp},
+      occupancy_units_{0, profile.miss_units, profile.hit_units},
+      heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone) {}
+
+std::size_t StretchSurvey::bytes() const {
+  return sizeof(*this) + frames_.capacity() * sizeof(StretchFrame) +
+         heads_.capacity() * sizeof(std::uint32_t) + segments_.capacity() * sizeof(Segment) +
+         columns_.capacity() * sizeof(std::int16_t);
+}
+
+void StretchSurvey::Add(const FrameOnMap& frame,
+                        const Keyframe& keyframe,
+                        const SigmaTable& sigmas) {
+  assert(frames_.empty() || frames_.back().sequence < frame.key.sequence);
+  AddFrame({frame.key.sequence, frame.time_ms});
+  const FrameResampler resampler(frame, keyframe, sigmas, profile_);
+  resampler.Visit(band_, [&](std::size_t cell, const Observation& observation) {
+    Join(cell, observation, sigmas.Weight(observation.source, observation.distance_step));
+  });
+}
+
+// An observation belongs to the segment whose representative is nearest in altitude (the paper's
+// eq. 2), if one layer may reach that far. What was guessed says nothing of the altitude where
+// ground was measured, but lends its occupancy and column to the nearest ground.
+void StretchSurvey::Join(std::size_t cell, const Observation& observation, std::int64_t weight) {
+  const auto frame = static_cast<std::uint32_t>(frames_.size() - 1);
+  if (!observation.is_strong()) {
+    const Nearest ground = Find(cell, observation.altitude_mm, true);
+    if (ground.distance_mm < profile_.other_layer_mm) {
+      AddEvidence(observation, 0, frame, ground.segment);
+      return;
+    }
+  }
+  Nearest nearest = Find(cell, observation.altitude_mm, observation.is_strong());
+  if (nearest.distance_mm > profile_.same_layer_mm && nearest.alike < kMaxCellSegments) {
+    nearest.segment = AddSegment(cell, observation, observation.is_strong());
+  } else if (observation.distance_step < segments_[nearest.segment].distance_step) {
+    SetRepresentative(observation, segments_[nearest.segment]);  // of two equally near the first
+  }
+  AddEvidence(observation, weight, frame, nearest.segment);
+}
+
+StretchSurvey::Nearest StretchSurvey::Find(std::size_t cell,
+                                           std::int32_t altitude_mm,
+                                           bool is_strong) const {
+  Nearest nearest;
+  for (std::uint32_t i = heads_[cell]; i != Segment::kNone; i = segments_[i].next) {
+    if (segments_[i].is_strong == is_strong) {
+      const std::int64_t distance_mm =
+          std::abs(std::int64_t{segments_[i].altitude_mm} - altitude_mm);
+      ++nearest.alike;
+      if (distance_mm < nearest.distance_mm) {
+        nearest.segment = i;
+        nearest.distance_mm = distance_mm;
+      }
+    }
+  }
+  return nearest;
+}
+
+std::uint32_t StretchSurvey::AddSegment(std::size_t cell,
+                                        const Observation& representative,
+                                        bool is_strong) {
+  const auto index = static_cast<std::uint32_t>(segments_.size());
+  Segment segment;
+  segment.reference_mm = representative.altitude_mm;
+  SetRepresentative(representative, segment);
+  segment.is_strong = is_strong;
+  segment.column_base = ColumnBaseIndex(representative.altitude_mm, profile_) - kColumnMargin;
+  segment.next = heads_[cell];
+  heads_[cell] = index;
+  segments_.push_back(segment);
+  columns_.resize(columns_.size() + lanes_);
+  return index;
+}
+
+void StretchSurvey::AddEvidence(const Observation& observation,
+                                std::int64_t weight,
+                                std::uint32_t frame,
+                                std::uint32_t index) {
+  Segment& segment = segments_[index];
+  segment.weight += weight;
+  segment.moment += weight * (observation.altitude_mm - segment.reference_mm);
+  if (segment.observations < std::numeric_limits<std::uint16_t>::max()) {
+    ++segment.observations;
+  }
+  segment.last_frame = frame;
+  segment.is_strong |= observation.is_strong();
+  segment.occupancy = AddSaturating(
+      segment.occupancy, occupancy_units_[static_cast<std::size_t>(observation.occupancy)],
+      clamp_.usual);
+  if (observation.column != 0) {
+    AddNibbles(observation.column, std::int64_t{observation.column_base} - segment.column_base,
+               clamp_, std::span(columns_).subspan(index * lanes_, lanes_), segment.column_seen);
+  }
+}
+
+}  // namespace atlas

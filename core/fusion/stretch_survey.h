@@ -1,0 +1,80 @@
+// What one stretch of a session saw of a band of a tile: the segments of its cells.
+//
+// A stretch is the keyframes of one session whose sequence numbers agree but for their last bits
+// (`stretch_keyframes`). Its survey depends on its keyframes and their poses alone, whatever the
+// other sessions say: a change of one stretch leaves the others' surveys as they are, and a
+// keyframe that follows the last one is simply added.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/fusion/column_evidence.h"
+#include "core/fusion/frame_resampler.h"
+#include "core/fusion/observation.h"
+#include "core/fusion/segment.h"
+#include "core/fusion/sigma_table.h"
+
+namespace atlas {
+
+// The keyframes of a stretch in the order they were taken.
+struct StretchFrame {
+  std::uint32_t sequence = 0;
+  std::int64_t time_ms = 0;
+};
+
+class StretchSurvey {
+ public:
+  // A cell has no more segments of a kind and stretch: a bound on what hostile vehicles can make of
+  // it.
+  static constexpr std::uint32_t kMaxCellSegments = 32;
+
+  StretchSurvey(const TileBand& band, const MapProfile& profile);
+
+  // Adds a keyframe's observations. Sequence numbers must rise from call to call.
+  void Add(const FrameOnMap& frame, const Keyframe& keyframe, const SigmaTable& sigmas);
+
+  // The same by hand: frames, then segments and the observations that belong to them.
+  void AddFrame(const StretchFrame& frame) { frames_.push_back(frame); }
+  std::uint32_t AddSegment(std::size_t cell, const Observation& representative, bool is_strong);
+  void AddEvidence(const Observation& observation,
+                   std::int64_t weight,
+                   std::uint32_t frame,
+                   std::uint32_t segment);
+
+  std::span<const StretchFrame> frames() const { return frames_; }
+  bool is_empty() const { return segments_.empty(); }
+  std::size_t bytes() const;
+
+  // First segment of a cell, the next by Segment::next, or Segment::kNone. Cells row by row.
+  std::uint32_t First(std::size_t cell) const { return heads_[cell]; }
+  const Segment& At(std::uint32_t segment) const { return segments_[segment]; }
+  std::span<const std::int16_t> Column(std::uint32_t segment) const {
+    return std::span(columns_).subspan(segment * lanes_, lanes_);
+  }
+
+ private:
+  // Of a cell's segments of one kind the nearest to an altitude, the later one of two.
+  struct Nearest {
+    std::uint32_t segment = Segment::kNone;
+    std::uint32_t alike = 0;  // segments of the kind
+    std::int64_t distance_mm = std::numeric_limits<std::int64_t>::max();
+  };
+
+  void Join(std::size_t cell, const Observation& observation, std::int64_t weight);
+  Nearest Find(std::size_t cell, std::int32_t altitude_mm, bool is_strong) const;
+
+  const MapProfile profile_;
+  TileBand band_;
+  std::size_t lanes_;
+  EvidenceClamp clamp_;
+  std::array<std::int16_t, 3> occupancy_units_;  // by Occupancy
+  std::vector<StretchFrame> frames_;
+  std::vector<std::uint32_t> heads_;  // by cell of the band
+  std::vector<Segment> segments_;
+  std::vector<std::int16_t> columns_;  // lanes_ a segment
+};
+
+}  // namespace atlas

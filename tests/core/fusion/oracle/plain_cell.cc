@@ -1,0 +1,348 @@
+#include "tests/core/fusion/oracle/plain_cell.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <tuple>
+
+#include "core/base/integer_math.h"
+#include "core/fusion/cell_layers.h"
+#include "core/geometry/nibble.h"
+#include "core/tile/layer_association.h"
+
+namespace atlas::testing {
+namespace {
+
+constexpr std::size_t kMaxSegments = 32;  // of one stretch and kind in a cell
+constexpr int kMargin = 4;                // of a stretch's column, below and above
+
+bool SameStretch(const PlacedKeyframe& a, const PlacedKeyframe& b, const MapProfile& profile) {
+  return a.key.sequence / profile.stretch_keyframes == b.key.sequence / profile.stretch_keyframes &&
+         (a.key.session == b.key.session);
+}
+
+// A later stretch's say on top of what was known.
+int Folded(int sum, int said, const MapProfile& profile) {
+  if (said == 0) {
+    return sum;
+  }
+  const int say = std::clamp<int>(said, -profile.stretch_clamp, profile.stretch_clamp);
+  const int carried = std::clamp<int>(sum, -profile.carry_clamp, profile.carry_clamp);
+  return std::clamp<int>(carried + say, -profile.evidence_clamp, profile.evidence_clamp);
+}
+
+}  // namespace
+
+void PlainCell::Fuse(std::span<const PlainObservation> observations,
+                     std::vector<const SessionKey*>& used,
+                     std::vector<TileLayer>& out) {
+  FindSegments(observations);
+  if (profile_.preset == FusionPreset::kBounded) {
+    KeepLatest();
+  }
+  const bool any_strong = std::any_of(segments_.begin(), segments_.end(), [](const Segment& s) {
+    return s.is_kept && s.representative->is_strong();
+  });
+  ChainLayers(!any_strong);
+  for (Layer& layer : layers_) {
+    SumLayer(layer);
+  }
+  KeepBestLayers();
+  if (any_strong) {
+    AdoptWeak();
+  }
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    out.push_back(Publish(i));
+  }
+  for (const Segment& segment : segments_) {
+    const SessionKey* key = &segment.first->key.session;
+    if (segment.layer >= 0 && (used.empty() || used.back() != key)) {
+      used.push_back(key);
+    }
+  }
+}
+
+void PlainCell::FindSegments(std::span<const PlainObservation> observations) {
+  segments_.clear();
+  std::size_t stretch_begin = 0;
+  const PlacedKeyframe* previous = nullptr;
+  for (const PlainObservation& observation : observations) {
+    if (previous == nullptr || !SameStretch(*previous, *observation.placed, profile_)) {
+      stretch_begin = segments_.size();
+    }
+    previous = observation.placed;
+    const Nearest ground = FindNearest(observation.altitude_mm, true, stretch_begin);
+    if (!observation.is_strong() && ground.segment != nullptr &&
+        ground.distance_mm < profile_.other_layer_mm) {
+      AddTo(observation, 0, *ground.segment);  // its occupancy and column, not its altitude
+      continue;
+    }
+    Segment& segment = SegmentFor(observation, stretch_begin);
+    if (segment.representative == nullptr ||
+        observation.distance_step < segment.representative->distance_step) {
+      segment.representative = &observation;
+    }
+    AddTo(observation, sigmas_.Weight(observation.source, observation.distance_step), segment);
+  }
+}
+
+// Of the stretch's segments of a kind the one nearest in altitude, the later one of two.
+PlainCell::Nearest PlainCell::FindNearest(std::int64_t altitude_mm,
+                                          bool is_strong,
+                                          std::size_t stretch_begin) {
+  Nearest nearest;
+  for (std::size_t i = segments_.size(); i-- > stretch_begin;) {
+    Segment& segment = segments_[i];
+    const std::int64_t distance_mm = std::abs(segment.representative->altitude_mm - altitude_mm);
+    if (segment.representative->is_strong() == is_strong) {
+      ++nearest.alike;
+      if (nearest.segment == nullptr || distance_mm < nearest.distance_mm) {
+        nearest.segment = &segment;
+        nearest.distance_mm = distance_mm;
+      }
+    }
+  }
+  return nearest;
+}
+
+// A new one when none is near enough.
+PlainCell::Segment& PlainCell::SegmentFor(const PlainObservation& observation,
+                                          std::size_t stretch_begin) {
+  const Nearest nearest =
+      FindNearest(observation.altitude_mm, observation.is_strong(), stretch_begin);
+  if (nearest.segment != nullptr &&
+      (nearest.distance_mm <= profile_.same_layer_mm || nearest.alike == kMaxSegments)) {
+    return *nearest.segment;
+  }
+  Segment& segment = segments_.emplace_back();
+  segment.first = observation.placed;
+  segment.column_base = ColumnBaseIndex(observation.altitude_mm, profile_) - kMargin;
+  return segment;
+}
+
+void PlainCell::AddTo(const PlainObservation& observation,
+                      std::int64_t weight,
+                      Segment& segment) const {
+  segment.last = observation.placed;
+  segment.weight += weight;
+  segment.weighted_mm += weight * observation.altitude_mm;
+  ++segment.observations;
+  const int units = observation.occupancy == Occupancy::kObstacle ? profile_.hit_units
+                    : observation.occupancy == Occupancy::kFree   ? profile_.miss_units
+                                                                  : 0;
+  segment.occupancy =
+      std::clamp<int>(segment.occupancy + units, -profile_.stretch_clamp, profile_.stretch_clamp);
+  if (observation.column != 0) {
+    AddColumn(observation, segment);
+  }
+}
+
+void PlainCell::AddColumn(const PlainObservation& observation, Segment& segment) const {
+  const int kept = profile_.column_segments <= 8 ? 16 : 24;
+  for (int nibble = 0; nibble < profile_.column_segments; ++nibble) {
+    const std::uint8_t state = NibbleAt(observation.column, nibble);
+    const std::int64_t k = std::int64_t{observation.column_base} + nibble - segment.column_base;
+    if (state == 0 || k < 0 || k >= kept) {
+      continue;
+    }
+    int& sum = segment.column[static_cast<std::size_t>(k)];
+    segment.is_seen[static_cast<std::size_t>(k)] = true;
+    const int floor = std::min<int>(sum, -profile_.stretch_clamp);
+    sum = state == kNibbleFree
+              ? -profile_.driven_clamp
+              : std::clamp<int>(sum + kNibbleEvidence[state], floor, profile_.stretch_clamp);
+  }
+}
+
+// Preset bounded: in each band of altitude the stretches that saw it last, so many of a vehicle.
+void PlainCell::KeepLatest() {
+  std::vector<Segment*> latest_first;
+  for (Segment& segment : segments_) {
+    segment.is_kept = false;
+    latest_first.push_back(&segment);
+  }
+  std::stable_sort(
+      latest_first.begin(), latest_first.end(), [](const Segment* a, const Segment* b) {
+        return std::tie(a->last->time_ms, a->last->key) > std::tie(b->last->time_ms, b->last->key);
+      });
+  const auto band = [&](const Segment& s) {
+    return FloorDiv(s.representative->altitude_mm, profile_.band_mm);
+  };
+  for (Segment* segment : latest_first) {
+    int of_all = 0;
+    int of_vehicle = 0;
+    for (const Segment* other : latest_first) {
+      if (other->is_kept && band(*other) == band(*segment)) {
+        ++of_all;
+        of_vehicle += other->first->key.session.vehicle == segment->first->key.session.vehicle;
+      }
+    }
+    segment->is_kept =
+        of_all < profile_.band_segments && of_vehicle < profile_.band_vehicle_segments;
+  }
+}
+
+// Eq. 1.
+void PlainCell::ChainLayers(bool all_make) {
+  makers_.clear();
+  layers_.clear();
+  for (Segment& segment : segments_) {
+    segment.layer = -1;
+    if (segment.is_kept && (all_make || segment.representative->is_strong())) {
+      makers_.push_back(&segment);
+    }
+  }
+  std::stable_sort(makers_.begin(), makers_.end(), [](const Segment* a, const Segment* b) {
+    return a->representative->altitude_mm < b->representative->altitude_mm;
+  });
+  const auto estimate = [&](const Segment& s) {
+    return AltitudeEstimate{
+        s.representative->altitude_mm,
+        sigmas_.Sigma100um(s.representative->source, s.representative->distance_step)};
+  };
+  const Segment* lowest = nullptr;
+  const Segment* previous = nullptr;
+  for (Segment* segment : makers_) {
+    const AltitudeEstimate next = estimate(*segment);
+    bool is_same = false;
+    if (previous != nullptr) {
+      const std::int64_t step = next.altitude_mm - estimate(*previous).altitude_mm;
+      const std::int64_t span = next.altitude_mm - estimate(*lowest).altitude_mm;
+      is_same = span <= profile_.layer_span_mm &&
+                (step <= profile_.same_layer_mm ||
+                 (step < profile_.other_layer_mm && OverlapsAsOneLayer(estimate(*previous), next)));
+    }
+    if (!is_same) {
+      layers_.push_back({static_cast<int>(layers_.size())});
+      lowest = segment;
+    }
+    segment->layer = layers_.back().chained;
+    previous = segment;
+  }
+}
+
+// Eq. 3, one vehicle at a time for the cap.
+void PlainCell::SumLayer(Layer& layer) const {
+  std::int64_t reference_mm = 0;  // the lowest representative's altitude
+  for (const Segment* segment : makers_) {
+    if (segment->layer == layer.chained) {
+      reference_mm = segment->representative->altitude_mm;
+      break;
+    }
+  }
+  std::int64_t moment = 0;
+  for (std::size_t i = 0; i < segments_.size();) {
+    std::int64_t vehicle_weight = 0;
+    std::int64_t vehicle_moment = 0;
+    const std::string& vehicle = segments_[i].first->key.session.vehicle;
+    for (; i < segments_.size() && segments_[i].first->key.session.vehicle == vehicle; ++i) {
+      const Segment& segment = segments_[i];
+      if (segment.layer == layer.chained) {
+        vehicle_weight += segment.weight;
+        vehicle_moment += segment.weighted_mm - segment.weight * reference_mm;
+        layer.observations += segment.observations;
+        layer.time_ms = std::max(layer.time_ms, segment.last->time_ms);
+        layer.is_measured |= segment.representative->is_strong();
+      }
+    }
+    if (vehicle_weight > kVehicleWeightCap) {
+      vehicle_moment = RoundDiv128(Int128{vehicle_moment} * kVehicleWeightCap, vehicle_weight);
+      vehicle_weight = kVehicleWeightCap;
+    }
+    layer.weight += vehicle_weight;
+    moment += vehicle_moment;
+  }
+  layer.altitude_mm = reference_mm + RoundDiv(moment, layer.weight);
+}
+
+void PlainCell::KeepBestLayers() {
+  std::stable_sort(layers_.begin(), layers_.end(),
+                   [](const Layer& a, const Layer& b) { return a.observations > b.observations; });
+  layers_.resize(std::min(layers_.size(), kMaxCellLayers));
+  std::sort(layers_.begin(), layers_.end(), [](const Layer& a, const Layer& b) {
+    return std::pair(a.altitude_mm, a.chained) < std::pair(b.altitude_mm, b.chained);
+  });
+  for (Segment& segment : segments_) {
+    const auto found = std::find_if(layers_.begin(), layers_.end(), [&](const Layer& layer) {
+      return layer.chained == segment.layer;
+    });
+    segment.layer = found == layers_.end() ? -1 : static_cast<int>(found - layers_.begin());
+  }
+}
+
+void PlainCell::AdoptWeak() {
+  for (Segment& segment : segments_) {
+    if (!segment.is_kept || segment.representative->is_strong()) {
+      continue;
+    }
+    std::int64_t nearest_mm = profile_.other_layer_mm;
+    for (std::size_t i = 0; i < layers_.size(); ++i) {
+      const std::int64_t distance_mm =
+          std::abs(layers_[i].altitude_mm - segment.representative->altitude_mm);
+      if (distance_mm < nearest_mm) {
+        nearest_mm = distance_mm;
+        segment.layer = static_cast<int>(i);
+      }
+    }
+    if (segment.layer >= 0) {
+      layers_[static_cast<std::size_t>(segment.layer)].observations += segment.observations;
+    }
+  }
+}
+
+TileLayer PlainCell::Publish(std::size_t index) const {
+  std::vector<const Segment*> in_order;
+  for (const Segment& segment : segments_) {
+    if (segment.layer == static_cast<int>(index)) {
+      in_order.push_back(&segment);
+    }
+  }
+  std::stable_sort(in_order.begin(), in_order.end(), [](const Segment* a, const Segment* b) {
+    return a->last->time_ms < b->last->time_ms;
+  });
+  const Layer& layer = layers_[index];
+  int occupancy = 0;
+  for (const Segment* segment : in_order) {
+    occupancy = Folded(occupancy, segment->occupancy, profile_);
+  }
+  TileLayer out;
+  out.altitude_mm = static_cast<std::int32_t>(layer.altitude_mm);
+  out.sigma_100um = sigmas_.SigmaOfWeight100um(layer.weight);
+  out.occupancy = static_cast<std::int8_t>(occupancy);
+  out.flags = static_cast<std::uint8_t>(
+      (occupancy < 0 ? TileLayer::kTraversable + TileLayer::kTraversableAny : 0) +
+      (layer.is_measured ? TileLayer::kMeasured : 0));
+  out.observations = static_cast<std::uint16_t>(std::min<std::int64_t>(layer.observations, 65'535));
+  out.confirmed_s = static_cast<std::uint32_t>(
+      std::clamp<std::int64_t>(FloorDiv(layer.time_ms, 1'000), 0, 0xFFFFFFFF));
+  out.column = PublishColumn(in_order, index);
+  return out;
+}
+
+std::uint64_t PlainCell::PublishColumn(std::span<const Segment* const> in_order,
+                                       std::size_t index) const {
+  const auto altitude_mm = static_cast<std::int32_t>(layers_[index].altitude_mm);
+  std::uint64_t column = 0;
+  for (int k = 0; k < profile_.column_segments; ++k) {
+    const std::int64_t lattice = std::int64_t{ColumnBaseIndex(altitude_mm, profile_)} + k;
+    if (index + 1 < layers_.size() &&
+        (lattice + 1) * profile_.segment_height_mm >
+            layers_[index + 1].altitude_mm - profile_.slab_margin_mm) {
+      break;  // it would reach into the slab of the next layer
+    }
+    int sum = 0;
+    bool is_seen = false;
+    for (const Segment* segment : in_order) {
+      const std::int64_t own = lattice - segment->column_base;
+      if (own >= 0 && own < 24 && segment->is_seen[static_cast<std::size_t>(own)]) {
+        is_seen = true;
+        sum = Folded(sum, segment->column[static_cast<std::size_t>(own)], profile_);
+      }
+    }
+    if (is_seen) {
+      column |= std::uint64_t{NibbleFromEvidence(sum)} << (4 * k);
+    }
+  }
+  return column;
+}
+
+}  // namespace atlas::testing
