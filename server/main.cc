@@ -86,7 +86,9 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   ServiceOptions options;
   options.fusion.workers = config.workers > 0 ? static_cast<unsigned>(config.workers)
                                               : std::max(1U, std::thread::hardware_concurrency());
-  options.fusion.cache_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
+  options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
+  const std::size_t survey_bytes = static_cast<std::size_t>(config.survey_mib) << 20;
+  options.fusion.building.surveys = {survey_bytes / 3, survey_bytes - survey_bytes / 3};
   return options;
 }
 

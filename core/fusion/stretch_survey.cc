@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cassert>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 
+#include "core/base/compression.h"
 #include "core/tile/column_lattice.h"
 
 namespace atlas {
@@ -20,6 +22,27 @@ void SetRepresentative(const Observation& observation, Segment& segment) {
   segment.source = observation.source;
 }
 
+constexpr int kPackLevel = 1;
+
+template <typename T>
+std::size_t ByteSize(const std::vector<T>& values) {
+  return values.size() * sizeof(T);
+}
+
+template <typename T>
+void Append(const std::vector<T>& values, Bytes& out) {
+  const std::size_t begin = out.size();
+  out.resize(begin + ByteSize(values));
+  std::memcpy(out.data() + begin, values.data(), ByteSize(values));
+}
+
+// Fills `values` from the front of `rest`.
+template <typename T>
+void Take(std::vector<T>& values, ByteSpan& rest) {
+  std::memcpy(values.data(), rest.data(), ByteSize(values));
+  rest = rest.subspan(ByteSize(values));
+}
+
 }  // namespace
 
 StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
@@ -33,7 +56,43 @@ StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
 std::size_t StretchSurvey::bytes() const {
   return sizeof(*this) + frames_.capacity() * sizeof(StretchFrame) +
          heads_.capacity() * sizeof(std::uint32_t) + segments_.capacity() * sizeof(Segment) +
-         columns_.capacity() * sizeof(std::int16_t);
+         columns_.capacity() * sizeof(std::int16_t) + packed_.capacity();
+}
+
+void StretchSurvey::Pack() {
+  if (!packed_.empty()) {
+    return;
+  }
+  Bytes plain;
+  plain.reserve(sizeof(std::uint64_t) + ByteSize(heads_) + ByteSize(segments_) +
+                ByteSize(columns_));
+  Append(std::vector<std::uint64_t>{segments_.size()}, plain);
+  Append(heads_, plain);
+  Append(segments_, plain);
+  Append(columns_, plain);
+  packed_ = Compress(plain, kPackLevel);
+  packed_size_ = plain.size();
+  packed_.shrink_to_fit();
+  heads_ = {};
+  segments_ = {};
+  columns_ = {};
+}
+
+void StretchSurvey::Unpack() {
+  if (packed_.empty()) {
+    return;
+  }
+  const Bytes plain = *Decompress(packed_, packed_size_);  // made by Pack() in this process
+  ByteSpan rest = plain;
+  std::vector<std::uint64_t> count(1);
+  Take(count, rest);
+  heads_.resize(static_cast<std::size_t>(band_.rows) * profile_.tile_cells);
+  Take(heads_, rest);
+  segments_.resize(count[0]);
+  Take(segments_, rest);
+  columns_.resize(count[0] * lanes_);
+  Take(columns_, rest);
+  packed_ = {};
 }
 
 void StretchSurvey::Add(const FrameOnMap& frame,

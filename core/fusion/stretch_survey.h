@@ -6,11 +6,15 @@
 // keyframe that follows the last one is simply added.
 #pragma once
 
+#include <array>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "core/base/bytes.h"
 #include "core/fusion/column_evidence.h"
 #include "core/fusion/frame_resampler.h"
 #include "core/fusion/observation.h"
@@ -44,9 +48,13 @@ class StretchSurvey {
                    std::uint32_t frame,
                    std::uint32_t segment);
 
+  const TileBand& band() const { return band_; }
   std::span<const StretchFrame> frames() const { return frames_; }
-  bool is_empty() const { return segments_.empty(); }
   std::size_t bytes() const;
+
+  // Compresses the segments; they come back with Unpack(), which comes before anything else.
+  void Pack();
+  void Unpack();
 
   // First segment of a cell, the next by Segment::next, or Segment::kNone. Cells row by row.
   std::uint32_t First(std::size_t cell) const { return heads_[cell]; }
@@ -66,7 +74,7 @@ class StretchSurvey {
   void Join(std::size_t cell, const Observation& observation, std::int64_t weight);
   Nearest Find(std::size_t cell, std::int32_t altitude_mm, bool is_strong) const;
 
-  const MapProfile profile_;
+  MapProfile profile_;
   TileBand band_;
   std::size_t lanes_;
   EvidenceClamp clamp_;
@@ -75,6 +83,8 @@ class StretchSurvey {
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;
   std::vector<std::int16_t> columns_;  // lanes_ a segment
+  Bytes packed_;                       // instead of heads_, segments_ and columns_
+  std::size_t packed_size_ = 0;        // of what it unpacks to
 };
 
 }  // namespace atlas

@@ -5,8 +5,7 @@
 #include <utility>
 
 #include "core/fusion/fusion_stretch.h"
-#include "core/fusion/paper_survey.h"
-#include "core/fusion/stretch_survey.h"
+#include "core/fusion/survey_frames.h"
 #include "core/fusion/tile_combiner.h"
 
 namespace atlas {
@@ -70,33 +69,13 @@ class TileFuser {
     surveys.reserve(stretches.size());
     std::vector<SurveyedStretch> surveyed;
     for (const FusionStretch& stretch : stretches) {
-      auto survey = Survey(band, stretch);
-      if (!survey) {
-        return survey.error();
-      }
-      surveys.push_back(*std::move(survey));
-      surveyed.push_back({&surveys.back(), stretch.session, stretch.vehicle});
+      StretchSurvey& survey = surveys.emplace_back(band, profile_);
+      ATLAS_RETURN_IF_ERROR(
+          SurveyFrames(stretch.frames, frames_, source_, {profile_, sigmas_}, survey));
+      surveyed.push_back({&survey, stretch.session, stretch.vehicle});
     }
     combiner.Combine(band, surveyed, tile);
     return {};
-  }
-
-  Result<StretchSurvey> Survey(const TileBand& band, const FusionStretch& stretch) const {
-    PaperSurvey paper(band, sigmas_, profile_);
-    StretchSurvey survey(band, profile_);
-    const bool is_paper = profile_.preset == FusionPreset::kPaper;
-    for (const std::size_t i : stretch.frames) {
-      const auto keyframe = source_(i);
-      if (!keyframe) {
-        return Error(keyframe.error());
-      }
-      if (is_paper) {
-        paper.Add(frames_[i], **keyframe);
-      } else {
-        survey.Add(frames_[i], **keyframe, sigmas_);
-      }
-    }
-    return is_paper ? paper.Finish() : std::move(survey);
   }
 
   static void NameContributors(std::span<const FusionStretch> stretches,

@@ -21,6 +21,7 @@ struct FrameOnMap {
   std::int64_t time_ms = 0;
   KeyframePlacement placement;
   GridGeometry grid;
+  std::uint64_t content = 0;  // names the cells: equal for equal keys means the same keyframe
 };
 
 // The cells of frame `index`, whose grid is what the frame says; asked for one at a time.

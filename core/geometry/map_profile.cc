@@ -1,5 +1,8 @@
 #include "core/geometry/map_profile.h"
 
+#include <algorithm>
+#include <array>
+
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
 
@@ -7,6 +10,7 @@ namespace atlas {
 namespace {
 
 constexpr std::uint8_t kProfileVersion = 2;
+constexpr std::array<std::string_view, 3> kPresetNames = {"paper", "strict", "bounded"};
 
 Status OutOfRange(const char* field, double value, const char* range) {
   return Status(StatusCode::kInvalidArgument,
@@ -115,6 +119,18 @@ std::optional<GeodeticOrigin> DecodeOrigin(ByteReader& in) {
 }
 
 }  // namespace
+
+std::string_view FusionPresetName(FusionPreset preset) {
+  return kPresetNames[static_cast<std::size_t>(preset)];
+}
+
+std::optional<FusionPreset> FusionPresetByName(std::string_view name) {
+  const auto found = std::find(kPresetNames.begin(), kPresetNames.end(), name);
+  if (found == kPresetNames.end()) {
+    return std::nullopt;
+  }
+  return static_cast<FusionPreset>(found - kPresetNames.begin());
+}
 
 Status MapProfile::Validate() const {
   ATLAS_RETURN_IF_ERROR(ValidateGrid(*this));

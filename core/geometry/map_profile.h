@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "core/base/bytes.h"
 #include "core/base/status.h"
@@ -16,6 +17,10 @@ enum class FusionPreset : std::uint8_t {
   kStrict = 1,   // with gates on what is one layer; the default
   kBounded = 2,  // strict over the latest stretches: its cost does not grow with the passes
 };
+
+// "paper", "strict", "bounded"; nothing for another name.
+std::string_view FusionPresetName(FusionPreset preset);
+std::optional<FusionPreset> FusionPresetByName(std::string_view name);
 
 // WGS84 coordinates of the world frame's origin.
 struct GeodeticOrigin {

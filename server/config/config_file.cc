@@ -17,15 +17,16 @@ struct Key {
   bool is_number;  // else a text
 };
 
-constexpr std::array<Key, 9> kKeys = {{{"listen", false},
-                                       {"data", false},
-                                       {"workers", true},
-                                       {"cache_mib", true},
-                                       {"log_level", false},
-                                       {"map.cell_size", true},
-                                       {"map.segments", true},
-                                       {"map.segment_height", true},
-                                       {"map.preset", false}}};
+constexpr std::array<Key, 10> kKeys = {{{"listen", false},
+                                        {"data", false},
+                                        {"workers", true},
+                                        {"cache_mib", true},
+                                        {"survey_mib", true},
+                                        {"log_level", false},
+                                        {"map.cell_size", true},
+                                        {"map.segments", true},
+                                        {"map.segment_height", true},
+                                        {"map.preset", false}}};
 
 using Settings = std::map<std::string, GivenSetting>;
 

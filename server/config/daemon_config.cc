@@ -29,13 +29,15 @@ constexpr Setting kSettings[] = {
      "HOST:PORT, loopback only; port 0 takes a free one (127.0.0.1:7447)"},
     {"workers", "--workers", "ATLASD_WORKERS", "fusion threads; 0 is one a core (0)"},
     {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "memory for decoded keyframes (128)"},
+    {"survey_mib", "--survey-mib", "ATLASD_SURVEY_MIB",
+     "memory for what tiles keep from one fusion to the next (384)"},
     {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "debug, info, warning or error (info)"},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "new atlas: metres a cell (0.1)"},
     {"map.segments", "--segments", "ATLASD_SEGMENTS",
      "new atlas: segments a column: 2, 4, 8 or 16 (8)"},
     {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT",
      "new atlas: metres a segment (1)"},
-    {"map.preset", "--preset", "ATLASD_PRESET", "new atlas: fusion preset: strict (strict)"},
+    {"map.preset", "--preset", "ATLASD_PRESET", "new atlas: fusion preset: strict, bounded or paper (strict)"},
 };
 
 using Settings = std::map<std::string, GivenSetting>;
@@ -116,6 +118,9 @@ Status Apply(const std::string& key, const std::string& text, DaemonConfig& conf
   if (key == "cache_mib") {
     return ApplyCount(key, text, 8, 65'536, config.cache_mib);
   }
+  if (key == "survey_mib") {
+    return ApplyCount(key, text, 0, 1'048'576, config.survey_mib);
+  }
   if (key == "log_level") {
     return ApplyLogLevel(text, config);
   }
@@ -128,8 +133,8 @@ Status Apply(const std::string& key, const std::string& text, DaemonConfig& conf
   if (key == "map.segment_height") {
     return ApplyNumber(key, text, config.segment_height_m);
   }
-  if (text != "strict") {
-    return BadValue("preset", text, "strict");
+  if (!FusionPresetByName(text)) {
+    return BadValue("preset", text, "strict, bounded or paper");
   }
   config.preset = text;
   return {};
@@ -169,6 +174,9 @@ Result<MapProfile> DaemonConfig::NewProfile() const {
   if (segment_height_m) {
     profile.segment_height_mm = static_cast<std::uint16_t>(std::llround(*segment_height_m * 1e3));
   }
+  if (preset) {
+    profile.preset = *FusionPresetByName(*preset);  // checked when it was given
+  }
   const bool is_sane =
       (!cell_size_m || (*cell_size_m > 0.0 && *cell_size_m <= 100.0)) &&
       (!segments || (*segments > 0 && *segments <= 16)) &&
@@ -188,7 +196,7 @@ Status DaemonConfig::CheckAgainst(const MapProfile& existing) const {
   if (!asked) {
     return asked.error();
   }
-  const auto differs = [](const char* what, double have, double want) {
+  const auto differs = [](const char* what, const auto& have, const auto& want) {
     return Status(StatusCode::kInvalidData, StrCat("the atlas has a ", what, " of ", have, ", not ",
                                                    want, ": it is fixed when an atlas is made"));
   };
@@ -200,6 +208,9 @@ Status DaemonConfig::CheckAgainst(const MapProfile& existing) const {
   }
   if (segment_height_m && asked->segment_height_mm != existing.segment_height_mm) {
     return differs("segment height", existing.segment_height_m(), *segment_height_m);
+  }
+  if (preset && asked->preset != existing.preset) {
+    return differs("preset", FusionPresetName(existing.preset), *preset);
   }
   return {};
 }

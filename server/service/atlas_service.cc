@@ -263,7 +263,7 @@ Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience
     }
     AtlasVerifier::Options options;
     options.rebuild = rebuild;
-    options.cache_bytes = options_.verify_cache_bytes;
+    options.building = options_.verification;
     options.check_stop = [&] {
       return CheckRunning(patience.stop);
     };

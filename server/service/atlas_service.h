@@ -48,7 +48,8 @@ struct ServiceStatus {
 
 struct ServiceOptions {
   FusionOptions fusion;
-  std::size_t verify_cache_bytes = 128u << 20;
+  // Verification fuses from nothing: it keeps no surveys.
+  TileBuilderOptions verification{.surveys = {0, 0}};
 };
 
 // How long a call may wait, and what ends it earlier.

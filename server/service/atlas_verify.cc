@@ -31,7 +31,7 @@ Status CheckTileBlob(const StoredTile& tile, const MapProfile& profile) {
 }  // namespace
 
 AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
-    : store_(store), options_(std::move(options)), builder_(store, options_.cache_bytes) {}
+    : store_(store), options_(std::move(options)), builder_(store, options_.building) {}
 
 Result<VerifyReport> AtlasVerifier::Run() {
   for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyKeyframes,

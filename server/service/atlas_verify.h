@@ -26,7 +26,7 @@ class AtlasVerifier {
  public:
   struct Options {
     bool rebuild = false;
-    std::size_t cache_bytes = 128u << 20;
+    TileBuilderOptions building;
     std::size_t max_findings = 20;
     // Asked between tiles; a failed status ends the verification with it.
     std::function<Status()> check_stop;

@@ -32,7 +32,7 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
       clock_(std::move(clock)),
       log_(std::move(log)),
       options_(options),
-      builder_(store, options.cache_bytes) {
+      builder_(store, options.building) {
   for (unsigned i = 0; i < options_.workers; ++i) {
     threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
       RunWorker(stop, owner);

@@ -26,8 +26,8 @@ using WallClock = std::function<std::int64_t()>;  // ms since 1970
 
 struct FusionOptions {
   unsigned workers = 1;
-  std::size_t cache_bytes = 256u << 20;  // decoded keyframes, all workers together
-  std::uint32_t tiles_per_claim = 4;     // finished in one group commit
+  TileBuilderOptions building;
+  std::uint32_t tiles_per_claim = 4;  // finished in one group commit
   std::int64_t lease_ms = 120'000;
   std::int64_t min_backoff_ms = 1'000;  // doubled with each failure of a tile
   std::int64_t max_backoff_ms = 60'000;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/str_cat.h"
+#include "core/fusion/fusion_stretch.h"
 #include "core/fusion/keyframe_placement.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/keyframe/keyframe_codec.h"
@@ -30,8 +31,13 @@ std::optional<TileContent> ToContent(const Tile& tile, const MapProfile& profile
 
 }  // namespace
 
-TileBuilder::TileBuilder(AtlasStore& store, std::size_t cache_bytes)
-    : store_(store), profile_(store.identity().profile), cache_(cache_bytes) {}
+TileBuilder::TileBuilder(AtlasStore& store, const TileBuilderOptions& options)
+    : store_(store),
+      profile_(store.identity().profile),
+      sigmas_(profile_, Keyframe::kMaxRadiusCells),
+      options_(options),
+      keyframes_(options.keyframe_bytes),
+      surveys_(options.surveys) {}
 
 Result<BuiltTile> TileBuilder::Build(const TileId& id) {
   return id.level == 0 ? BuildFromKeyframes(id) : BuildFromChildren(id);
@@ -49,11 +55,12 @@ Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
     if (!placement) {
       return Error(placement.error().WithContext(StrCat("keyframe ", record.key)));
     }
-    frames.push_back({record.key, record.time_ms, *placement, record.grid});
+    frames.push_back({record.key, record.time_ms, *placement, record.grid,
+                      static_cast<std::uint64_t>(record.id)});
   }
   const auto load = [&](std::size_t i) -> Result<KeyframeCache::Handle> {
     const KeyframeRecord& record = sources->keyframes[i];
-    auto keyframe = cache_.Get(record.id, [this](std::int64_t k) { return LoadKeyframe(k); });
+    auto keyframe = keyframes_.Get(record.id, [this](std::int64_t k) { return LoadKeyframe(k); });
     if (keyframe && (*keyframe)->grid != record.grid) {
       return Error(StatusCode::kInvalidData,
                    StrCat("keyframe ", record.key, ": its grid is not the one of its row"));
@@ -61,11 +68,41 @@ Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
     return keyframe ? keyframe
                     : Error(keyframe.error().WithContext(StrCat("keyframe ", record.key)));
   };
-  const auto tile = FuseTile(id, frames, load, profile_);
+  const auto tile = Fuse(id, frames, load);
   if (!tile) {
     return Error(tile.error());
   }
   return BuiltTile{sources->revision, ToContent(*tile, profile_)};
+}
+
+// From the surveys of the last time, where they are still there. They are taken out meanwhile: what
+// fails is lost, and two workers never share.
+Result<Tile> TileBuilder::Fuse(const TileId& id,
+                               std::span<const FrameOnMap> frames,
+                               const KeyframeSource& source) {
+  std::optional<TileSurveys> surveys = surveys_.Take(id);
+  if (!FitsInMemory(id, frames)) {
+    return FuseTile(id, frames, source, profile_, options_.tile_bytes);
+  }
+  if (!surveys) {
+    surveys.emplace(id);
+  }
+  const FusionContext context{profile_, sigmas_};
+  const auto work = surveys->Update(frames, source, context);
+  if (!work) {
+    return Error(work.error());
+  }
+  Tile tile = surveys->Combine(context);
+  surveys_.Put(*std::move(surveys));
+  return tile;
+}
+
+// Whether a tile's surveys, a segment or two a cell and stretch, may be held at once.
+bool TileBuilder::FitsInMemory(const TileId& id, std::span<const FrameOnMap> frames) const {
+  constexpr std::size_t kCellBytes = 128;
+  const std::size_t cells = std::size_t{profile_.tile_cells} * profile_.tile_cells;
+  return profile_.preset != FusionPreset::kPaper &&
+         CutStretches(id, frames, profile_).size() * cells * kCellBytes <= options_.tile_bytes;
 }
 
 Result<BuiltTile> TileBuilder::BuildFromChildren(const TileId& id) {

@@ -15,71 +15,17 @@
 #include "core/fusion/tile_fusion.h"
 #include "core/tile/tile_codec.h"
 #include "tests/core/fusion/oracle/plain_fusion.h"
+#include "tests/core/fusion/random_drives.h"
 #include "tests/core/support/keyframe_worlds.h"
 #include "tests/core/support/test_scale.h"
 
 namespace atlas {
 namespace {
 
-MapProfile ProfileOf(std::uint32_t seed) {
-  MapProfile profile;
-  profile.tile_cells = 16;
-  profile.column_segments = static_cast<std::uint8_t>(2u << (seed % 4));
-  profile.segment_height_mm = seed % 3 == 0 ? 1'000 : 500;
-  profile.stretch_keyframes = 16;
-  profile.preset = seed % 4 == 1 ? FusionPreset::kBounded : FusionPreset::kStrict;
-  profile.band_segments = 3;
-  profile.band_vehicle_segments = 2;
-  return profile;
-}
+using testing::DrivesProfile;
+using testing::RandomDrives;
 
 constexpr double kPi = 3.14159265358979323846;
-
-std::uint32_t Draw(std::mt19937& random, std::uint32_t count) {
-  return static_cast<std::uint32_t>(random() % count);
-}
-
-// Grounds of 40 mm noise on three decks, so that layers join, split and straddle the gates.
-void FlattenAltitudes(Keyframe& keyframe, std::mt19937& random) {
-  for (KeyframeCell& cell : keyframe.cells) {
-    if (cell.source != AltitudeSource::kNone) {
-      const bool is_outlier = random() % 20 == 0;
-      const auto noise = static_cast<int>(random() % (is_outlier ? 5'000 : 40));
-      cell.altitude_mm = static_cast<std::int16_t>(-1'700 + noise);
-    }
-  }
-}
-
-// Some sessions of some vehicles on several decks, in random order, with gaps in their sequences
-// and times that do not always follow them.
-std::vector<PlacedKeyframe> RandomDrives(const MapProfile& profile, std::uint32_t seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  std::vector<PlacedKeyframe> keyframes;
-  const std::uint32_t sessions = 1 + Draw(random, 5);
-  for (std::uint32_t s = 0; s < sessions; ++s) {
-    std::uint32_t sequence = Draw(random, 10);
-    const std::uint32_t count = 1 + Draw(random, 8);
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const auto radius = static_cast<std::int32_t>(6 + random() % 14);
-      Keyframe keyframe = testing::RandomKeyframe(profile, radius, random() & 0xFFFFFFFF);
-      FlattenAltitudes(keyframe, random);
-      const double deck_m = 1.3 * static_cast<double>(random() % 4);
-      const testing::MapPose pose{0.8 + unit(random), 0.8 + unit(random), deck_m,
-                                  180.0 * unit(random)};
-      const testing::FrameName name{StrCat("car", s % 2), StrCat("s", s), sequence};
-      keyframes.push_back(testing::PlacedFrame(name, pose, std::move(keyframe)));
-      keyframes.back().placement.slope_x = static_cast<std::int32_t>(3e7 * unit(random));
-      keyframes.back().placement.slope_y = static_cast<std::int32_t>(3e7 * unit(random));
-      if (random() % 4 == 0) {
-        keyframes.back().time_ms -= 500;
-      }
-      sequence += 1 + Draw(random, 5);
-    }
-  }
-  std::shuffle(keyframes.begin(), keyframes.end(), random);
-  return keyframes;
-}
 
 // The first difference between two tiles, or nothing.
 std::string Difference(const Tile& tile, const Tile& expected) {
@@ -113,7 +59,7 @@ TEST(TileFusionPropertyTest, EqualsThePlainFusion) {
   std::size_t upper_layers = 0;
   std::ptrdiff_t columns = 0;
   for (std::uint32_t seed = 0; seed < testing::Scaled(60); ++seed) {
-    const MapProfile profile = ProfileOf(seed);
+    const MapProfile profile = DrivesProfile(seed);
     const auto keyframes = RandomDrives(profile, seed);
     const TileId id{0, seed % 5 == 0 ? -1 : 0, 0};
     const Tile tile = FuseTile(id, keyframes, profile);
@@ -129,7 +75,7 @@ TEST(TileFusionPropertyTest, EqualsThePlainFusion) {
 
 TEST(TileFusionPropertyTest, TheOrderOfKeyframesDoesNotMatter) {
   for (std::uint32_t seed = 100; seed < 100 + testing::Scaled(30); ++seed) {
-    const MapProfile profile = ProfileOf(seed);
+    const MapProfile profile = DrivesProfile(seed);
     auto keyframes = RandomDrives(profile, seed);
     const Bytes payload = EncodeTilePayload(FuseTile({0, 0, 0}, keyframes, profile), profile);
     std::mt19937 random(seed);
@@ -142,7 +88,7 @@ TEST(TileFusionPropertyTest, TheOrderOfKeyframesDoesNotMatter) {
 
 TEST(TileFusionPropertyTest, TilesAreValidAndReadBack) {
   for (std::uint32_t seed = 200; seed < 200 + testing::Scaled(30); ++seed) {
-    const MapProfile profile = ProfileOf(seed);
+    const MapProfile profile = DrivesProfile(seed);
     const Tile tile = FuseTile({0, 0, 0}, RandomDrives(profile, seed), profile);
     const auto decoded = DecodeTile(EncodeTile(tile, profile).blob, profile);
     ASSERT_TRUE(decoded.has_value()) << decoded.error().message();
@@ -152,7 +98,7 @@ TEST(TileFusionPropertyTest, TilesAreValidAndReadBack) {
 }
 
 TEST(TileFusionPropertyTest, KeyframesThatDoNotReachTheTileAreIgnored) {
-  const MapProfile profile = ProfileOf(0);
+  const MapProfile profile = DrivesProfile(0);
   auto keyframes = RandomDrives(profile, 7);
   const Tile tile = FuseTile({0, 0, 0}, keyframes, profile);
   for (const double x_m : {-3.0, 4.2, 9e6, -9e6}) {
@@ -163,7 +109,7 @@ TEST(TileFusionPropertyTest, KeyframesThatDoNotReachTheTileAreIgnored) {
 }
 
 TEST(TileFusionPropertyTest, AKeyframeReachesNoTileBeyondItsFootprint) {
-  const MapProfile profile = ProfileOf(0);
+  const MapProfile profile = DrivesProfile(0);
   std::mt19937 random(8);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (int i = 0; i < 20; ++i) {
@@ -185,7 +131,7 @@ TEST(TileFusionPropertyTest, AKeyframeReachesNoTileBeyondItsFootprint) {
 
 TEST(TileFusionPropertyTest, TileBordersDoNotShow) {
   for (std::uint32_t seed = 300; seed < 300 + testing::Scaled(10); ++seed) {
-    const MapProfile small = ProfileOf(seed);
+    const MapProfile small = DrivesProfile(seed);
     MapProfile large = small;
     large.tile_cells = 32;
     const auto keyframes = RandomDrives(small, seed);
@@ -203,7 +149,7 @@ TEST(TileFusionPropertyTest, TileBordersDoNotShow) {
 }
 
 TEST(TileFusionPropertyTest, FarAwayIsLikeHere) {
-  const MapProfile profile = ProfileOf(1);
+  const MapProfile profile = DrivesProfile(1);
   const auto keyframes = RandomDrives(profile, 9);
   const Tile here = FuseTile({0, 0, 0}, keyframes, profile);
   for (const std::int32_t tiles : {-6'000'000, 6'000'000, 12'345}) {
@@ -260,7 +206,7 @@ bool Agrees(std::span<const TileLayer> layers, const std::optional<double>& alti
 }
 
 TEST(TileFusionPropertyTest, ResamplingAgreesWithDoubles) {
-  const MapProfile profile = ProfileOf(2);
+  const MapProfile profile = DrivesProfile(2);
   std::mt19937 random(10);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   int compared = 0;
@@ -284,7 +230,7 @@ TEST(TileFusionPropertyTest, ResamplingAgreesWithDoubles) {
 }
 
 TEST(TileFusionPropertyTest, AResidualTiltMovesAltitudesOnly) {
-  const MapProfile profile = ProfileOf(3);
+  const MapProfile profile = DrivesProfile(3);
   Keyframe keyframe = testing::BlankKeyframe(profile, 20);
   testing::FillDisc(keyframe, {-1'000, Occupancy::kFree, AltitudeSource::kMeasured});
   auto placed = testing::PlacedFrame({}, {0.8, 0.8, 1.0, 30.0}, std::move(keyframe));
@@ -303,7 +249,7 @@ TEST(TileFusionPropertyTest, AResidualTiltMovesAltitudesOnly) {
 
 TEST(TileFusionPropertyTest, BandsOfATileAreTheTile) {
   for (std::uint32_t seed = 400; seed < 400 + testing::Scaled(10); ++seed) {
-    MapProfile profile = ProfileOf(0);
+    MapProfile profile = DrivesProfile(0);
     profile.tile_cells = 64;
     const auto keyframes = RandomDrives(profile, seed);
     std::vector<FrameOnMap> frames;
@@ -331,7 +277,7 @@ TEST(TileFusionPropertyTest, BandsOfATileAreTheTile) {
 }
 
 TEST(TileFusionPropertyTest, ASourcesErrorIsTheTiles) {
-  const MapProfile profile = ProfileOf(0);
+  const MapProfile profile = DrivesProfile(0);
   const auto keyframes = RandomDrives(profile, 9);
   const FrameOnMap frame{keyframes[0].key, 0, keyframes[0].placement, keyframes[0].keyframe->grid};
   const auto failing = [](std::size_t) -> Result<std::shared_ptr<const Keyframe>> {

@@ -74,6 +74,7 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
   EXPECT_EQ(config.port, 7447);
   EXPECT_EQ(config.workers, 0);
   EXPECT_EQ(config.cache_mib, 128);
+  EXPECT_EQ(config.survey_mib, 384);
   EXPECT_EQ(config.log_level, "info");
   EXPECT_EQ(config.NewProfile().value(), MapProfile());
   EXPECT_THAT(Refusal({}), HasSubstr("--data"));
@@ -81,7 +82,7 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
 
 TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
   const std::string file = File(
-      "data = '/file'\nworkers = 1\ncache_mib = 9\nlisten = '127.0.0.1:1'\nlog_level = 'error'\n"
+      "data = '/file'\nworkers = 1\ncache_mib = 9\nsurvey_mib = 0\nlisten = '127.0.0.1:1'\nlog_level = 'error'\n"
       "[map]\ncell_size = 0.2\nsegments = 4\nsegment_height = 0.5\npreset = 'strict'\n");
   SetVariable("ATLASD_WORKERS", "2");
   SetVariable("ATLASD_LISTEN", "127.0.0.1:2");
@@ -91,6 +92,7 @@ TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
   const DaemonConfig& config = command->config;
   EXPECT_EQ(config.data, "/file");
   EXPECT_EQ(config.cache_mib, 9);
+  EXPECT_EQ(config.survey_mib, 0);
   EXPECT_EQ(config.log_level, "error");
   EXPECT_EQ(config.workers, 2);
   EXPECT_EQ(config.host, "::1");
@@ -161,7 +163,7 @@ TEST_F(DaemonConfigTest, RefusesValuesThatMakeNoSense) {
                                                           {"--listen", "127.0.0.1:"},
                                                           {"--listen", "127.0.0.1:-1"},
                                                           {"--log-level", "loud"},
-                                                          {"--preset", "paper"},
+                                                          {"--preset", "loose"},
                                                           {"--cache-mib", "9999999999"},
                                                           {"--workers", ""},
                                                           {"--workers"},

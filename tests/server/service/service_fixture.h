@@ -77,7 +77,9 @@ class ServiceTest : public ::testing::Test {
     store_ = std::move(*store);
     ServiceOptions service;
     service.fusion.workers = workers;
-    service.fusion.cache_bytes = 1u << 20;  // less than the drive: the cache must not matter
+    // Less than the drive: caches must not matter.
+    service.fusion.building.keyframe_bytes = 1u << 20;
+    service.fusion.building.surveys = {100'000, 100'000};
     service_ = std::make_unique<AtlasService>(
         *store_, [] { return kTestNow_ms; }, [](LogLevel, const std::string&) {}, service);
   }

@@ -1,0 +1,97 @@
+// Whatever happened to a tile's keyframes in between, its kept surveys make the tile that a fusion
+// from nothing makes, and only what changed is surveyed again.
+#include "core/fusion/tile_surveys.h"
+
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/core/fusion/random_drives.h"
+#include "tests/core/support/test_scale.h"
+
+namespace atlas {
+namespace {
+
+using testing::DrivesProfile;
+using testing::RandomDrives;
+
+// A tile's kept surveys beside the keyframes that they are made of.
+class KeptTile {
+ public:
+  explicit KeptTile(const MapProfile& profile)
+      : profile_(profile), sigmas_(profile_, 64), surveys_({0, 0, 0}) {}
+
+  // Updates and compares; returns how many keyframes were surveyed.
+  std::size_t Update(const std::vector<PlacedKeyframe>& keyframes) {
+    std::vector<FrameOnMap> frames;
+    for (const PlacedKeyframe& k : keyframes) {
+      frames.push_back({k.key, k.time_ms, k.placement, k.keyframe->grid});
+    }
+    const auto source = [&](std::size_t i) -> Result<std::shared_ptr<const Keyframe>> {
+      return keyframes[i].keyframe;
+    };
+    const auto work = surveys_.Update(frames, source, {profile_, sigmas_});
+    EXPECT_TRUE(work.has_value());
+    EXPECT_EQ(surveys_.Combine({profile_, sigmas_}), FuseTile({0, 0, 0}, keyframes, profile_));
+    return work->surveyed;
+  }
+
+  TileSurveys& surveys() { return surveys_; }
+
+ private:
+  MapProfile profile_;
+  SigmaTable sigmas_;
+  TileSurveys surveys_;
+};
+
+TEST(TileSurveysTest, FollowAnyChange) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(40); ++seed) {
+    MapProfile profile = DrivesProfile(seed);
+    if (seed % 8 == 7) {
+      profile.preset = FusionPreset::kPaper;
+    }
+    const auto all = RandomDrives(profile, seed);
+    std::mt19937 random(seed);
+    std::vector<PlacedKeyframe> current;
+    KeptTile tile(profile);
+    for (int step = 0; step < 12; ++step) {
+      const std::size_t pick = random() % all.size();
+      if (random() % 3 == 0 && !current.empty()) {
+        current.erase(current.begin() +
+                      static_cast<std::ptrdiff_t>(random() % current.size()));  // goes
+      }
+      std::erase_if(current, [&](const PlacedKeyframe& k) { return k.key == all[pick].key; });
+      current.push_back(all[pick]);
+      if (random() % 3 == 0) {  // moves
+        current.back().placement.x_um += static_cast<std::int64_t>(random() % 300'000);
+      }
+      tile.Update(current);
+      if (random() % 2 == 0) {
+        tile.surveys().Pack();
+        tile.surveys().Unpack();
+      }
+    }
+    EXPECT_EQ(tile.Update(current), 0u) << "nothing changed, seed " << seed;
+  }
+}
+
+TEST(TileSurveysTest, WhatFollowsIsAddedAndOnlyChangedStretchesAreSurveyedAgain) {
+  MapProfile profile = DrivesProfile(0);  // stretches of 16
+  KeptTile tile(profile);
+  std::vector<PlacedKeyframe> keyframes;
+  for (std::uint32_t i = 0; i < 48; ++i) {
+    keyframes.push_back(testing::PlacedFrame({"car", "a", i}, {0.8, 0.8 + 0.01 * i},
+                                             testing::RandomKeyframe(profile, 12, i)));
+    EXPECT_EQ(tile.Update(keyframes), 1u) << i;
+  }
+  keyframes[20].placement.x_um += 1'000;
+  EXPECT_EQ(tile.Update(keyframes), 16u);
+  keyframes.erase(keyframes.begin() + 40);
+  EXPECT_EQ(tile.Update(keyframes), 15u);
+  keyframes.resize(32);
+  EXPECT_EQ(tile.Update(keyframes), 0u);
+}
+
+}  // namespace
+}  // namespace atlas
