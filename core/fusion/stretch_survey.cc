@@ -8,6 +8,7 @@
 
 #include "core/base/compression.h"
 #include "core/tile/column_lattice.h"
+#include "core/tile/layer_association.h"
 
 namespace atlas {
 namespace {
@@ -73,9 +74,9 @@ void StretchSurvey::Pack() {
   packed_ = Compress(plain, kPackLevel);
   packed_size_ = plain.size();
   packed_.shrink_to_fit();
-  heads_ = {};
-  segments_ = {};
-  columns_ = {};
+  heads_ = std::vector<std::uint32_t>();
+  segments_ = std::vector<Segment>();
+  columns_ = std::vector<std::int16_t>();
 }
 
 void StretchSurvey::Unpack() {
@@ -92,7 +93,7 @@ void StretchSurvey::Unpack() {
   Take(segments_, rest);
   columns_.resize(count[0] * lanes_);
   Take(columns_, rest);
-  packed_ = {};
+  packed_ = Bytes();
 }
 
 void StretchSurvey::Add(const FrameOnMap& frame,
@@ -102,14 +103,16 @@ void StretchSurvey::Add(const FrameOnMap& frame,
   AddFrame({frame.key.sequence, frame.time_ms});
   const FrameResampler resampler(frame, keyframe, sigmas, profile_);
   resampler.Visit(band_, [&](std::size_t cell, const Observation& observation) {
-    Join(cell, observation, sigmas.Weight(observation.source, observation.distance_step));
+    Join(cell, observation, sigmas);
   });
 }
 
 // An observation belongs to the segment whose representative is nearest in altitude (the paper's
-// eq. 2), if one layer may reach that far. What was guessed says nothing of the altitude where
-// ground was measured, but lends its occupancy and column to the nearest ground.
-void StretchSurvey::Join(std::size_t cell, const Observation& observation, std::int64_t weight) {
+// eq. 2), if the two would be one layer. What was guessed says nothing of the altitude where ground
+// was measured, but lends its occupancy and column to the nearest ground.
+void StretchSurvey::Join(std::size_t cell,
+                         const Observation& observation,
+                         const SigmaTable& sigmas) {
   const auto frame = static_cast<std::uint32_t>(frames_.size() - 1);
   if (!observation.is_strong()) {
     const Nearest ground = Find(cell, observation.altitude_mm, true);
@@ -119,12 +122,29 @@ void StretchSurvey::Join(std::size_t cell, const Observation& observation, std::
     }
   }
   Nearest nearest = Find(cell, observation.altitude_mm, observation.is_strong());
-  if (nearest.distance_mm > profile_.same_layer_mm && nearest.alike < kMaxCellSegments) {
+  if (!IsOneLayer(observation, nearest, sigmas) && nearest.alike < kMaxCellSegments) {
     nearest.segment = AddSegment(cell, observation, observation.is_strong());
   } else if (observation.distance_step < segments_[nearest.segment].distance_step) {
     SetRepresentative(observation, segments_[nearest.segment]);  // of two equally near the first
   }
-  AddEvidence(observation, weight, frame, nearest.segment);
+  AddEvidence(observation, sigmas.Weight(observation.source, observation.distance_step), frame,
+              nearest.segment);
+}
+
+// Eq. 1 and the gates.
+bool StretchSurvey::IsOneLayer(const Observation& observation,
+                               const Nearest& nearest,
+                               const SigmaTable& sigmas) const {
+  if (nearest.distance_mm <= profile_.same_layer_mm) {
+    return true;
+  }
+  if (nearest.distance_mm >= profile_.other_layer_mm) {
+    return false;
+  }
+  const Segment& segment = segments_[nearest.segment];
+  return OverlapsAsOneLayer(
+      {segment.altitude_mm, sigmas.Sigma100um(segment.source, segment.distance_step)},
+      {observation.altitude_mm, sigmas.Sigma100um(observation.source, observation.distance_step)});
 }
 
 StretchSurvey::Nearest StretchSurvey::Find(std::size_t cell,

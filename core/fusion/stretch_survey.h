@@ -7,7 +7,6 @@
 #pragma once
 
 #include <array>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -71,7 +70,10 @@ class StretchSurvey {
     std::int64_t distance_mm = std::numeric_limits<std::int64_t>::max();
   };
 
-  void Join(std::size_t cell, const Observation& observation, std::int64_t weight);
+  void Join(std::size_t cell, const Observation& observation, const SigmaTable& sigmas);
+  bool IsOneLayer(const Observation& observation,
+                  const Nearest& nearest,
+                  const SigmaTable& sigmas) const;
   Nearest Find(std::size_t cell, std::int32_t altitude_mm, bool is_strong) const;
 
   MapProfile profile_;

@@ -104,13 +104,21 @@ PlainCell::Nearest PlainCell::FindNearest(std::int64_t altitude_mm,
   return nearest;
 }
 
-// A new one when none is near enough.
+bool PlainCell::IsOneLayer(const PlainObservation& a, const PlainObservation& b) const {
+  const std::int64_t distance_mm = std::abs(std::int64_t{a.altitude_mm} - b.altitude_mm);
+  return distance_mm <= profile_.same_layer_mm ||
+         (distance_mm < profile_.other_layer_mm &&
+          OverlapsAsOneLayer({a.altitude_mm, sigmas_.Sigma100um(a.source, a.distance_step)},
+                             {b.altitude_mm, sigmas_.Sigma100um(b.source, b.distance_step)}));
+}
+
+// A new one when the nearest would be another layer.
 PlainCell::Segment& PlainCell::SegmentFor(const PlainObservation& observation,
                                           std::size_t stretch_begin) {
   const Nearest nearest =
       FindNearest(observation.altitude_mm, observation.is_strong(), stretch_begin);
-  if (nearest.segment != nullptr &&
-      (nearest.distance_mm <= profile_.same_layer_mm || nearest.alike == kMaxSegments)) {
+  if (nearest.segment != nullptr && (nearest.alike == kMaxSegments ||
+                                     IsOneLayer(*nearest.segment->representative, observation))) {
     return *nearest.segment;
   }
   Segment& segment = segments_.emplace_back();

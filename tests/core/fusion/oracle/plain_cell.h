@@ -66,6 +66,7 @@ class PlainCell {
 
   void FindSegments(std::span<const PlainObservation> observations);
   Nearest FindNearest(std::int64_t altitude_mm, bool is_strong, std::size_t stretch_begin);
+  bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
   Segment& SegmentFor(const PlainObservation& observation, std::size_t stretch_begin);
   void AddTo(const PlainObservation& observation, std::int64_t weight, Segment& segment) const;
   void AddColumn(const PlainObservation& observation, Segment& segment) const;
