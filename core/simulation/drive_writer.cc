@@ -107,7 +107,12 @@ Status WriteInto(const SimulatedDrive& drive,
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "velodyne"));
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "labels"));
   for (std::size_t i = 0; i < drive.scans(); ++i) {
-    ATLAS_RETURN_IF_ERROR(WriteScan(drive.Scan(i), i, folder));
+    const SimulatedScan scan = drive.Scan(i);
+    if (scan.points.empty()) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("scan ", i, " sees nothing: does the drive lead through the world?"));
+    }
+    ATLAS_RETURN_IF_ERROR(WriteScan(scan, i, folder));
     if (progress) {
       progress(i + 1);
     }

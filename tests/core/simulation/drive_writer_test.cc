@@ -83,6 +83,15 @@ TEST_F(DriveWriterTest, RefusesAFolderThatHoldsSomething) {
   EXPECT_EQ(ReadAll(folder_ / "note.txt"), "mine");
 }
 
+TEST_F(DriveWriterTest, AScanThatSeesNothingIsATypedErrorThatLeavesNothing) {
+  TrajectoryWorld world;
+  world.still = std::make_shared<const MeshWorld>(TriangleMesh());
+  const auto drive = SimulatedDrive::Create(std::move(world), {DriveMoment()}, {});
+  const Status status = WriteDrive(*drive, folder_ / "drive", {});
+  EXPECT_EQ(status.code(), StatusCode::kInvalidData);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
 TEST_F(DriveWriterTest, AFileInTheWayIsATypedErrorThatLeavesNothing) {
   std::ofstream(folder_ / "file") << "mine";
   const Status status = WriteDrive(ShortDrive(), folder_ / "file" / "drive", {});
