@@ -25,6 +25,10 @@ struct ProfileCorner {
 
 class MeshBuilder {
  public:
+  void Triangle(const Eigen::Vector3d& a,
+                const Eigen::Vector3d& b,
+                const Eigen::Vector3d& c,
+                std::uint32_t label);
   void Quad(const Eigen::Vector3d& a,
             const Eigen::Vector3d& b,
             const Eigen::Vector3d& c,

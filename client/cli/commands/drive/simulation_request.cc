@@ -4,6 +4,7 @@
 
 #include "core/base/str_cat.h"
 #include "core/scan/drive_folder.h"
+#include "core/simulation/city/city_world.h"
 #include "core/simulation/mesh_labels.h"
 #include "core/simulation/obj_reader.h"
 #include "core/simulation/trajectory.h"
@@ -22,8 +23,8 @@ Result<Trajectory> ReadTrajectory(const std::string& path, const TrajectoryOptio
 }  // namespace
 
 void SimulationRequest::Declare(ArgumentSet& arguments) {
-  arguments.Required("WORLD", "street|overpass|garage|FILE.obj", world_,
-                     "Where the drive goes; a mesh in metres, z up");
+  arguments.Required("WORLD", "street|overpass|garage|city|FILE.obj", world_,
+                     "Where the drive goes; a city grows along any trajectory");
   arguments.Choice("--sensor", {"vlp16", "hdl32", "hdl64", "h350"}, sensor_, "The LiDAR");
   arguments.Optional("--seed", "K", seed_,
                      "Odd: the other direction; also noise, lane and traffic [0]");
@@ -36,8 +37,8 @@ void SimulationRequest::Declare(ArgumentSet& arguments) {
 Result<SimulatedDrive> SimulationRequest::MakeDrive() const {
   const Result<DriveOptions> options = Options();
   if (!options) return Error(options.error());
-  if (!is_along_trajectory()) return DriveBuiltIn(*options);
-  return DriveMesh(*options);
+  if (is_mesh()) return DriveMesh(*options);
+  return is_city() ? DriveAnyCity(*options) : DriveBuiltIn(*options);
 }
 
 Result<DriveOptions> SimulationRequest::Options() const {
@@ -46,7 +47,7 @@ Result<DriveOptions> SimulationRequest::Options() const {
   if (!sensor) return Error(sensor.error());
   options.sensor = *std::move(sensor);
   options.seed = seed_;
-  if (is_along_trajectory()) options.scan_interval_s = TrajectoryOptions().interval_s;
+  if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
   return options;
 }
 
@@ -54,13 +55,25 @@ Result<SimulatedDrive> SimulationRequest::DriveBuiltIn(const DriveOptions& optio
   const Result<WorldKind> kind = WorldKindByName(world_);
   if (!kind) return Error(kind.error().WithContext("no built-in world and no .obj file"));
   if (!trajectory_.empty() || every_m_ != 0.0) {
-    return Error(
-        StatusCode::kInvalidArgument,
-        StrCat("the ", world_, " has its own way: --trajectory and --every are for FILE.obj"));
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("the ", world_,
+                        " has its own way: --trajectory and --every are for city and FILE.obj"));
   }
   Result<SimulatedWorld> world = MakeWorld(*kind);
   if (!world) return Error(world.error());
   return SimulatedDrive::Create(*std::move(world), options);
+}
+
+Result<SimulatedDrive> SimulationRequest::DriveAnyCity(const DriveOptions& options) const {
+  if (trajectory_.empty() && every_m_ != 0.0) {
+    return Error(StatusCode::kInvalidArgument,
+                 "--every thins a trajectory: give --trajectory FILE");
+  }
+  if (trajectory_.empty()) return DriveCity(CityTour(options), options);
+  const Result<Trajectory> trajectory =
+      ReadTrajectory(trajectory_, {every_m_, options.scan_interval_s});
+  if (!trajectory) return Error(trajectory.error());
+  return DriveCity(*trajectory, options);
 }
 
 Result<SimulatedDrive> SimulationRequest::DriveMesh(const DriveOptions& options) const {

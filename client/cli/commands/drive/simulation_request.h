@@ -21,10 +21,11 @@ class SimulationRequest {
  private:
   Result<DriveOptions> Options() const;
   Result<SimulatedDrive> DriveBuiltIn(const DriveOptions& options) const;
+  Result<SimulatedDrive> DriveAnyCity(const DriveOptions& options) const;
   Result<SimulatedDrive> DriveMesh(const DriveOptions& options) const;
 
   bool is_mesh() const { return world_.ends_with(".obj"); }
-  bool is_along_trajectory() const { return is_mesh(); }
+  bool is_city() const { return world_ == "city"; }
 
   std::string world_;
   std::string sensor_ = "vlp16";
