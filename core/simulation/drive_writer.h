@@ -1,5 +1,5 @@
 // Writes a simulated drive as a folder of scans: velodyne/NNNNNN.bin, labels/NNNNNN.label,
-// poses.txt and times.txt. The folder appears whole or not at all.
+// poses.txt, times.txt and boxes.txt (docs/simulation.md). The folder appears whole or not at all.
 #pragma once
 
 #include <cstddef>

@@ -28,6 +28,8 @@ void SimulationRequest::Declare(ArgumentSet& arguments) {
   arguments.Choice("--sensor", {"vlp16", "hdl32", "hdl64", "h350"}, sensor_, "The LiDAR");
   arguments.Optional("--seed", "K", seed_,
                      "Odd: the other direction; also noise, lane and traffic [0]");
+  arguments.Optional("--parked", "K", parked_seed_,
+                     "Which of the street's or city's free slots hold a parked car [0: none]");
   arguments.Optional("--trajectory", "FILE", trajectory_,
                      "Sensor poses to drive along, 12 numbers a line as in poses.txt");
   arguments.Optional("--every", "M", every_m_,
@@ -47,6 +49,7 @@ Result<DriveOptions> SimulationRequest::Options() const {
   if (!sensor) return Error(sensor.error());
   options.sensor = *std::move(sensor);
   options.seed = seed_;
+  options.parked_seed = parked_seed_;
   if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
   return options;
 }
