@@ -26,7 +26,7 @@ KEYS = {
     "sessions": "sessions",
     "digest": "digest tiles revision",
     "verify": "checked damaged mismatched",
-    "segment": "precision recall f1 ms_per_scan scans",
+    "segment": "precision recall f1 missed_curb false_road ms_per_scan scans",
     "localize": "type translation_rmse_m rotation_rmse_deg translation_p95_m failures lost restarts scans hz "
                 "bytes_received",
     "plan": "found length_m cost waypoints tiles_loaded ms",
@@ -53,7 +53,7 @@ def lines_of(cases, work, drive):
         "sessions": ["sessions"],
         "digest": ["digest"],
         "verify": ["verify", "--rebuild"],
-        "segment": ["segment", drive],
+        "segment": ["segment", drive, "--curbs"],
         "localize": ["localize", drive, "--perturb", "0.2,1", "--trials", "2", "--max-range", "12"],
         "plan": ["plan", "--from", "0,-1.6,0", "--to", "4,-1.6,0"],
         "render": ["render", "-o", f"{work}/map.png"],
