@@ -1,8 +1,11 @@
 // How right a map is: simulated drives through front end and fusion, against the worlds they were
 // simulated in. One JSON object a world and preset.
-// Usage: accuracy_bench [--data DIR] [--pictures DIR] [WORLD ...]
-#include <cstdio>
+// Usage: accuracy_bench [--data DIR] [--pictures DIR] [--cells DIR] [WORLD ...]
+// --pictures: a PNG of each; --cells: a text of each, a line a cell that is not as it should be.
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -18,6 +21,7 @@ namespace {
 
 struct Arguments {
   std::string data;
+  std::string cells;
   std::string pictures;
   std::vector<std::string> worlds;
 };
@@ -25,6 +29,7 @@ struct Arguments {
 void Print(const std::string& name, const AccuracyScore& score) {
   const TraversabilityTable& table = score.traversability;
   std::cout << "{\"name\": \"" << name << "\", \"layers_right\": " << score.layers_right.value()
+            << ", \"layers_real\": " << score.layers_real.value()
             << ", \"cells\": " << score.layers_right.whole
             << ", \"missing\": " << score.cells_missing << ", \"fewer\": " << score.cells_fewer
             << ", \"more\": " << score.cells_more
@@ -43,6 +48,48 @@ void Print(const std::string& name, const AccuracyScore& score) {
             << ", " << table.occupied_unknown << "]}" << std::endl;
 }
 
+void ListCells(const DriveMap& map,
+               const TruthMap& truth,
+               const TruthOptions& options,
+               const std::string& path) {
+  std::ofstream file(path);
+  const auto list = [&](const char* what, const MapCell& cell, double z_m) {
+    const Eigen::Vector2d centre = cell.Centre(options.cell_m);
+    file << what << " " << centre.x() << " " << centre.y() << " " << z_m << " :";
+    for (const TileLayer& layer : map.Layers(cell)) {
+      file << " [" << layer.altitude_mm * 1e-3 << " sigma " << layer.sigma_100um * 1e-4
+           << " occupancy " << int{layer.occupancy} << " flags " << int{layer.flags} << " seen "
+           << layer.observations << " column " << std::hex << layer.column << std::dec << "]";
+    }
+    file << "\n";
+  };
+  for (const auto& [cell, cell_truth] : truth) {
+    const auto layers = map.Layers(cell);
+    const bool is_wrong =
+        IsDecided(cell_truth) && JudgeLayers(layers, cell_truth) != CellVerdict::kRight;
+    for (const SurfaceTruth& surface : cell_truth.surfaces) {
+      const bool is_far = std::none_of(layers.begin(), layers.end(), [&](const TileLayer& layer) {
+        return std::abs(layer.altitude_mm * 1e-3 - surface.altitude_m) < 0.1;
+      });
+      if (surface.is_counted && is_far) list("altitude", cell, surface.altitude_m);
+      if (is_wrong)
+        list(AreLayersReal(layers, cell_truth) ? "real" : "count", cell, surface.altitude_m);
+    }
+    for (const StructureTruth& structure : cell_truth.structures) {
+      if (structure.is_counted(options.min_beams) &&
+          !IsOccupied(map, cell, structure.ground_m, options.structure_low_m, options.high_m)) {
+        list("static", cell, structure.ground_m);
+      }
+    }
+    for (const double ground_m : cell_truth.moving_ground_m) {
+      if (!cell_truth.has_low_obstacle &&
+          IsOccupied(map, cell, ground_m, options.moving_low_m, options.high_m)) {
+        list("moving", cell, ground_m);
+      }
+    }
+  }
+}
+
 Status Measure(const std::string& world, const Arguments& arguments) {
   const Result<SimulatedDrive> drive = MakeBenchDrive(world, arguments.data);
   if (!drive) return drive.error().WithContext(world);
@@ -57,6 +104,9 @@ Status Measure(const std::string& world, const Arguments& arguments) {
     const DriveMap map(*keyframes, profile);
     const std::string name = StrCat(world, preset == FusionPreset::kStrict ? ".strict" : ".paper");
     Print(name, ScoreMap(map, truth, options));
+    if (!arguments.cells.empty()) {
+      ListCells(map, truth, options, arguments.cells + "/" + name + ".txt");
+    }
     if (!arguments.pictures.empty()) {
       ATLAS_RETURN_IF_ERROR(
           WritePng(DrawErrors(map, truth, options), arguments.pictures + "/" + name + ".png"));
@@ -69,8 +119,12 @@ int Main(int argc, char** argv) {
   Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    if ((word == "--data" || word == "--pictures") && i + 1 < argc) {
-      (word == "--data" ? arguments.data : arguments.pictures) = argv[++i];
+    if (word == "--data" && i + 1 < argc) {
+      arguments.data = argv[++i];
+    } else if (word == "--pictures" && i + 1 < argc) {
+      arguments.pictures = argv[++i];
+    } else if (word == "--cells" && i + 1 < argc) {
+      arguments.cells = argv[++i];
     } else {
       arguments.worlds.push_back(word);
     }

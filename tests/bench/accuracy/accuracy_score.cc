@@ -79,6 +79,8 @@ class Scorer {
     }
     const CellVerdict verdict = JudgeLayers(layers, truth);
     score_.layers_right.Add(verdict == CellVerdict::kRight);
+    score_.layers_real.Add(verdict == CellVerdict::kRight ||
+                           (verdict == CellVerdict::kMore && AreLayersReal(layers, truth)));
     score_.cells_missing += verdict == CellVerdict::kMissing ? 1U : 0U;
     score_.cells_fewer += verdict == CellVerdict::kFewer ? 1U : 0U;
     score_.cells_more += verdict == CellVerdict::kMore ? 1U : 0U;
@@ -159,6 +161,21 @@ CellVerdict JudgeLayers(std::span<const TileLayer> layers, const CellTruth& trut
     return CellVerdict::kRight;
   }
   return layers.size() < truth.surfaces.size() ? CellVerdict::kFewer : CellVerdict::kMore;
+}
+
+bool AreLayersReal(std::span<const TileLayer> layers, const CellTruth& truth) {
+  constexpr double kNear_m = 0.3;
+  std::vector<double> left_m = truth.ground_m;
+  for (const TileLayer& layer : layers) {
+    const auto found = std::find_if(left_m.begin(), left_m.end(), [&](double ground_m) {
+      return std::abs(ground_m - AltitudeOf(layer)) < kNear_m;
+    });
+    if (found == left_m.end()) {
+      return false;
+    }
+    left_m.erase(found);
+  }
+  return true;
 }
 
 bool IsOccupied(

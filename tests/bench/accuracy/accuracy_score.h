@@ -37,6 +37,10 @@ enum class CellVerdict : std::uint8_t { kRight, kMissing, kFewer, kMore };
 struct AccuracyScore {
   // Cells all of whose surfaces that any beam hit are counted ones.
   Share layers_right;
+  // The same, but further layers are right, too, where each lies within 0.3 m of a ground of its
+  // own that the world has there: fewer than three beams hit it, and the map knows it from between
+  // rays.
+  Share layers_real;
   std::uint64_t cells_missing = 0;
   std::uint64_t cells_fewer = 0;
   std::uint64_t cells_more = 0;
@@ -59,6 +63,8 @@ AccuracyScore ScoreMap(const DriveMap& map, const TruthMap& truth, const TruthOp
 // Of a cell whose surfaces are all counted.
 CellVerdict JudgeLayers(std::span<const TileLayer> layers, const CellTruth& truth);
 bool IsDecided(const CellTruth& truth);
+// No two layers on one ground of the world, and none beside.
+bool AreLayersReal(std::span<const TileLayer> layers, const CellTruth& truth);
 // Is the layer nearest to `ground_m` occupied between two heights above it?
 bool IsOccupied(
     const DriveMap& map, const MapCell& cell, double ground_m, double low_m, double high_m);

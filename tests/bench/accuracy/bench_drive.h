@@ -9,8 +9,9 @@
 
 namespace atlas::testing {
 
-// street, overpass, garage: built in. mesh_garage, mesh_interchange: the meshes of docs/data.md in
-// `data`, along the poses of the recorded simulations in them. VLP-16, 2 cm noise.
+// street, overpass, garage: built in; street_without_cars: nothing is parked there, only driven.
+// mesh_garage, mesh_interchange: the meshes of docs/data.md in `data`, along the poses of the
+// recorded simulations in them. VLP-16, 2 cm noise.
 Result<SimulatedDrive> MakeBenchDrive(std::string_view name, const std::filesystem::path& data);
 
 }  // namespace atlas::testing

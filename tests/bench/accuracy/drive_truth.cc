@@ -53,6 +53,9 @@ class TruthMeter {
       for (SurfaceTruth& surface : truth.surfaces) {
         Judge(cell, truth, surface);
       }
+      if (!truth.surfaces.empty()) {
+        Plumb(cell, truth);
+      }
     }
     return std::move(map_);
   }
@@ -164,6 +167,18 @@ class TruthMeter {
     const WorldHit above = CastWorld(parts_, {centre.x(), centre.y(), ground->z_m + 0.02},
                                      Eigen::Vector3f::UnitZ(), static_cast<float>(options_.high_m));
     surface.is_free = !above.is_hit() && !truth.has_low_obstacle;
+  }
+
+  // Every ground above and below what was hit, within 100 m.
+  void Plumb(const MapCell& cell, CellTruth& truth) {
+    const Eigen::Vector2d centre = cell.Centre(options_.cell_m);
+    const double middle_m = truth.surfaces.front().hit_z_m;
+    parts_ = drive_.still_world().Around({centre.x(), centre.y(), middle_m}, 1.0);
+    double from_m = middle_m + 50.0;
+    while (const auto ground = GroundBelow(parts_, centre, from_m, from_m - middle_m + 50.0)) {
+      truth.ground_m.push_back(ground->z_m);
+      from_m = ground->z_m - 0.01;
+    }
   }
 
   bool IsNearStep(const Eigen::Vector2d& centre, const GroundHit& ground) const {

@@ -47,6 +47,7 @@ struct CellTruth {
   std::vector<SurfaceTruth> surfaces;
   std::vector<StructureTruth> structures;
   std::vector<double> moving_ground_m;  // ground below returns of moving cars
+  std::vector<double> ground_m;         // all ground of the world at the centre, seen or not
   bool has_low_obstacle = false;        // any static hit above ground up to 2 m
 };
 
