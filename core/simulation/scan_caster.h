@@ -6,7 +6,7 @@
 
 #include "core/geometry/pose.h"
 #include "core/simulation/lidar_sensor.h"
-#include "core/simulation/static_world.h"
+#include "core/simulation/mesh/static_world.h"
 
 namespace atlas {
 

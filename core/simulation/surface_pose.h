@@ -4,7 +4,7 @@
 #include "core/base/status.h"
 #include "core/geometry/pose.h"
 #include "core/simulation/drive_path.h"
-#include "core/simulation/static_world.h"
+#include "core/simulation/mesh/static_world.h"
 
 namespace atlas {
 

@@ -8,7 +8,7 @@
 
 #include "core/geometry/pose.h"
 #include "core/simulation/drive_path.h"
-#include "core/simulation/static_world.h"
+#include "core/simulation/mesh/static_world.h"
 #include "core/simulation/truth_box.h"
 #include "core/simulation/worlds/simulated_world.h"
 

@@ -10,8 +10,8 @@
 
 #include "core/base/status.h"
 #include "core/simulation/city/city_path.h"
+#include "core/simulation/mesh/static_world.h"
 #include "core/simulation/simulated_drive.h"
-#include "core/simulation/static_world.h"
 #include "core/simulation/trajectory.h"
 
 namespace atlas {

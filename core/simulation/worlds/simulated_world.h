@@ -11,7 +11,7 @@
 
 #include "core/base/status.h"
 #include "core/simulation/drive_path.h"
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 

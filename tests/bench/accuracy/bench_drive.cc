@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "core/scan/drive_folder.h"
-#include "core/simulation/mesh_labels.h"
-#include "core/simulation/obj_reader.h"
+#include "core/simulation/mesh/mesh_labels.h"
+#include "core/simulation/mesh/obj_reader.h"
 #include "core/simulation/trajectory.h"
 #include "core/simulation/truth_label.h"
 

@@ -1,5 +1,5 @@
 // Floors, ceilings, ramps and decks of meshes without labels.
-#include "core/simulation/mesh_labels.h"
+#include "core/simulation/mesh/mesh_labels.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,5 +1,5 @@
 // Meshes from files, good and bad.
-#include "core/simulation/obj_reader.h"
+#include "core/simulation/mesh/obj_reader.h"
 
 #include <string>
 

@@ -5,8 +5,8 @@
 #include "core/base/str_cat.h"
 #include "core/scan/drive_folder.h"
 #include "core/simulation/city/city_world.h"
-#include "core/simulation/mesh_labels.h"
-#include "core/simulation/obj_reader.h"
+#include "core/simulation/mesh/mesh_labels.h"
+#include "core/simulation/mesh/obj_reader.h"
 #include "core/simulation/trajectory.h"
 
 namespace atlas {

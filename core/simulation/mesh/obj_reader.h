@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/base/status.h"
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 

@@ -7,8 +7,8 @@
 
 #include <Eigen/Core>
 
-#include "core/simulation/mesh_bvh.h"
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/mesh_bvh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 

@@ -1,5 +1,5 @@
 // Normals, plumb lines, and a histogram of heights.
-#include "core/simulation/mesh_labels.h"
+#include "core/simulation/mesh/mesh_labels.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/simulation/mesh_bvh.h"
+#include "core/simulation/mesh/mesh_bvh.h"
 #include "core/simulation/truth_label.h"
 
 namespace atlas {

@@ -1,7 +1,7 @@
 // Labels for a mesh that came without: what one may drive on, and on which deck.
 #pragma once
 
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 

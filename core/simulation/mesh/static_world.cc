@@ -1,5 +1,5 @@
 // One ray against several parts.
-#include "core/simulation/static_world.h"
+#include "core/simulation/mesh/static_world.h"
 
 namespace atlas {
 

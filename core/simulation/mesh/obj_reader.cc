@@ -1,5 +1,5 @@
 // Line by line; a vertex is kept in double until the middle of the mesh is known.
-#include "core/simulation/obj_reader.h"
+#include "core/simulation/mesh/obj_reader.h"
 
 #include <charconv>
 #include <cmath>
