@@ -62,7 +62,7 @@ USAGE = {
     "simulate": [[], ["street"], ["moon", "-o", "WORK/moon"], ["street", "-o", "WORK/s", "--sensor", "sonar"],
                  ["street", "-o", "WORK/s", "--seed", "-1"], ["WORK/x.obj", "-o", "WORK/s"],
                  ["street", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt"],
-                 ["street", "-o", "WORK/s", "--every", "2"],
+                 ["street", "-o", "WORK/s", "--every", "2"], ["city", "-o", "WORK/s", "--every", "2"],
                  ["WORK/x.obj", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt", "--every", "-1"]],
 }
 
