@@ -123,8 +123,101 @@ def bench_fusion(bin_dir):
                  "a straightforward version", 18.0)
 
 
+def bench_accuracy(bin_dir):
+    """Maps of simulated drives against the worlds that they were simulated in."""
+    data = os.environ.get("ATLAS_DATA", "")
+    worlds = ["street", "overpass", "garage"]
+    if (pathlib.Path(data) / "meshes").is_dir():
+        worlds += ["mesh_garage", "mesh_interchange"]
+    else:
+        print("accuracy: no meshes in $ATLAS_DATA, built-in worlds only", file=sys.stderr)
+    process = subprocess.Popen([bin_dir / "accuracy_bench", "--data", data, *worlds], stdout=subprocess.PIPE,
+                               text=True)
+    for line in process.stdout:
+        result = json.loads(line)
+        name = "accuracy." + result["name"]
+        emit(name + ".layers_right", result["layers_right"], f"of {result['cells']} cells", "goal", 0.99)
+        emit(name + ".layers_real", result["layers_real"], f"of {result['cells']} cells", "none", None)
+        emit(name + ".altitude_rmse", result["altitude_rmse_m"], "m", "goal", 0.03)
+        emit(name + ".altitude_within_30mm", result["altitude_within_30mm"],
+             f"of {result['altitudes']} surfaces", "none", None)
+        if result["moving_cells"]:
+            emit(name + ".moving_gone", result["moving_gone"], f"of {result['moving_cells']} cells", "goal", 0.99)
+        emit(name + ".static_kept", result["static_kept"], f"of {result['static_cells']} cells", "goal", 0.98)
+        emit(name + ".static_kept_nearby", result["static_kept_nearby"],
+             f"of {result['static_cells']} cells", "none", None)
+        for truth in ("free", "occupied"):
+            for said, count in zip(("free", "occupied", "unknown"), result[truth]):
+                emit(f"{name}.{truth}_called_{said}", count, "cells", "none", None)
+    if process.wait():
+        sys.exit(process.returncode)
+
+
+def bench_curbs(bin_dir):
+    """Kerbs over thresholds, simulated and real; draws docs/images/curbs.png."""
+    rows = []
+    with tempfile.TemporaryDirectory() as work:
+        street = pathlib.Path(work) / "street"
+        subprocess.run([bin_dir / "atlas", "simulate", "street", "-o", street, "--sensor", "hdl64"], check=True,
+                       stdout=subprocess.DEVNULL)
+        drives = {"simulated": [street], "real": [drive(f"semantickitti_mini/{piece}") for piece in PIECES]}
+        for kind, folders in drives.items():
+            for mode in ("atlas", "paper"):
+                for rings in (16, 32, 64):
+                    for threshold in CURB_THRESHOLDS:
+                        rows.append(curb_rates(bin_dir, kind, folders, mode, rings, threshold))
+                        print(json.dumps(rows[-1]), flush=True)
+    draw_curbs(rows, pathlib.Path(__file__).parent.parent / "docs/images/curbs.png")
+
+
+CURB_THRESHOLDS = [0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.10, 0.12, 0.16, 0.20, 0.25, 0.30]
+
+
+def curb_rates(bin_dir, kind, folders, mode, rings, threshold):
+    """Cells of all folders pooled."""
+    missed = curb = false = road = 0
+    for folder in folders:
+        out = subprocess.run([bin_dir / "atlas", "segment", folder, "--curbs", "--mode", mode, "--rings",
+                              str(rings), "--threshold", str(threshold), "--json"], check=True,
+                             stdout=subprocess.PIPE, text=True).stdout
+        result = json.loads(out)
+        curb += result["curb_cells"]
+        road += result["road_cells"]
+        missed += result["missed_curb"] * result["curb_cells"]
+        false += result["false_road"] * result["road_cells"]
+    return {"name": f"curbs.{kind}.{mode}.{rings}", "threshold_m": threshold,
+            "missed_curb": round(missed / curb, 5), "false_road": round(false / road, 5),
+            "curb_cells": curb, "road_cells": road}
+
+
+def draw_curbs(rows, path):
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.6), sharey=True)
+    for axis, kind in zip(axes, ("simulated", "real")):
+        for mode, style in (("atlas", "-o"), ("paper", "--s")):
+            for rings, color in ((16, "tab:red"), (32, "tab:green"), (64, "tab:blue")):
+                curve = [row for row in rows if row["name"] == f"curbs.{kind}.{mode}.{rings}"]
+                axis.plot([100 * row["false_road"] for row in curve], [100 * row["missed_curb"] for row in curve],
+                          style, color=color, markersize=3, linewidth=1.2, label=f"{mode}, {rings} rings")
+                for row in curve:
+                    if mode == "atlas" and row["threshold_m"] in (0.02, 0.05, 0.12, 0.3):
+                        axis.annotate(f"{row['threshold_m']:g}", (100 * row["false_road"], 100 * row["missed_curb"]),
+                                      fontsize=6, color=color)
+        axis.set_xscale("log")
+        axis.set_xlabel("road cells called obstacle, %")
+        axis.set_title(f"kerbs, {kind} (numbers: threshold, m)", fontsize=10)
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel("kerb cells called traversable, %")
+    axes[1].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
 BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
-              "localization": bench_localization, "fusion": bench_fusion}
+              "localization": bench_localization, "fusion": bench_fusion, "accuracy": bench_accuracy,
+              "curbs": bench_curbs}
 
 
 def main():

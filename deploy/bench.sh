@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Runs the benchmarks named (all, if none) and prints one JSON line a figure:
-# {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion]
-# The first three need the drives of docs/data.md in $ATLAS_DATA.
+# {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion] [accuracy] [curbs]
+# All but fusion and accuracy need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the meshes there too.
+# curbs prints a line a threshold instead, and draws docs/images/curbs.png.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"

@@ -9,7 +9,7 @@ BUILD_PACKAGES=(
   libssl-dev libpng-dev
 )
 TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format python3 xz-utils)
-BENCH_PACKAGES=(libbenchmark-dev)
+BENCH_PACKAGES=(libbenchmark-dev python3-matplotlib)
 TIDY_PACKAGES=(clang-tidy)
 
 # install_packages PACKAGE...: asks apt only for what is missing.

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "client/score/curb_score.h"
 #include "client/score/segmentation_score.h"
 #include "core/base/status.h"
 #include "core/scan/drive_folder.h"
@@ -15,10 +16,12 @@ namespace atlas {
 struct DriveSegmentationOptions {
   std::optional<std::uint32_t> rings;
   SegmenterOptions segmenter;
+  bool with_curbs = false;  // score kerbs too
 };
 
 struct DriveSegmentationReport {
   SegmentationScore score;  // over the scans with labels
+  CurbCounts curbs;         // likewise, where asked for
   std::uint64_t scans = 0;
   std::uint64_t ground = 0;  // returns
   std::uint64_t obstacle = 0;

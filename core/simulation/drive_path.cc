@@ -18,6 +18,26 @@ void DrivePath::Add(const PathPoint& point) {
   points_.push_back(point);
 }
 
+DrivePath DrivePath::Through(std::span<const Eigen::Vector3d> points) {
+  constexpr double kNear_m = 0.1;
+  DrivePath path({points.front(), 0.0});
+  for (const Eigen::Vector3d& point : points) {
+    PathPoint& last = path.points_.back();
+    const Eigen::Vector2d step = (point - last.position).head<2>();
+    if (step.norm() < kNear_m) {
+      continue;
+    }
+    const double turn_rad =
+        std::remainder(std::atan2(step.y(), step.x()) - last.yaw_rad, 2.0 * std::numbers::pi);
+    const bool is_first = path.points_.size() == 1;
+    // A corner looks half-way between its two sides.
+    const double yaw_rad = last.yaw_rad + turn_rad;
+    last.yaw_rad += is_first ? turn_rad : 0.5 * turn_rad;
+    path.Add({point, yaw_rad});
+  }
+  return path;
+}
+
 DrivePath& DrivePath::Straight(double length_m, double rise_m) {
   const PathPoint start = points_.back();
   const Eigen::Vector3d end_offset(length_m * std::cos(start.yaw_rad),

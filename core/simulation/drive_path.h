@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,6 +17,10 @@ struct PathPoint {
 class DrivePath {
  public:
   explicit DrivePath(const PathPoint& start) : points_{start}, along_m_{0.0} {}
+
+  // Straight from point to point; points nearer than 0.1 m to the one before are left out. Requires
+  // a point. A path of one point looks along x.
+  static DrivePath Through(std::span<const Eigen::Vector3d> points);
 
   // `length_m` in plan, climbing `rise_m` evenly.
   DrivePath& Straight(double length_m, double rise_m = 0.0);

@@ -81,6 +81,30 @@ void AppendNumber(double value, std::string_view end, std::string& text) {
   text.append(digits.data(), static_cast<std::size_t>(size)).append(end);
 }
 
+// "scan class", 12 numbers of T_world_box, three of the size.
+void AppendBox(const std::string& scan, const TruthBox& box, std::string& text) {
+  text.append(scan).append(" ").append(std::to_string(box.label & 0xFFFF)).append(" ");
+  for (const double number : PoseToRowMajor(box.T_world_box)) {
+    AppendNumber(number, " ", text);
+  }
+  AppendNumber(box.size_m.x(), " ", text);
+  AppendNumber(box.size_m.y(), " ", text);
+  AppendNumber(box.size_m.z(), "\n", text);
+}
+
+std::string BoxesText(const SimulatedDrive& drive) {
+  std::string text;
+  for (const TruthBox& box : drive.parked_boxes()) {
+    AppendBox("all", box, text);
+  }
+  for (std::size_t i = 0; i < drive.scans(); ++i) {
+    for (const TruthBox& box : drive.moving_boxes(i)) {
+      AppendBox(std::to_string(i), box, text);
+    }
+  }
+  return text;
+}
+
 Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
   std::string poses;
   std::string times;
@@ -91,6 +115,8 @@ Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
     }
     AppendNumber(drive.time_s(i), "\n", times);
   }
+  const std::string boxes = BoxesText(drive);
+  ATLAS_RETURN_IF_ERROR(WriteFile(folder / "boxes.txt", boxes.data(), boxes.size()));
   ATLAS_RETURN_IF_ERROR(WriteFile(folder / "times.txt", times.data(), times.size()));
   return WriteFile(folder / "poses.txt", poses.data(), poses.size());
 }
@@ -107,7 +133,12 @@ Status WriteInto(const SimulatedDrive& drive,
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "velodyne"));
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "labels"));
   for (std::size_t i = 0; i < drive.scans(); ++i) {
-    ATLAS_RETURN_IF_ERROR(WriteScan(drive.Scan(i), i, folder));
+    const SimulatedScan scan = drive.Scan(i);
+    if (scan.points.empty()) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("scan ", i, " sees nothing: does the drive lead through the world?"));
+    }
+    ATLAS_RETURN_IF_ERROR(WriteScan(scan, i, folder));
     if (progress) {
       progress(i + 1);
     }

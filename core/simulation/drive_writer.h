@@ -1,5 +1,5 @@
 // Writes a simulated drive as a folder of scans: velodyne/NNNNNN.bin, labels/NNNNNN.label,
-// poses.txt and times.txt. The folder appears whole or not at all.
+// poses.txt, times.txt and boxes.txt (docs/simulation.md). The folder appears whole or not at all.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,8 @@ using DriveProgress = std::function<void(std::size_t scans_written)>;
 
 // Scans are written one at a time into `folder`.partial, which is renamed at the end and removed on
 // failure; `progress` (may be empty) is called after each. kConflict when `folder` exists and is
-// not empty; kPermissionDenied, kNotFound or kResourceExhausted (full disk) as the system says.
+// not empty; kInvalidData when a scan would be empty; kPermissionDenied, kNotFound or
+// kResourceExhausted (full disk) as the system says.
 Status WriteDrive(const SimulatedDrive& drive,
                   const std::filesystem::path& folder,
                   const DriveProgress& progress);

@@ -16,10 +16,10 @@ struct LabelledHit {
   float incidence = 0.0F;
 };
 
-LabelledHit Describe(const TriangleMesh& mesh, const MeshRay& ray, const MeshHit& hit) {
-  const TriangleEdges edges = EdgesOf(mesh, hit.triangle);
+LabelledHit Describe(const WorldHit& hit) {
+  const TriangleEdges edges = EdgesOf(hit.part->mesh, hit.hit.triangle);
   const Eigen::Vector3f normal = edges.edge1.cross(edges.edge2).normalized();
-  return {hit.distance_m, mesh.labels[hit.triangle], std::abs(normal.dot(ray.direction))};
+  return {hit.hit.distance_m, hit.label(), std::abs(normal.dot(hit.ray.direction))};
 }
 
 }  // namespace
@@ -38,7 +38,7 @@ ScanCaster::ScanCaster(LidarSensor sensor) : sensor_(std::move(sensor)) {
   }
 }
 
-SimulatedScan ScanCaster::Cast(const CastableMesh& world,
+SimulatedScan ScanCaster::Cast(const WorldParts& still,
                                const CastableMesh& traffic,
                                const Pose& T_world_sensor,
                                const ScanNoise& noise) const {
@@ -46,18 +46,21 @@ SimulatedScan ScanCaster::Cast(const CastableMesh& world,
   scan.points.reserve(directions_.size());
   scan.labels.reserve(directions_.size());
   const Eigen::Matrix3f rotation = T_world_sensor.linear().cast<float>();
-  MeshRay ray;
-  ray.origin = T_world_sensor.translation().cast<float>();
+  const Eigen::Vector3d& origin_m = T_world_sensor.translation();
+  const Eigen::Vector3f in_traffic = (origin_m - traffic.origin_m).cast<float>();
   const auto max_range_m = static_cast<float>(sensor_.max_range_m);
   for (std::size_t i = 0; i < directions_.size(); ++i) {
-    ray.direction = rotation * directions_[i];
-    const MeshHit still = world.bvh.Cast(ray, max_range_m);
-    const MeshHit moving = traffic.bvh.Cast(ray, still.distance_m);
-    if (!still.is_hit() && !moving.is_hit()) {
+    const Eigen::Vector3f direction = rotation * directions_[i];
+    WorldHit nearest = CastWorld(still, origin_m, direction, max_range_m);
+    const MeshRay ray{in_traffic, direction};
+    const MeshHit moving = traffic.bvh.Cast(ray, nearest.hit.distance_m);
+    if (moving.is_hit()) {
+      nearest = {moving, &traffic, ray};
+    }
+    if (!nearest.is_hit()) {
       continue;
     }
-    const LabelledHit hit =
-        moving.is_hit() ? Describe(traffic.mesh, ray, moving) : Describe(world.mesh, ray, still);
+    const LabelledHit hit = Describe(nearest);
     HashRandom random(noise.seed, noise.scan, i);
     const double range_m = hit.distance_m + sensor_.range_sigma_m * random.Gaussian();
     if (range_m < sensor_.min_range_m || range_m > sensor_.max_range_m) {

@@ -6,7 +6,7 @@
 
 #include "core/geometry/pose.h"
 #include "core/simulation/lidar_sensor.h"
-#include "core/simulation/mesh_bvh.h"
+#include "core/simulation/mesh/static_world.h"
 
 namespace atlas {
 
@@ -26,15 +26,6 @@ struct SimulatedScan {
   std::vector<std::uint32_t> labels;  // truth_label.h, one a point
 };
 
-// A mesh that can be cast against.
-struct CastableMesh {
-  TriangleMesh mesh;
-  MeshBvh bvh;
-
-  CastableMesh() = default;
-  explicit CastableMesh(TriangleMesh m) : mesh(std::move(m)), bvh(mesh) {}
-};
-
 struct ScanNoise {
   std::uint64_t seed = 0;
   std::uint64_t scan = 0;
@@ -46,7 +37,7 @@ class ScanCaster {
   explicit ScanCaster(LidarSensor sensor);
 
   // Everything in `traffic` stands still during the scan.
-  SimulatedScan Cast(const CastableMesh& world,
+  SimulatedScan Cast(const WorldParts& still,
                      const CastableMesh& traffic,
                      const Pose& T_world_sensor,
                      const ScanNoise& noise) const;

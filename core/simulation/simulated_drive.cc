@@ -1,71 +1,17 @@
-// Poses from the wheels' contacts with the surface, traffic by time, and the cast.
+// Where the vehicle stops, and the cast from there.
 #include "core/simulation/simulated_drive.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <utility>
 
 #include "core/base/hash_random.h"
 #include "core/base/str_cat.h"
-#include "core/simulation/worlds/props.h"
+#include "core/simulation/surface_pose.h"
 
 namespace atlas {
 namespace {
 
-// Wheels of a small car, seen from its middle.
-constexpr double kHalfWheelbase_m = 1.35;
-constexpr double kHalfTrack_m = 0.75;
-// The surface is looked for from this far above the leg down to this far below that.
-constexpr double kLookFrom_m = 1.2;
-constexpr double kLookDown_m = 2.4;
 constexpr double kLaneJitter_m = 0.3;
-
-Result<Eigen::Vector3d> SurfaceBelow(const MeshBvh& world, const Eigen::Vector3d& p) {
-  MeshRay ray;
-  ray.origin = (p + Eigen::Vector3d(0.0, 0.0, kLookFrom_m)).cast<float>();
-  ray.direction = -Eigen::Vector3f::UnitZ();
-  const MeshHit hit = world.Cast(ray, static_cast<float>(kLookDown_m));
-  if (!hit.is_hit()) {
-    return Error(StatusCode::kInternal,
-                 StrCat("no surface below (", p.x(), ", ", p.y(), ", ", p.z(), ") m"));
-  }
-  return Eigen::Vector3d(p.x(), p.y(), p.z() + kLookFrom_m - static_cast<double>(hit.distance_m));
-}
-
-// Front left, front right, rear left, rear right.
-Result<std::array<Eigen::Vector3d, 4>> WheelContacts(const MeshBvh& world, const PathPoint& at) {
-  const Eigen::Isometry3d frame = FrameAt(at);
-  std::array<Eigen::Vector3d, 4> contacts;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const double x = i < 2 ? kHalfWheelbase_m : -kHalfWheelbase_m;
-    const double y = i % 2 == 0 ? kHalfTrack_m : -kHalfTrack_m;
-    auto contact = SurfaceBelow(world, frame * Eigen::Vector3d(x, y, 0.0));
-    if (!contact) {
-      return Error(contact.error());
-    }
-    contacts[i] = *contact;
-  }
-  return contacts;
-}
-
-Result<Pose> PoseOnSurface(const MeshBvh& world, const PathPoint& at, double height_m) {
-  const auto ground = SurfaceBelow(world, at.position);
-  const auto wheels = WheelContacts(world, at);
-  if (!ground || !wheels) {
-    return Error(ground ? wheels.error() : ground.error());
-  }
-  const auto& [front_left, front_right, rear_left, rear_right] = *wheels;
-  const Eigen::Vector3d x = (front_left + front_right - rear_left - rear_right).normalized();
-  const Eigen::Vector3d across = front_left + rear_left - front_right - rear_right;
-  const Eigen::Vector3d z = x.cross(across).normalized();
-  Pose pose = Pose::Identity();
-  pose.linear().col(0) = x;
-  pose.linear().col(1) = z.cross(x);
-  pose.linear().col(2) = z;
-  pose.translation() = *ground + Eigen::Vector3d(0.0, 0.0, height_m);
-  return pose;
-}
+constexpr double kThing_m = 10.0;  // nothing that moves reaches further from its middle
 
 bool IsWithin(double value, double low, double high) {
   return value >= low && value <= high;  // false for NaN
@@ -105,70 +51,98 @@ Status ValidateDrive(const DriveOptions& options) {
 
 }  // namespace
 
-SimulatedDrive::SimulatedDrive(SimulatedWorld world, const DriveOptions& options)
-    : options_(options),
-      caster_(options.sensor),
-      static_world_(std::move(world.mesh)),
-      traffic_(std::move(world.traffic)),
-      lane_left_m_(world.lane_left_m) {
-  const bool is_reverse = options.seed % 2 == 1;
-  for (const DrivePath& leg : world.legs) {
-    legs_.push_back(is_reverse ? leg.Reversed() : leg);
-    oncoming_legs_.push_back(is_reverse ? leg : leg.Reversed());
-  }
-}
+SimulatedDrive::SimulatedDrive(std::shared_ptr<const StaticWorld> still,
+                               const DriveOptions& options)
+    : options_(options), caster_(options.sensor), still_(std::move(still)) {}
 
 Result<SimulatedDrive> SimulatedDrive::Create(SimulatedWorld world, const DriveOptions& options) {
   if (Status status = ValidateDrive(options); !status.ok()) {
     return Error(std::move(status));
   }
-  SimulatedDrive drive(std::move(world), options);
+  SimulatedDrive drive(std::make_shared<const MeshWorld>(std::move(world.mesh)), options);
+  std::vector<DrivePath> legs = std::move(world.legs);
+  std::vector<DrivePath> oncoming_legs;
+  for (const DrivePath& leg : legs) {
+    oncoming_legs.push_back(leg.Reversed());
+  }
+  if (options.seed % 2 == 1) {
+    std::swap(legs, oncoming_legs);
+  }
   const double jitter_m =
       options.seed == 0 ? 0.0 : HashRandom(options.seed).Uniform(-kLaneJitter_m, kLaneJitter_m);
-  for (std::size_t leg = 0; leg < drive.legs_.size(); ++leg) {
-    if (Status status = drive.AddLeg(leg, drive.lane_left_m_ + jitter_m); !status.ok()) {
+  for (std::size_t leg = 0; leg < legs.size(); ++leg) {
+    if (Status status = drive.AddLeg(legs[leg], leg, world.lane_left_m + jitter_m); !status.ok()) {
       return Error(status.WithContext(StrCat("drive, leg ", leg)));
     }
   }
+  drive.traffic_ = std::make_shared<const Traffic>(
+      std::move(world.traffic), std::move(legs), std::move(oncoming_legs), world.parked_slots,
+      TrafficOptions{options.seed, options.parked_seed});
   return drive;
 }
 
-Status SimulatedDrive::AddLeg(std::size_t leg, double left_m) {
-  const DrivePath& path = legs_[leg];
+Result<SimulatedDrive> SimulatedDrive::Create(TrajectoryWorld world,
+                                              std::vector<DriveMoment> moments,
+                                              const DriveOptions& options) {
+  if (Status status = ValidateDrive(options); !status.ok()) {
+    return Error(std::move(status));
+  }
+  SimulatedDrive drive(std::move(world.still), options);
+  double time_s = 0.0;
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    const bool is_same_leg = i > 0 && moments[i].leg == moments[i - 1].leg;
+    time_s += is_same_leg ? moments[i].leg_time_s - moments[i - 1].leg_time_s
+                          : (i > 0 ? options.scan_interval_s : 0.0);
+    drive.AddStop(moments[i], time_s);
+  }
+  std::vector<DrivePath> oncoming_legs;
+  for (const DrivePath& leg : world.legs) {
+    oncoming_legs.push_back(leg.Reversed());
+  }
+  drive.traffic_ = std::make_shared<const Traffic>(
+      std::move(world.traffic), std::move(world.legs), std::move(oncoming_legs), world.parked_slots,
+      TrafficOptions{options.seed, options.parked_seed});
+  return drive;
+}
+
+void SimulatedDrive::AddStop(const DriveMoment& moment, double time_s) {
+  if (!stops_.empty() && stops_.back().moment.leg == moment.leg) {
+    const Pose& last = stops_.back().moment.T_world_sensor;
+    length_m_ += (moment.T_world_sensor.translation() - last.translation()).norm();
+  }
+  stops_.push_back({moment, time_s});
+}
+
+Status SimulatedDrive::AddLeg(const DrivePath& path, std::size_t leg, double left_m) {
   const auto steps = static_cast<std::size_t>(path.length_m() / options_.spacing_m);
   for (std::size_t i = 0; i <= steps; ++i) {
-    const PathPoint at = path.At(static_cast<double>(i) * options_.spacing_m, left_m);
-    auto pose = PoseOnSurface(static_world_.bvh, at, options_.sensor_height_m);
+    const double along_m = static_cast<double>(i) * options_.spacing_m;
+    const PathPoint at = path.At(along_m, left_m);
+    auto pose = PoseOnSurface(still_->Around(at.position, kThing_m), at, options_.sensor_height_m);
     if (!pose) {
       return pose.error();
     }
-    if (i > 0) {
-      length_m_ += (pose->translation() - stops_.back().T_world_sensor.translation()).norm();
-    }
-    stops_.push_back({*pose, leg, i});
+    const double leg_time_s = static_cast<double>(i) * options_.scan_interval_s;
+    AddStop({*pose, leg, leg_time_s, along_m},
+            static_cast<double>(stops_.size()) * options_.scan_interval_s);
   }
   return {};
 }
 
-CastableMesh SimulatedDrive::TrafficAt(const Stop& stop) const {
-  TriangleMesh mesh;
-  const double time_s = static_cast<double>(stop.index_in_leg) * options_.scan_interval_s;
-  for (std::size_t i = 0; i < traffic_.size(); ++i) {
-    const TrafficParticipant& participant = traffic_[i];
-    const DrivePath& path = (participant.is_oncoming ? oncoming_legs_ : legs_)[participant.leg];
-    const double delay_m =
-        options_.seed == 0 ? 0.0 : HashRandom(options_.seed, i).Uniform(0.0, 8.0);
-    const double along_m = participant.start_m + delay_m + participant.speed_m_s * time_s;
-    if (participant.leg == stop.leg && along_m <= path.length_m()) {
-      mesh.Append(participant.mesh, FrameAt(path.At(along_m, participant.left_m)));
-    }
-  }
-  return CastableMesh(std::move(mesh));
+WorldParts SimulatedDrive::PartsAround(std::size_t i) const {
+  return still_->Around(sensor_pose(i).translation(), options_.sensor.max_range_m);
 }
 
 SimulatedScan SimulatedDrive::Scan(std::size_t i) const {
-  return caster_.Cast(static_world_, TrafficAt(stops_[i]), stops_[i].T_world_sensor,
-                      {options_.seed, i});
+  const WorldParts parts = PartsAround(i);
+  const Eigen::Vector3d origin = parts.empty() ? sensor_pose(i).translation() : parts[0]->origin_m;
+  const CastableMesh traffic =
+      traffic_->MeshAround(stops_[i].moment, options_.sensor.max_range_m + kThing_m, origin);
+  return caster_.Cast(parts, traffic, sensor_pose(i), {options_.seed, i});
+}
+
+SimulatedScan SimulatedDrive::StillScan(std::size_t i, const ScanCaster& caster) const {
+  return caster.Cast(PartsAround(i), {}, sensor_pose(i), {options_.seed, i});
 }
 
 }  // namespace atlas

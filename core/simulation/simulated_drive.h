@@ -5,12 +5,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "core/base/status.h"
 #include "core/geometry/pose.h"
 #include "core/simulation/lidar_sensor.h"
+#include "core/simulation/mesh/static_world.h"
 #include "core/simulation/scan_caster.h"
+#include "core/simulation/traffic.h"
+#include "core/simulation/truth_box.h"
 #include "core/simulation/worlds/simulated_world.h"
 
 namespace atlas {
@@ -19,45 +24,65 @@ struct DriveOptions {
   LidarSensor sensor = Vlp16Sensor();
   // Even seeds drive the legs forward, odd ones in the other direction and lane. Seed 0 keeps to
   // the lane's middle, others up to 0.3 m beside it. Range noise and the traffic's places follow it
-  // too; the world does not.
+  // too; the world does not. Along a trajectory only noise and traffic do.
   std::uint64_t seed = 0;
+  // Which of the world's parked slots hold a car: 0 none, else every other one by chance.
+  std::uint64_t parked_seed = 0;
   double spacing_m = 1.25;        // between scans, in plan, along the middle of the leg
   double sensor_height_m = 1.8;   // straight above the surface
   double scan_interval_s = 0.25;  // with the spacing: 18 km/h
+};
+
+// What a drive along a trajectory meets. Legs are the pieces of the trajectory, for traffic alone.
+struct TrajectoryWorld {
+  std::shared_ptr<const StaticWorld> still;
+  std::vector<DrivePath> legs;
+  std::vector<TrafficParticipant> traffic;
+  std::vector<ParkedSlot> parked_slots;
 };
 
 class SimulatedDrive {
  public:
   // kInvalidArgument on options out of range; kInternal when a leg leaves the world's surface.
   static Result<SimulatedDrive> Create(SimulatedWorld world, const DriveOptions& options);
+  // One scan a moment, its poses as given; `moments` name legs of the world.
+  static Result<SimulatedDrive> Create(TrajectoryWorld world,
+                                       std::vector<DriveMoment> moments,
+                                       const DriveOptions& options);
 
   std::size_t scans() const { return stops_.size(); }
   double length_m() const { return length_m_; }  // sum over legs
   // T_world_sensor of scan i. Requires i < scans().
-  const Pose& sensor_pose(std::size_t i) const { return stops_[i].T_world_sensor; }
-  double time_s(std::size_t i) const { return static_cast<double>(i) * options_.scan_interval_s; }
+  const Pose& sensor_pose(std::size_t i) const { return stops_[i].moment.T_world_sensor; }
+  double time_s(std::size_t i) const { return stops_[i].time_s; }
   SimulatedScan Scan(std::size_t i) const;
+  // What is there all the time, cast by another sensor: no traffic, no cars of this drive.
+  SimulatedScan StillScan(std::size_t i, const ScanCaster& caster) const;
 
-  const TriangleMesh& world_mesh() const { return static_world_.mesh; }
+  // Truth: what moves, where it is during scan i (nothing moves within a scan), and the cars that
+  // are parked in this drive and may be gone in another.
+  std::vector<TruthBox> moving_boxes(std::size_t i) const {
+    return traffic_->MovingBoxes(stops_[i].moment);
+  }
+  const std::vector<TruthBox>& parked_boxes() const { return traffic_->parked_boxes(); }
+
+  const StaticWorld& still_world() const { return *still_; }
 
  private:
   struct Stop {
-    Pose T_world_sensor;
-    std::size_t leg = 0;
-    std::size_t index_in_leg = 0;
+    DriveMoment moment;
+    double time_s = 0.0;
   };
 
-  SimulatedDrive(SimulatedWorld world, const DriveOptions& options);
-  Status AddLeg(std::size_t leg, double left_m);
-  CastableMesh TrafficAt(const Stop& stop) const;
+  SimulatedDrive(std::shared_ptr<const StaticWorld> still, const DriveOptions& options);
+  Status AddLeg(const DrivePath& path, std::size_t leg, double left_m);
+  void AddStop(const DriveMoment& moment, double time_s);
+  WorldParts PartsAround(std::size_t i) const;
 
   DriveOptions options_;
   ScanCaster caster_;
-  CastableMesh static_world_;
-  std::vector<DrivePath> legs_;  // as driven
-  std::vector<DrivePath> oncoming_legs_;
-  std::vector<TrafficParticipant> traffic_;
-  double lane_left_m_ = 0.0;
+  std::shared_ptr<const StaticWorld> still_;
+  std::shared_ptr<const Traffic> traffic_;
   std::vector<Stop> stops_;
   double length_m_ = 0.0;
 };

@@ -24,6 +24,15 @@ void MeshBuilder::Triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, st
   mesh_.labels.push_back(label);
 }
 
+void MeshBuilder::Triangle(const Eigen::Vector3d& a,
+                           const Eigen::Vector3d& b,
+                           const Eigen::Vector3d& c,
+                           std::uint32_t label) {
+  const std::uint32_t ia = Vertex(a);
+  const std::uint32_t ib = Vertex(b);
+  Triangle(ia, ib, Vertex(c), label);
+}
+
 void MeshBuilder::Quad(const Eigen::Vector3d& a,
                        const Eigen::Vector3d& b,
                        const Eigen::Vector3d& c,

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "core/simulation/drive_path.h"
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 
@@ -25,6 +25,10 @@ struct ProfileCorner {
 
 class MeshBuilder {
  public:
+  void Triangle(const Eigen::Vector3d& a,
+                const Eigen::Vector3d& b,
+                const Eigen::Vector3d& c,
+                std::uint32_t label);
   void Quad(const Eigen::Vector3d& a,
             const Eigen::Vector3d& b,
             const Eigen::Vector3d& c,

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "core/base/status.h"
 #include "core/simulation/drive_path.h"
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 
@@ -25,17 +28,26 @@ struct TrafficParticipant {
   double start_m = 0.0;  // along its own direction
   double speed_m_s = 5.0;
   double left_m = 0.0;  // in its own direction
+  // Drives where the vehicle does, `start_m` ahead of it, instead of at a speed of its own.
+  bool is_leading = false;
+};
+
+// Where a car may be parked in one drive and not in another (DriveOptions::parked_seed).
+struct ParkedSlot {
+  Eigen::Isometry3d T_world_car = Eigen::Isometry3d::Identity();  // x forward, on the ground
+  std::uint32_t deck = 0;
 };
 
 struct SimulatedWorld {
   TriangleMesh mesh;
   std::vector<DrivePath> legs;  // driven one after the other
   std::vector<TrafficParticipant> traffic;
+  std::vector<ParkedSlot> parked_slots;
   double lane_left_m = 0.0;  // of the drive, from the middle of a leg, in its direction
 };
 
-// 240 m of street with a curve: 12 cm curbs, sidewalks, houses, fences, trees, poles, parked cars;
-// a car ahead, one that comes towards, and a walker.
+// 240 m of street with a curve: 12 cm curbs, sidewalks, houses, fences, trees, poles, parked cars
+// and slots for more; a car ahead, two that come towards, and a walker.
 SimulatedWorld MakeStreetWorld();
 
 // A road along x and a bridge over it along y, 5.5 m above: piers, a slab of 0.6 m, guard rails.

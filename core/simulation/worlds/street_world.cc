@@ -85,11 +85,21 @@ void AddFurniture(const DrivePath& street, double side, HashRandom& random, Mesh
   for (const double along_m : EvenlySpaced(30.0, street.length_m(), 55.0)) {
     AddSign(FrameAt(Beside(street, along_m + 9.0 * side, side, 5.6)), out);
   }
+}
+
+// Every other slot of the parking strip is always taken; the rest are the drive's.
+void AddParkedCars(const DrivePath& street,
+                   double side,
+                   HashRandom& random,
+                   MeshBuilder& out,
+                   std::vector<ParkedSlot>& free_slots) {
   for (const double along_m : EvenlySpaced(4.0, street.length_m(), 6.5)) {
+    PathPoint stall = Beside(street, along_m, side, 4.0);
+    stall.position.z() = 0.0;
     if (random.Below(2) == 0) {
-      PathPoint stall = Beside(street, along_m, side, 4.0);
-      stall.position.z() = 0.0;
       out.Append(CarMesh(TruthLabel(TruthClass::kCar)), FrameAt(stall));
+    } else {
+      free_slots.push_back({FrameAt(stall), 0});
     }
   }
 }
@@ -105,6 +115,7 @@ SimulatedWorld MakeStreetWorld() {
   for (const double side : {1.0, -1.0}) {
     AddPlots(street, side, random, builder);
     AddFurniture(street, side, random, builder);
+    AddParkedCars(street, side, random, builder, world.parked_slots);
   }
   world.mesh = builder.Take();
   world.legs.push_back(Centreline(0.0));

@@ -60,7 +60,10 @@ USAGE = {
     "render": [[], ["-o"], ["-o", "WORK/x.png", "--layer", "middle"], ["-o", "WORK/x.png", "--layer", "-1"],
                ["-o", "WORK/x.png", "--color", "pink"]],
     "simulate": [[], ["street"], ["moon", "-o", "WORK/moon"], ["street", "-o", "WORK/s", "--sensor", "sonar"],
-                 ["street", "-o", "WORK/s", "--seed", "-1"]],
+                 ["street", "-o", "WORK/s", "--seed", "-1"], ["WORK/x.obj", "-o", "WORK/s"],
+                 ["street", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt"],
+                 ["street", "-o", "WORK/s", "--every", "2"], ["city", "-o", "WORK/s", "--every", "2"],
+                 ["WORK/x.obj", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt", "--every", "-1"]],
 }
 
 

@@ -26,7 +26,7 @@ KEYS = {
     "sessions": "sessions",
     "digest": "digest tiles revision",
     "verify": "checked damaged mismatched",
-    "segment": "precision recall f1 ms_per_scan scans",
+    "segment": "precision recall f1 missed_curb false_road ms_per_scan scans",
     "localize": "type translation_rmse_m rotation_rmse_deg translation_p95_m failures lost restarts scans hz "
                 "bytes_received",
     "plan": "found length_m cost waypoints tiles_loaded ms",
@@ -37,7 +37,7 @@ LAYER = "z_m sigma_m occupancy traversable observations column"
 COLUMN = "base_m segment_m probabilities"
 TILE = "type level x y revision bytes"
 SCAN = "type scan pose health error_m error_deg"
-LATER = ("retract", "restore", "--trajectory", "city", "bounded", ".obj")  # not before they work
+LATER = ("retract", "restore", "bounded")  # not before they work
 
 
 def lines_of(cases, work, drive):
@@ -53,7 +53,7 @@ def lines_of(cases, work, drive):
         "sessions": ["sessions"],
         "digest": ["digest"],
         "verify": ["verify", "--rebuild"],
-        "segment": ["segment", drive],
+        "segment": ["segment", drive, "--curbs"],
         "localize": ["localize", drive, "--perturb", "0.2,1", "--trials", "2", "--max-range", "12"],
         "plan": ["plan", "--from", "0,-1.6,0", "--to", "4,-1.6,0"],
         "render": ["render", "-o", f"{work}/map.png"],

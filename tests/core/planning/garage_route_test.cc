@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/simulation/mesh_bvh.h"
+#include "core/simulation/mesh/mesh_bvh.h"
 #include "core/simulation/truth_label.h"
 #include "core/simulation/worlds/simulated_world.h"
 #include "tests/core/planning/tiny_world.h"

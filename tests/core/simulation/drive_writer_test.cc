@@ -76,11 +76,44 @@ TEST_F(DriveWriterTest, PosesReadBackExactly) {
   EXPECT_FALSE(poses >> rest);
 }
 
+TEST_F(DriveWriterTest, WritesALineForEachBox) {
+  const SimulatedDrive drive = ShortDrive();
+  ASSERT_TRUE(WriteDrive(drive, folder_ / "drive", {}).ok());
+  std::ifstream boxes(folder_ / "drive/boxes.txt");
+  std::string line;
+  for (std::size_t i = 0; i < drive.scans(); ++i) {
+    for (const TruthBox& box : drive.moving_boxes(i)) {
+      ASSERT_TRUE(std::getline(boxes, line));
+      std::istringstream words(line);
+      std::size_t scan = 0;
+      std::uint32_t label = 0;
+      double number = 0.0;
+      ASSERT_TRUE(words >> scan >> label);
+      EXPECT_EQ(scan, i);
+      EXPECT_EQ(label, box.label);
+      int numbers = 0;
+      while (words >> number) ++numbers;
+      EXPECT_EQ(numbers, 15);
+      EXPECT_DOUBLE_EQ(number, box.size_m.z());
+    }
+  }
+  EXPECT_FALSE(std::getline(boxes, line));
+}
+
 TEST_F(DriveWriterTest, RefusesAFolderThatHoldsSomething) {
   std::ofstream(folder_ / "note.txt") << "mine";
   const Status status = WriteDrive(ShortDrive(), folder_, {});
   EXPECT_EQ(status.code(), StatusCode::kConflict);
   EXPECT_EQ(ReadAll(folder_ / "note.txt"), "mine");
+}
+
+TEST_F(DriveWriterTest, AScanThatSeesNothingIsATypedErrorThatLeavesNothing) {
+  TrajectoryWorld world;
+  world.still = std::make_shared<const MeshWorld>(TriangleMesh());
+  const auto drive = SimulatedDrive::Create(std::move(world), {DriveMoment()}, {});
+  const Status status = WriteDrive(*drive, folder_ / "drive", {});
+  EXPECT_EQ(status.code(), StatusCode::kInvalidData);
+  EXPECT_TRUE(fs::is_empty(folder_));
 }
 
 TEST_F(DriveWriterTest, AFileInTheWayIsATypedErrorThatLeavesNothing) {

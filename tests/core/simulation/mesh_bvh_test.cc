@@ -1,5 +1,5 @@
 // The hierarchy against trying every triangle, and the triangle test against known geometry.
-#include "core/simulation/mesh_bvh.h"
+#include "core/simulation/mesh/mesh_bvh.h"
 
 #include <cmath>
 

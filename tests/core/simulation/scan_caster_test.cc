@@ -17,12 +17,12 @@ constexpr std::uint32_t kWallLabel = TruthLabel(TruthClass::kBuilding, 2);
 constexpr std::uint32_t kCarLabel = TruthLabel(TruthClass::kMovingCar);
 
 // A floor 1.8 m below the sensor and a wall at x = 12 m.
-CastableMesh Room() {
+WorldParts Room() {
   MeshBuilder builder;
   builder.Floor({{-200.0, -200.0, -1.8}, {200.0, 200.0, -1.8}}, kFloorLabel);
   builder.Quad({12.0, -300.0, -2.0}, {12.0, 300.0, -2.0}, {12.0, 300.0, 100.0},
                {12.0, -300.0, 100.0}, kWallLabel);
-  return CastableMesh(builder.Take());
+  return {std::make_shared<const CastableMesh>(builder.Take())};
 }
 
 SimulatedScan ScanRoom(double sigma_m) {

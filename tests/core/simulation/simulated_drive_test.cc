@@ -8,6 +8,7 @@
 
 #include "core/base/hash.h"
 #include "core/simulation/truth_label.h"
+#include "core/simulation/worlds/mesh_builder.h"
 
 namespace atlas {
 namespace {
@@ -57,14 +58,13 @@ TEST(SimulatedDriveTest, ScansKeepToTheSpacingAndTheModestCount) {
 TEST(SimulatedDriveTest, SensorStands180CentimetresAboveTheSurface) {
   for (const WorldKind kind : {WorldKind::kStreet, WorldKind::kOverpass, WorldKind::kGarage}) {
     const SimulatedDrive drive = Drive(kind, 1);
-    const MeshBvh world(drive.world_mesh());
+    const WorldParts world = drive.still_world().Around({0.0, 0.0, 0.0}, 1e3);
     for (std::size_t i = 0; i < drive.scans(); ++i) {
-      const MeshRay down{drive.sensor_pose(i).translation().cast<float>(),
-                         -Eigen::Vector3f::UnitZ()};
-      const MeshHit hit = world.Cast(down, 10.0F);
+      const WorldHit hit =
+          CastWorld(world, drive.sensor_pose(i).translation(), -Eigen::Vector3f::UnitZ(), 10.0F);
       ASSERT_TRUE(hit.is_hit());
-      ASSERT_NEAR(hit.distance_m, 1.8F, 1e-3) << i;
-      ASSERT_TRUE(IsGroundLabel(drive.world_mesh().labels[hit.triangle])) << i;
+      ASSERT_NEAR(hit.hit.distance_m, 1.8F, 1e-3) << i;
+      ASSERT_TRUE(IsGroundLabel(hit.label())) << i;
     }
   }
 }
@@ -141,6 +141,26 @@ TEST(SimulatedDriveTest, RefusesOptionsOutOfRange) {
             StatusCode::kInvalidArgument);
   EXPECT_EQ(code([](DriveOptions& o) { o.sensor.range_sigma_m = 9.0; }),
             StatusCode::kInvalidArgument);
+}
+
+TEST(SimulatedDriveTest, AMeshFarFromTheOriginIsMeasuredAsWellAsANearOne) {
+  MeshBuilder builder;
+  builder.Floor({{-50.0, -50.0, 0.0}, {50.0, 50.0, 0.0}}, TruthLabel(TruthClass::kRoad));
+  const Eigen::Vector3d far_m(3'000'000.0, -5'000'000.0, 400.0);
+  DriveMoment moment;
+  moment.T_world_sensor.translation() = far_m + Eigen::Vector3d(0.3, 0.7, 1.8);
+  DriveOptions options;
+  options.sensor.range_sigma_m = 0.0;
+  TrajectoryWorld world;
+  world.still = std::make_shared<const MeshWorld>(builder.Take(), far_m);
+  const auto drive = SimulatedDrive::Create(std::move(world), {moment}, options);
+  ASSERT_TRUE(drive.has_value());
+  EXPECT_EQ(drive->sensor_pose(0).translation(), moment.T_world_sensor.translation());
+  const SimulatedScan scan = drive->Scan(0);
+  ASSERT_GT(scan.points.size(), 5000U);
+  for (const SimulatedPoint& p : scan.points) {
+    ASSERT_NEAR(p.z, -1.8F, 1e-4);
+  }
 }
 
 TEST(SimulatedDriveTest, ALaneBesideTheWorldIsAnError) {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/simulation/mesh_bvh.h"
+#include "core/simulation/mesh/mesh_bvh.h"
 #include "core/simulation/simulated_drive.h"
 #include "core/simulation/truth_label.h"
 #include "core/simulation/worlds/props.h"

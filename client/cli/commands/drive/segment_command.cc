@@ -10,12 +10,18 @@
 namespace atlas {
 namespace {
 
-boost::json::object ReportJson(const DriveSegmentationReport& report) {
+boost::json::object ReportJson(const DriveSegmentationReport& report, bool with_curbs) {
   boost::json::object json;
   if (report.score.scans() > 0) {
     json["precision"] = Rounded(report.score.precision(), 5);
     json["recall"] = Rounded(report.score.recall(), 5);
     json["f1"] = Rounded(report.score.f1(), 5);
+  }
+  if (with_curbs) {
+    json["missed_curb"] = Rounded(report.curbs.missed_curb(), 5);
+    json["false_road"] = Rounded(report.curbs.false_road(), 5);
+    json["curb_cells"] = report.curbs.curb_cells;
+    json["road_cells"] = report.curbs.road_cells;
   }
   json["ground"] = report.ground;
   json["obstacle"] = report.obstacle;
@@ -24,12 +30,18 @@ boost::json::object ReportJson(const DriveSegmentationReport& report) {
   return json;
 }
 
-void PrintReport(const DriveSegmentationReport& report, std::ostream& out) {
+void PrintReport(const DriveSegmentationReport& report, bool with_curbs, std::ostream& out) {
   FactList facts;
   if (report.score.scans() > 0) {
     facts.Add("precision", FixedText(report.score.precision(), 4));
     facts.Add("recall", FixedText(report.score.recall(), 4));
     facts.Add("F1", FixedText(report.score.f1(), 4));
+  }
+  if (with_curbs) {
+    facts.Add("missed curb", StrCat(FixedText(report.curbs.missed_curb(), 4), " of ",
+                                    report.curbs.curb_cells, " cells"));
+    facts.Add("false road", StrCat(FixedText(report.curbs.false_road(), 4), " of ",
+                                   report.curbs.road_cells, " cells"));
   }
   facts.Add("returns", StrCat(report.ground, " ground, ", report.obstacle, " obstacle"));
   facts.Add("scans", StrCat(report.scans, ", of them ", report.score.scans(), " with labels"));
@@ -46,6 +58,7 @@ class SegmentCommand : public Command {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt, optional labels/NNNNNN.label");
     arguments.Optional("--threshold", "T", threshold_m_,
                        "Distance from a plane that is still ground, metres [0.12]");
+    arguments.Flag("--curbs", with_curbs_, "Score kerbs too: the border of road and sidewalk");
     arguments.Choice("--mode", {"paper", "atlas"}, mode_, "The paper's rules, or ours");
   }
 
@@ -57,9 +70,9 @@ class SegmentCommand : public Command {
     const auto report = Segment(*drive, *options, context);
     if (!report) return report.error();
     if (context.is_json) {
-      context.PrintJson(ReportJson(*report));
+      context.PrintJson(ReportJson(*report, with_curbs_));
     } else {
-      PrintReport(*report, context.out);
+      PrintReport(*report, with_curbs_, context.out);
     }
     return {};
   }
@@ -72,6 +85,7 @@ class SegmentCommand : public Command {
     }
     DriveSegmentationOptions options;
     options.rings = drive_.rings();
+    options.with_curbs = with_curbs_;
     options.segmenter.mode = mode_ == "paper" ? SegmentMode::kPaper : SegmentMode::kAtlas;
     options.segmenter.threshold_m = static_cast<float>(threshold_m_);
     return options;
@@ -86,6 +100,7 @@ class SegmentCommand : public Command {
 
   DriveFlags drive_;
   double threshold_m_ = SegmenterOptions().threshold_m;
+  bool with_curbs_ = false;
   std::string mode_ = "atlas";
 };
 

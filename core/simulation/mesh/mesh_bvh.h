@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 

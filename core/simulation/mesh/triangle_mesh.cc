@@ -1,5 +1,5 @@
 // Joining meshes, and triangles as corner and edges.
-#include "core/simulation/triangle_mesh.h"
+#include "core/simulation/mesh/triangle_mesh.h"
 
 namespace atlas {
 

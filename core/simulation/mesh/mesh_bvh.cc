@@ -1,5 +1,5 @@
 // Building (binned SAH, Wald 2007) and walking the hierarchy.
-#include "core/simulation/mesh_bvh.h"
+#include "core/simulation/mesh/mesh_bvh.h"
 
 #include <algorithm>
 #include <array>

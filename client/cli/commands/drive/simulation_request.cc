@@ -1,0 +1,97 @@
+#include "client/cli/commands/drive/simulation_request.h"
+
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "core/scan/drive_folder.h"
+#include "core/simulation/city/city_world.h"
+#include "core/simulation/mesh/mesh_labels.h"
+#include "core/simulation/mesh/obj_reader.h"
+#include "core/simulation/trajectory.h"
+
+namespace atlas {
+namespace {
+
+Result<Trajectory> ReadTrajectory(const std::string& path, const TrajectoryOptions& options) {
+  const Result<std::vector<Pose>> poses = ReadPoses(path);
+  if (!poses) return Error(poses.error());
+  Result<Trajectory> trajectory = PlanTrajectory(*poses, options);
+  if (!trajectory) return Error(trajectory.error().WithContext(path));
+  return trajectory;
+}
+
+}  // namespace
+
+void SimulationRequest::Declare(ArgumentSet& arguments) {
+  arguments.Required("WORLD", "street|overpass|garage|city|FILE.obj", world_,
+                     "Where the drive goes; a city grows along any trajectory");
+  arguments.Choice("--sensor", {"vlp16", "hdl32", "hdl64", "h350"}, sensor_, "The LiDAR");
+  arguments.Optional("--seed", "K", seed_,
+                     "Odd: the other direction; also noise, lane and traffic [0]");
+  arguments.Optional("--parked", "K", parked_seed_,
+                     "Which of the street's or city's free slots hold a parked car [0: none]");
+  arguments.Optional("--trajectory", "FILE", trajectory_,
+                     "Sensor poses to drive along, 12 numbers a line as in poses.txt");
+  arguments.Optional("--every", "M", every_m_,
+                     "Least distance between scans along a trajectory [0: every pose]");
+}
+
+Result<SimulatedDrive> SimulationRequest::MakeDrive() const {
+  const Result<DriveOptions> options = Options();
+  if (!options) return Error(options.error());
+  if (is_mesh()) return DriveMesh(*options);
+  return is_city() ? DriveAnyCity(*options) : DriveBuiltIn(*options);
+}
+
+Result<DriveOptions> SimulationRequest::Options() const {
+  DriveOptions options;
+  Result<LidarSensor> sensor = LidarSensorByName(sensor_);
+  if (!sensor) return Error(sensor.error());
+  options.sensor = *std::move(sensor);
+  options.seed = seed_;
+  options.parked_seed = parked_seed_;
+  if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
+  return options;
+}
+
+Result<SimulatedDrive> SimulationRequest::DriveBuiltIn(const DriveOptions& options) const {
+  const Result<WorldKind> kind = WorldKindByName(world_);
+  if (!kind) return Error(kind.error().WithContext("no built-in world and no .obj file"));
+  if (!trajectory_.empty() || every_m_ != 0.0) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("the ", world_,
+                        " has its own way: --trajectory and --every are for city and FILE.obj"));
+  }
+  Result<SimulatedWorld> world = MakeWorld(*kind);
+  if (!world) return Error(world.error());
+  return SimulatedDrive::Create(*std::move(world), options);
+}
+
+Result<SimulatedDrive> SimulationRequest::DriveAnyCity(const DriveOptions& options) const {
+  if (trajectory_.empty() && every_m_ != 0.0) {
+    return Error(StatusCode::kInvalidArgument,
+                 "--every thins a trajectory: give --trajectory FILE");
+  }
+  if (trajectory_.empty()) return DriveCity(CityTour(options), options);
+  const Result<Trajectory> trajectory =
+      ReadTrajectory(trajectory_, {every_m_, options.scan_interval_s});
+  if (!trajectory) return Error(trajectory.error());
+  return DriveCity(*trajectory, options);
+}
+
+Result<SimulatedDrive> SimulationRequest::DriveMesh(const DriveOptions& options) const {
+  if (trajectory_.empty()) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat(world_, ": a mesh does not say where to drive: give --trajectory FILE"));
+  }
+  Result<Trajectory> trajectory = ReadTrajectory(trajectory_, {every_m_, options.scan_interval_s});
+  if (!trajectory) return Error(trajectory.error());
+  Result<ObjMesh> obj = ReadObj(world_);
+  if (!obj) return Error(obj.error());
+  LabelMesh(obj->mesh);
+  TrajectoryWorld world;
+  world.still = std::make_shared<const MeshWorld>(std::move(obj->mesh), obj->origin_m);
+  return SimulatedDrive::Create(std::move(world), std::move(trajectory->moments), options);
+}
+
+}  // namespace atlas
