@@ -3,13 +3,15 @@
 #include <algorithm>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/migration.h"
 #include "server/store/sqlite/row_hash.h"
 
 namespace atlas {
 namespace {
 
-// Blobs stand last in their rows: the other columns are read without touching overflow pages. The
-// checksums of counters, keyframe_tiles and dirty_tiles are reserved and null.
+// The tables of version 1; migrations add to them. Blobs stand last in their rows: the other
+// columns are read without touching overflow pages. The checksums of counters, keyframe_tiles and
+// dirty_tiles are reserved and null.
 constexpr const char* kTables = R"sql(
 CREATE TABLE meta (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -108,9 +110,10 @@ Status CheckVersions(Connection& connection) {
                          application, ", expected ", kStoreApplicationId, ")"));
   }
   const std::int64_t version = connection.Ask("PRAGMA user_version");
-  if (version != kStoreSchemaVersion) {
-    return Status(StatusCode::kUnsupported, StrCat("store: schema version ", version,
-                                                   ", this build reads ", kStoreSchemaVersion));
+  if (version < 1 || version > kStoreSchemaVersion) {
+    return Status(
+        StatusCode::kUnsupported,
+        StrCat("store: schema version ", version, ", this build reads 1 to ", kStoreSchemaVersion));
   }
   return {};
 }
@@ -120,6 +123,7 @@ Status CheckVersions(Connection& connection) {
 void CreateSchema(Connection& connection, const AtlasIdentity& identity) {
   connection.Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = DELETE; BEGIN IMMEDIATE;");
   connection.Execute(kTables);
+  AddTables(connection, 1);
   const Bytes profile = identity.profile.Encode();
   connection.Prepare("INSERT INTO meta (id, profile, atlas_id, epoch, checksum) VALUES (1,?,?,?,?)")
       .Bind(ByteSpan(profile))
