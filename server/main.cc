@@ -87,6 +87,7 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.fusion.workers = config.workers > 0 ? static_cast<unsigned>(config.workers)
                                               : std::max(1U, std::thread::hardware_concurrency());
   options.fusion.cache_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
+  options.scratch_directory = config.data;
   return options;
 }
 
