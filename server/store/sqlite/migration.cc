@@ -31,11 +31,13 @@ CREATE TABLE footprint_history (
 INSERT INTO counters (id, name, value) VALUES (11, 'history_horizon', 0);
 )sql";
 
-// Every session of version 1 was live from its first keyframe on.
+// Every session of version 1 was live from its first keyframe on. The order of the joins (CROSS)
+// keeps it to indexes: rows of keyframes are large.
 void WriteFirstStates(Connection& connection) {
   Query row = connection.Prepare(
-      "SELECT s.id, s.vehicle, min(k.revision) FROM sessions s JOIN keyframes k "
-      "ON k.session_id = s.id GROUP BY s.id ORDER BY s.id");
+      "SELECT s.id, s.vehicle, min(h.revision) FROM sessions s CROSS JOIN keyframes k "
+      "ON k.session_id = s.id CROSS JOIN pose_history h ON h.keyframe_id = k.id "
+      "GROUP BY s.id ORDER BY s.id");
   while (row.Step()) {
     row.Rewind();
     SessionStateRow state;
@@ -56,7 +58,7 @@ struct Moved {
 
 std::vector<Moved> MovedKeyframes(Connection& connection) {
   Query row = connection.Prepare(
-      "SELECT k.id, k.radius_cells * k.cell_size_um FROM poses p JOIN keyframes k "
+      "SELECT k.id, k.radius_cells * k.cell_size_um FROM poses p CROSS JOIN keyframes k "
       "ON k.id = p.keyframe_id WHERE p.batch > 0 ORDER BY k.id");
   std::vector<Moved> moved;
   while (row.Step()) {
