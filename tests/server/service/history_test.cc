@@ -229,18 +229,21 @@ TEST_F(HistoryTest, ARevisionBeforeFusionShowsItsKeyframesFused) {
   EXPECT_NE(two.sha256, unfused.sha256);
 }
 
-TEST_F(HistoryTest, NothingNeedsToBeKeptForTheSameTiles) {
+TEST_F(HistoryTest, WhatIsKeptSavesWorkAndChangesNothing) {
   Open();
   UploadDrive(4);
   const std::uint64_t revision = Digest().revision;
   const Content expected = Everything({});
-  for (const std::size_t max_kept_bytes : {std::size_t{0}, std::size_t{3'000}}) {
-    PastView view(*store_,
-                  {revision, std::make_shared<KeyframeCache>(0),
-                   [] {
-                     return Status();
-                   }},
-                  {}, max_kept_bytes);
+  std::vector<int> looks;
+  for (const std::size_t max_kept_bytes :
+       {std::size_t{0}, std::size_t{3'000}, std::size_t{1} << 20}) {
+    looks.push_back(0);
+    const auto look = [&looks] {
+      ++looks.back();
+      return Status();
+    };
+    PastView view(*store_, {revision, std::make_shared<KeyframeCache>(0), look}, {},
+                  max_kept_bytes);
     Content content;
     for (int level = TestProfile().levels - 1; level >= 0; --level) {
       ASSERT_TRUE(view.Scan({static_cast<std::uint8_t>(level)},
@@ -255,6 +258,9 @@ TEST_F(HistoryTest, NothingNeedsToBeKeptForTheSameTiles) {
     }
     EXPECT_EQ(content, expected);
   }
+  EXPECT_GT(looks[0], looks[1]);
+  EXPECT_GT(looks[1], looks[2]);
+  EXPECT_GT(looks[0], 3 * looks[2]);  // each level-0 tile once instead of once a level
 }
 
 TEST_F(HistoryTest, RevisionsThatAreNotThereAreRefused) {
