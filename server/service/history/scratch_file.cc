@@ -49,7 +49,7 @@ Result<ScratchFile> ScratchFile::Create(const std::filesystem::path& directory) 
 Status ScratchFile::Append(std::uint64_t key, ByteSpan bytes) {
   const RecordHeader header{key, bytes.size()};
   if (std::fwrite(&header, sizeof(header), 1, file_.get()) != 1 ||
-      std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
+      (!bytes.empty() && std::fwrite(bytes.data(), bytes.size(), 1, file_.get()) != 1)) {
     return DiskFailure(errno);
   }
   ++records_;
@@ -67,7 +67,7 @@ Status ScratchFile::Replay(const std::function<Status(std::uint64_t key, ByteSpa
       return DiskFailure(EIO);
     }
     bytes.resize(header.size_bytes);
-    if (std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
+    if (!bytes.empty() && std::fread(bytes.data(), bytes.size(), 1, file_.get()) != 1) {
       return DiskFailure(EIO);
     }
     ATLAS_RETURN_IF_ERROR(visit(header.key, bytes));

@@ -229,6 +229,25 @@ TEST_F(HistoryTest, ARevisionBeforeFusionShowsItsKeyframesFused) {
   EXPECT_NE(two.sha256, unfused.sha256);
 }
 
+TEST_F(HistoryPropertyTest, ThePastStandsStillWhileThePresentMoves) {
+  RandomWorld world(77);
+  Open(2);
+  for (int step = 0; step < 8; ++step) {
+    Step(world);
+  }
+  const AtlasDigest was = Digest();
+  const Content tiles = Everything({});
+  std::jthread present([this, &world](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      Step(world);
+    }
+  });
+  for (std::uint32_t i = 0; i < testing::Scaled(4); ++i) {
+    EXPECT_EQ(DigestAt(was.revision).sha256, was.sha256);
+    EXPECT_EQ(EverythingAt(was.revision), tiles);
+  }
+}
+
 TEST_F(HistoryTest, WhatIsKeptSavesWorkAndChangesNothing) {
   Open();
   UploadDrive(4);
