@@ -14,6 +14,8 @@ namespace {
 using Body = wire::Envelope;
 using std::chrono::milliseconds;
 
+constexpr std::uint32_t kMinorWithPast = 2;
+
 std::uint32_t TimeoutField(milliseconds timeout) {
   return static_cast<std::uint32_t>(
       std::clamp<std::int64_t>(timeout.count(), 0, INT64_C(0xFFFFFFFF)));
@@ -38,7 +40,7 @@ Status CheckVersion(const wire::HelloReply& reply, const Endpoint& endpoint) {
 
 AtlasIdentity IdentityFromWire(const wire::HelloReply& reply) {
   const ByteSpan id = BytesFromWire(reply.atlas_id());
-  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision()};
+  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision(), reply.protocol_minor()};
 }
 
 wire::Envelope RegionRequest(const RegionQuery& query) {
@@ -53,6 +55,10 @@ wire::Envelope RegionRequest(const RegionQuery& query) {
   region.set_finest_level(query.finest_level);
   region.set_only_finest(query.is_only_finest);
   region.set_budget_bytes(query.budget_bytes);
+  if (query.at_revision) {
+    region.set_at_revision(*query.at_revision);
+    region.set_timeout_ms(TimeoutField(query.at_timeout));
+  }
   return request;
 }
 
@@ -157,11 +163,13 @@ Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection
 Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
                                                const TileCallback& on_tile) {
   if (Status status = CheckDisc(query); !status.ok()) return Error(std::move(status));
+  if (Status status = CheckPast(query.at_revision); !status.ok()) return Error(std::move(status));
+  const milliseconds extra = query.at_revision ? query.at_timeout : milliseconds(0);
   wire::Envelope request = RegionRequest(query);
   const Result<std::uint64_t> id = channel_->Send(request);
   if (!id) return Error(id.error());
   while (true) {
-    Result<wire::Envelope> reply = channel_->ReceiveFor(*id, Body::kTile, Body::kQueryEnd);
+    Result<wire::Envelope> reply = channel_->ReceiveFor(*id, Body::kTile, Body::kQueryEnd, extra);
     if (!reply) return Error(reply.error());
     if (reply->has_query_end()) return SummaryFromWire(reply->query_end());
     Result<TileBlob> tile = TileFromWire(*reply->mutable_tile());
@@ -204,9 +212,38 @@ Result<std::vector<SessionSummary>> AtlasClient::ListSessions() {
   return sessions;
 }
 
-Result<DigestSummary> AtlasClient::Digest(milliseconds timeout) {
+// A daemon that does not know the field would answer with the atlas as it is.
+Status AtlasClient::CheckPast(const std::optional<std::uint64_t>& at_revision) const {
+  if (!at_revision || atlas_.protocol_minor >= kMinorWithPast) return {};
+  return {StatusCode::kUnsupported,
+          StrCat("the daemon speaks protocol ", kProtocolMajor, '.', atlas_.protocol_minor,
+                 ", reading an earlier revision needs ", kProtocolMajor, '.', kMinorWithPast)};
+}
+
+Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
+                                                        SessionAction action,
+                                                        const std::string& author) {
+  if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
   wire::Envelope request;
-  request.mutable_digest_request()->set_timeout_ms(TimeoutField(timeout));
+  wire::ChangeSession& change = *request.mutable_change_session();
+  change.set_vehicle(key.vehicle);
+  change.set_session(key.session);
+  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
+                                                      : wire::ChangeSession::RESTORE);
+  change.set_author(author);
+  const auto reply = channel_->Call(request, Body::kChangeSessionReply);
+  if (!reply) return Error(reply.error());
+  const wire::ChangeSessionReply& done = reply->change_session_reply();
+  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision()};
+}
+
+Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,
+                                          std::optional<std::uint64_t> at_revision) {
+  if (Status status = CheckPast(at_revision); !status.ok()) return Error(std::move(status));
+  wire::Envelope request;
+  wire::DigestRequest& digest = *request.mutable_digest_request();
+  digest.set_timeout_ms(TimeoutField(timeout));
+  if (at_revision) digest.set_at_revision(*at_revision);
   const auto reply = channel_->Call(request, Body::kDigestReply, timeout);
   if (!reply) return Error(reply.error());
   const wire::DigestReply& done = reply->digest_reply();

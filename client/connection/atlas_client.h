@@ -48,13 +48,21 @@ class AtlasClient {
   Result<PoseBatchSummary> UpdatePoses(std::span<const PoseCorrection> corrections,
                                        const std::string& author);
   // Calls back once a tile, in the order sent. A failing callback ends the query with its status.
+  // kUnsupported: an earlier revision, and the daemon is too old for that.
   Result<RegionSummary> QueryRegion(const RegionQuery& query, const TileCallback& on_tile);
   Result<AtlasStatus> ReadStatus();
   // Returns when no tile is dirty; kTimeout after `timeout`.
   Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
   Result<std::vector<SessionSummary>> ListSessions();
-  // Waits until no tile is dirty, `timeout` long.
-  Result<DigestSummary> Digest(std::chrono::milliseconds timeout);
+  // Takes a session out of the map, or puts it back. kNotFound: unknown. One that is so already
+  // stays as it is.
+  Result<SessionChangeSummary> ChangeSession(const SessionKey& key,
+                                             SessionAction action,
+                                             const std::string& author);
+  // Waits until no tile is dirty, `timeout` long. With a revision: of the atlas as it was then,
+  // which is fused again meanwhile; kUnsupported when the daemon is too old for that.
+  Result<DigestSummary> Digest(std::chrono::milliseconds timeout,
+                               std::optional<std::uint64_t> at_revision = std::nullopt);
   Result<VerifySummary> Verify(bool is_rebuild, std::chrono::milliseconds timeout);
 
   std::uint64_t bytes_sent() const;
@@ -63,6 +71,8 @@ class AtlasClient {
  private:
   friend class KeyframeUploader;
   AtlasClient(std::unique_ptr<RpcChannel> channel, const MapProfile& profile, AtlasIdentity atlas);
+
+  Status CheckPast(const std::optional<std::uint64_t>& at_revision) const;
 
   std::unique_ptr<RpcChannel> channel_;
   MapProfile profile_;

@@ -21,6 +21,7 @@ struct AtlasIdentity {
   Bytes atlas_id;
   std::uint64_t epoch = 0;
   std::uint64_t revision = 0;
+  std::uint32_t protocol_minor = 0;  // that its daemon speaks
 };
 
 struct KeyframeUpload {
@@ -52,6 +53,9 @@ struct RegionQuery {
   std::uint8_t finest_level = 0;
   bool is_only_finest = false;
   std::uint64_t budget_bytes = 0;  // 0: none
+  // As the atlas was at that revision: fused again for this query, which may take long.
+  std::optional<std::uint64_t> at_revision = std::nullopt;
+  std::chrono::milliseconds at_timeout{600'000};
 };
 
 // A tile as it was encoded; DecodeTile makes a Tile of it.
@@ -97,6 +101,15 @@ struct SessionSummary {
   std::int64_t first_time_ms = 0;
   std::int64_t last_time_ms = 0;
   std::uint32_t last_sequence = 0;
+};
+
+enum class SessionAction : std::uint8_t { kRetract, kRestore };
+
+struct SessionChangeSummary {
+  bool is_changed = false;
+  std::string state;  // after it
+  std::uint32_t tiles_marked = 0;
+  std::uint64_t revision = 0;
 };
 
 struct DigestSummary {

@@ -13,6 +13,14 @@ namespace atlas {
 MapView::MapView(AtlasClient& client, const MapViewOptions& options)
     : client_(client), options_(options), cache_(options.max_cache_bytes) {}
 
+RegionQuery MapView::QueryOf(std::uint8_t level) const {
+  RegionQuery query;
+  query.finest_level = level;
+  query.is_only_finest = true;
+  query.at_revision = options_.at_revision;
+  return query;
+}
+
 Status MapView::Fetch(const RegionQuery& query, const OnTile& on_tile) {
   const auto result = client_.QueryRegion(query, [&](TileBlob received) -> Status {
     Result<Tile> tile = DecodeTile(received.blob, profile());
@@ -32,10 +40,8 @@ Status MapView::Fetch(const RegionQuery& query, const OnTile& on_tile) {
 
 Result<std::shared_ptr<const Tile>> MapView::FetchOne(const TileId& id) {
   // A disc in the middle of the tile touches no other.
-  RegionQuery query;
+  RegionQuery query = QueryOf(id.level);
   query.disc = {TileCenter(id, profile()), 0.25 * TileSideMetres(id.level, profile())};
-  query.finest_level = id.level;
-  query.is_only_finest = true;
   std::shared_ptr<const Tile> fetched;
   const Status status = Fetch(query, [&](const std::shared_ptr<const Tile>& tile) {
     if (tile->id == id) fetched = tile;
@@ -68,10 +74,8 @@ Status MapView::Load(const Eigen::Vector2d& center_m, double radius_m, std::uint
                [this](const TileId& id) { return !cache_.Contains(id); });
   // One query for the disc sends again what is held: worth it only when little is.
   if (2 * missing.size() > tiles->size()) {
-    RegionQuery query;
+    RegionQuery query = QueryOf(level);
     query.disc = {center_m, radius_m};
-    query.finest_level = level;
-    query.is_only_finest = true;
     return FetchDisc(query, missing);
   }
   for (const TileId& id : missing) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,6 +20,7 @@ namespace atlas {
 struct MapViewOptions {
   std::size_t max_cache_bytes = std::size_t{256} << 20;
   std::size_t max_tiles_per_load = 16'384;
+  std::optional<std::uint64_t> at_revision = std::nullopt;  // none: the atlas as it is
 };
 
 class MapView {
@@ -41,6 +43,7 @@ class MapView {
  private:
   using OnTile = std::function<void(const std::shared_ptr<const Tile>&)>;
 
+  RegionQuery QueryOf(std::uint8_t level) const;
   Status Fetch(const RegionQuery& query, const OnTile& on_tile);
   Result<std::shared_ptr<const Tile>> FetchOne(const TileId& id);
   Status FetchDisc(const RegionQuery& query, const std::vector<TileId>& missing);

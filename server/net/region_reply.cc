@@ -7,6 +7,7 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
+#include "server/net/atlas_wait.h"
 #include "server/net/on_pool.h"
 
 namespace atlas {
@@ -14,7 +15,9 @@ namespace {
 
 namespace asio = boost::asio;
 
+// Those of the past are fused one by one: each is sent when it is there.
 constexpr std::size_t kTilesPerRead = 16;
+constexpr std::size_t kPastTilesPerRead = 1;
 // More than any frame of a reply has besides its tile's blob.
 constexpr std::size_t kFrameOverheadBytes = kFrameHeaderBytes + 52;
 
@@ -35,10 +38,10 @@ wire::Envelope TileEnvelope(std::uint64_t request_id, const StoredTile& tile) {
 
 using TileBatch = std::vector<StoredTile>;
 
-// Up to kTilesPerRead tiles; fewer only at the end.
-Result<TileBatch> NextBatch(AtlasService& service, RegionQuery& query) {
+// Up to `max_tiles` tiles; fewer only at the end.
+Result<TileBatch> NextBatch(AtlasService& service, RegionQuery& query, std::size_t max_tiles) {
   TileBatch batch;
-  while (batch.size() < kTilesPerRead) {
+  while (batch.size() < max_tiles) {
     Result<std::optional<StoredTile>> tile = service.NextTile(query);
     if (!tile) {
       return Error(tile.error());
@@ -49,6 +52,29 @@ Result<TileBatch> NextBatch(AtlasService& service, RegionQuery& query) {
     batch.push_back(std::move(**tile));
   }
   return batch;
+}
+
+// A query under way, and the revision that its end will name.
+struct Cursor {
+  RegionQuery query;
+  std::uint64_t revision = 0;
+};
+
+Result<std::shared_ptr<Cursor>> OpenCursor(AtlasService& service,
+                                           const RegionRequest& region,
+                                           const Patience& patience) {
+  const Result<std::uint64_t> current = service.ReadRevision();
+  if (!current) {
+    return Error(current.error());
+  }
+  RegionQuery::Options options;
+  options.end_bytes = kFrameOverheadBytes;
+  options.tile_cost = &TileCost;
+  Result<RegionQuery> query = service.Query(region, std::move(options), patience);
+  if (!query) {
+    return Error(query.error());
+  }
+  return std::make_shared<Cursor>(Cursor{std::move(*query), region.at_revision.value_or(*current)});
 }
 
 struct Sent {
@@ -108,6 +134,9 @@ Result<RegionRequest> RegionFromWire(const wire::QueryRegion& query) {
   region.coarsest_level = query.coarsest_level();
   region.only_finest = query.only_finest();
   region.budget_bytes = query.budget_bytes();
+  if (query.has_at_revision()) {
+    region.at_revision = query.at_revision();
+  }
   return region;
 }
 
@@ -117,23 +146,18 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
                                    RegionRequest region,
                                    ReplyWriter& out) {
   const std::uint64_t request_id = request.request_id();
-  const Blocking<std::uint64_t> read_revision = [&service] {
-    return service.ReadRevision();
+  const Patience patience{TimeoutFromWire(request.query_region().timeout_ms()), out.peer_left()};
+  const Blocking<std::shared_ptr<Cursor>> open = [&service, region, patience] {
+    return OpenCursor(service, region, patience);
   };
-  const Result<std::uint64_t> revision = co_await OnPool(pool, read_revision);
-  if (!revision) {
-    co_return revision.error();
+  const Result<std::shared_ptr<Cursor>> opened = co_await OnPool(pool, open);
+  if (!opened) {
+    co_return opened.error();
   }
-  RegionQuery::Options options;
-  options.end_bytes = kFrameOverheadBytes;
-  options.tile_cost = &TileCost;
-  Result<RegionQuery> query = service.Query(region, std::move(options));
-  if (!query) {
-    co_return query.error();
-  }
-  const auto cursor = std::make_shared<RegionQuery>(std::move(*query));
-  const Blocking<TileBatch> read = [&service, cursor] {
-    return NextBatch(service, *cursor);
+  const std::shared_ptr<Cursor> cursor = *opened;
+  const std::size_t max_tiles = region.at_revision ? kPastTilesPerRead : kTilesPerRead;
+  const Blocking<TileBatch> read = [&service, cursor, max_tiles] {
+    return NextBatch(service, cursor->query, max_tiles);
   };
   Sent sent;
   while (true) {
@@ -141,7 +165,7 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
     if (!batch) {
       co_return batch.error();
     }
-    const bool is_last = batch->size() < kTilesPerRead;
+    const bool is_last = batch->size() < max_tiles;
     const Result<bool> is_open = co_await SendBatch(request_id, std::move(*batch), sent, out);
     if (!is_open) {
       co_return is_open.error();
@@ -153,7 +177,7 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
       break;
     }
   }
-  Result<Bytes> end = EndFrame(request_id, sent, cursor->is_truncated(), *revision);
+  Result<Bytes> end = EndFrame(request_id, sent, cursor->query.is_truncated(), cursor->revision);
   if (!end) {
     co_return end.error();
   }

@@ -14,7 +14,8 @@ namespace atlas {
 Result<RegionRequest> RegionFromWire(const wire::QueryRegion& query);
 
 // Sends every frame of the reply, QueryEnd last. The budget counts whole frames; the first tile
-// that does not fit ends the reply.
+// that does not fit ends the reply. Tiles are read on `pool`, those of an earlier revision fused
+// there, one at a time.
 boost::asio::awaitable<Status> SendRegion(AtlasService& service,
                                           boost::asio::thread_pool& pool,
                                           const wire::Envelope& request,

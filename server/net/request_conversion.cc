@@ -95,6 +95,24 @@ Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message) {
   return request;
 }
 
+Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message) {
+  SessionChange change{{message.vehicle(), message.session()},
+                       SessionAction::kRetract,
+                       message.author(),
+                       message.reason()};
+  switch (message.action()) {
+    case wire::ChangeSession::RETRACT:
+      return change;
+    case wire::ChangeSession::RESTORE:
+      change.action = SessionAction::kRestore;
+      return change;
+    default:
+      return Error(StatusCode::kInvalidArgument,
+                   StrCat("session: unknown action ", static_cast<int>(message.action()),
+                          ", expected to retract (1) or to restore (2)"));
+  }
+}
+
 void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out) {
   out.set_duplicate(result.is_duplicate);
   out.set_revision(result.revision);
@@ -106,6 +124,13 @@ void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
   out.set_tiles_marked(result.tiles_marked);
   out.set_revision(result.revision);
   out.set_batch(result.batch);
+}
+
+void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out) {
+  out.set_changed(result.is_changed);
+  out.set_state(StateName(result.state));
+  out.set_tiles_marked(result.tiles_marked);
+  out.set_revision(result.revision);
 }
 
 void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {

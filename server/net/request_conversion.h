@@ -16,9 +16,12 @@ Status CheckHello(const wire::Envelope& request, const MapProfile& profile);
 // The error names the keyframe.
 Result<UploadRequest> UploadFromWire(const wire::UploadKeyframe& upload);
 Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message);
+// kInvalidArgument on an action that this version does not know.
+Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message);
 
 void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out);
 void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out);
+void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out);
 void StatusToWire(const ServiceStatus& status, wire::StatusReply& out);
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out);
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out);

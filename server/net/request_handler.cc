@@ -57,8 +57,11 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyW
       return Upload(request, out);
     case Envelope::kUpdatePoses:
       return UpdatePoses(request, out);
+    case Envelope::kChangeSession:
+      return ChangeSession(request, out);
     case Envelope::kQueryRegion:
-      return Query(request, out);
+      return request.query_region().has_at_revision() ? QueryThePast(request, out)
+                                                      : Query(request, out);
     case Envelope::kStatusRequest:
       return ReadStatus(request, out);
     case Envelope::kWaitRequest:
@@ -66,7 +69,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyW
     case Envelope::kSessionsRequest:
       return ListSessions(request, out);
     case Envelope::kDigestRequest:
-      return Digest(request, out);
+      return request.digest_request().has_at_revision() ? DigestThePast(request, out)
+                                                        : Digest(request, out);
     case Envelope::kVerifyRequest:
       return Verify(request, out);
     default:
@@ -118,6 +122,25 @@ asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, Rep
   co_return Status();
 }
 
+asio::awaitable<Status> RequestHandler::ChangeSession(const Envelope& request, ReplyWriter& out) {
+  Result<SessionChange> change = SessionChangeFromWire(request.change_session());
+  if (!change) {
+    co_return change.error();
+  }
+  const auto owned = std::make_shared<SessionChange>(std::move(*change));
+  Starting<SessionChangeResult> start = [this, owned](auto done) {
+    service_.ChangeSession(std::move(*owned), std::move(done));
+  };
+  const Result<SessionChangeResult> result = co_await StartOnPool(pool_, std::move(start));
+  if (!result) {
+    co_return result.error();
+  }
+  Envelope reply = ReplyTo(request);
+  SessionChangeToWire(*result, *reply.mutable_change_session_reply());
+  co_await out.Send(std::move(reply));
+  co_return Status();
+}
+
 asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWriter& out) {
   const wire::QueryRegion& query = request.query_region();
   Result<RegionRequest> region = RegionFromWire(query);
@@ -136,6 +159,19 @@ asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWrit
     }
   }
   co_return co_await SendRegion(service_, pool_, request, *region, out);
+}
+
+// Fusing is long work: it has places and threads of its own, and ends when the peer leaves.
+asio::awaitable<Status> RequestHandler::QueryThePast(const Envelope& request, ReplyWriter& out) {
+  const Result<RegionRequest> region = RegionFromWire(request.query_region());
+  if (!region) {
+    co_return region.error();
+  }
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  co_return co_await SendRegion(service_, reading_pool_, request, *region, out);
 }
 
 asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, ReplyWriter& out) {
@@ -203,6 +239,26 @@ asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWri
   }
   const Blocking<AtlasDigest> compute = [this, patience] {
     return service_.Digest(patience);
+  };
+  const Result<AtlasDigest> digest = co_await OnPool(reading_pool_, compute);
+  if (!digest) {
+    co_return digest.error();
+  }
+  Envelope reply = ReplyTo(request);
+  DigestToWire(*digest, *reply.mutable_digest_reply());
+  co_await out.Send(std::move(reply));
+  co_return Status();
+}
+
+asio::awaitable<Status> RequestHandler::DigestThePast(const Envelope& request, ReplyWriter& out) {
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const std::uint64_t revision = request.digest_request().at_revision();
+  const Patience patience{TimeoutFromWire(request.digest_request().timeout_ms()), out.peer_left()};
+  const Blocking<AtlasDigest> compute = [this, revision, patience] {
+    return service_.DigestAt(revision, patience);
   };
   const Result<AtlasDigest> digest = co_await OnPool(reading_pool_, compute);
   if (!digest) {

@@ -38,11 +38,14 @@ class RequestHandler {
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
   boost::asio::awaitable<Status> Upload(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> UpdatePoses(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> ChangeSession(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> DigestThePast(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
 
   AtlasService& service_;

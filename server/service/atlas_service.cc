@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/service/current_tiles.h"
 #include "server/service/process_memory.h"
 #include "server/store/await.h"
 
@@ -36,7 +37,8 @@ AtlasService::AtlasService(AtlasStore& store,
       clock_(std::move(clock)),
       log_(std::move(log)),
       options_(options),
-      fusion_(store, changes_, clock_, log_, options.fusion) {}
+      fusion_(store, changes_, clock_, log_, options.fusion),
+      past_(store, options.past_cache_bytes, options.scratch_directory) {}
 
 AtlasService::~AtlasService() {
   Stop();
@@ -66,11 +68,18 @@ void AtlasService::UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBa
   store_.UpdatePoses(std::move(*batch), Notifying(changes_, std::move(done)));
 }
 
+void AtlasService::ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done) {
+  Status status = CheckSessionChange(change);
+  if (!status.ok()) {
+    done(Error(std::move(status)));
+    return;
+  }
+  store_.ChangeSession(std::move(change), Notifying(changes_, std::move(done)));
+}
+
 Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
-  if (!request.author.empty()) {
-    if (Status status = ValidateName("author", request.author); !status.ok()) {
-      return Error(std::move(status));
-    }
+  if (Status status = CheckAuthor(request.author); !status.ok()) {
+    return Error(std::move(status));
   }
   std::vector<KeyframeKey> keys;
   keys.reserve(request.updates.size());
@@ -175,14 +184,34 @@ Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& pat
   return {};
 }
 
+std::function<Status()> AtlasService::CheckFor(std::uint64_t revision,
+                                               const Patience& patience) const {
+  return [this, revision, deadline = DeadlineOf(patience), stop = patience.stop] {
+    ATLAS_RETURN_IF_ERROR(CheckRunning(stop));
+    return std::chrono::steady_clock::now() < deadline
+               ? Status()
+               : Status(StatusCode::kTimeout,
+                        StrCat("the atlas of revision ", revision, " was not fused in time"));
+  };
+}
+
 Result<RegionQuery> AtlasService::Query(const RegionRequest& request,
-                                        RegionQuery::Options options) {
-  return RegionQuery::Create(store_, request, std::move(options));
+                                        RegionQuery::Options options,
+                                        const Patience& patience) {
+  if (!request.at_revision) {
+    return RegionQuery::Create(std::make_shared<CurrentTiles>(store_), request, std::move(options));
+  }
+  auto view = past_.View(request, CheckFor(*request.at_revision, patience));
+  if (!view) {
+    return Error(view.error());
+  }
+  return RegionQuery::Create(std::move(*view), request, std::move(options));
 }
 
 Result<std::optional<StoredTile>> AtlasService::NextTile(RegionQuery& query) {
   auto tile = query.Next();
-  if (!tile && tile.error().code() == StatusCode::kInvalidData && query.last_tried()) {
+  const bool is_damaged = !tile && tile.error().code() == StatusCode::kInvalidData;
+  if (is_damaged && !query.is_of_the_past() && query.last_tried()) {
     const TileId id = *query.last_tried();
     log_(LogLevel::kError, StrCat("tile ", id, " is damaged and will be built again"));
     const auto marked =
@@ -249,6 +278,10 @@ Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
       return Error(StatusCode::kTimeout, "the atlas changes while its digest is computed");
     }
   }
+}
+
+Result<AtlasDigest> AtlasService::DigestAt(std::uint64_t revision, const Patience& patience) {
+  return past_.Digest(revision, CheckFor(revision, patience));
 }
 
 Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience) {

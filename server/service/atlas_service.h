@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <stop_token>
 #include <string>
@@ -15,6 +16,7 @@
 #include "server/service/atlas_verify.h"
 #include "server/service/change_signal.h"
 #include "server/service/fusion_scheduler.h"
+#include "server/service/history/past_atlas.h"
 #include "server/service/log_sink.h"
 #include "server/service/region_query.h"
 #include "server/service/upload_check.h"
@@ -50,6 +52,9 @@ struct ServiceOptions {
   FusionOptions fusion;
   // Verification fuses from nothing: it keeps no surveys.
   TileBuilderOptions verification{.surveys = {0, 0}};
+  std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
+  // Where the digest of an earlier revision sets tiles aside: a disk.
+  std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
 };
 
 // How long a call may wait, and what ends it earlier.
@@ -70,6 +75,7 @@ class AtlasService {
   // Checked on the calling thread; `done` is called once it is on disk, or refused.
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
+  void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
 
   // Until nothing is dirty but what damage keeps from being fused.
   Result<WaitOutcome> WaitUntilClean(const Patience& patience);
@@ -78,7 +84,10 @@ class AtlasService {
   // yet.
   Status WaitForRevision(std::uint64_t revision, const Patience& patience);
 
-  Result<RegionQuery> Query(const RegionRequest& request, RegionQuery::Options options);
+  // A query of an earlier revision fuses what it sends: `patience` bounds all of it, kTimeout.
+  Result<RegionQuery> Query(const RegionRequest& request,
+                            RegionQuery::Options options,
+                            const Patience& patience = {});
   // The query's next tile; one that turns out damaged is marked to be built again.
   Result<std::optional<StoredTile>> NextTile(RegionQuery& query);
 
@@ -89,6 +98,8 @@ class AtlasService {
   // Of a clean atlas that did not change meanwhile; kTimeout if there is none in time, kInvalidData
   // if damage keeps it from becoming clean.
   Result<AtlasDigest> Digest(const Patience& patience);
+  // Of the atlas as of an earlier revision, fused again; kTimeout if that takes longer.
+  Result<AtlasDigest> DigestAt(std::uint64_t revision, const Patience& patience);
   // `rebuild` waits like WaitUntilClean and reports what is damaged; a plain check does not wait.
   Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
 
@@ -110,6 +121,8 @@ class AtlasService {
                           DirtyState& state);
   bool IsStuck(const DirtyState& state) const;
   Status CheckRunning(const std::stop_token& stop) const;
+  // CheckRunning, and kTimeout when the time is up.
+  std::function<Status()> CheckFor(std::uint64_t revision, const Patience& patience) const;
   // kTimeout when more than damaged tiles is left at the deadline.
   Result<WaitEnd> WaitForWorkers(TimePoint deadline,
                                  const std::stop_token& stop,
@@ -122,6 +135,7 @@ class AtlasService {
   ServiceOptions options_;
   ChangeSignal changes_;
   FusionScheduler fusion_;
+  PastAtlas past_;
 };
 
 }  // namespace atlas

@@ -69,6 +69,7 @@ Status AtlasVerifier::VerifySessions() {
   }
   for (const SessionRecord& session : *sessions) {
     expected_keyframes_ += session.keyframes;
+    ATLAS_RETURN_IF_ERROR(Note(store_.CheckSession(session.key)));
   }
   return {};
 }
@@ -185,7 +186,7 @@ Status AtlasVerifier::CheckParentExists(const TileId& id) {
 Status AtlasVerifier::VerifyMissingTiles() {
   std::int64_t after = -1;
   while (options_.rebuild) {
-    const auto page = store_.ListFootprintTiles(after, kPage);
+    const auto page = store_.ListFootprintTiles(0, after, kPage);
     if (!page) {
       return page.error();
     }

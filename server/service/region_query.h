@@ -6,26 +6,23 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "core/base/integer_math.h"
 #include "core/base/status.h"
-#include "server/store/atlas_store.h"
+#include "server/service/region_disc.h"
+#include "server/service/tile_view.h"
 
 namespace atlas {
-
-struct RegionDisc {
-  std::int64_t x_um = 0;
-  std::int64_t y_um = 0;
-  std::uint64_t radius_um = 0;
-};
 
 struct RegionRequest {
   std::optional<RegionDisc> disc;  // none: the whole atlas, in key order
   std::uint32_t finest_level = 0;
   std::uint32_t coarsest_level = 0;  // 0: the atlas's coarsest
   bool only_finest = false;
-  std::uint64_t budget_bytes = 0;  // 0: none
+  std::uint64_t budget_bytes = 0;                           // 0: none
+  std::optional<std::uint64_t> at_revision = std::nullopt;  // none: the atlas as it is
 };
 
 class RegionQuery {
@@ -38,7 +35,7 @@ class RegionQuery {
   };
 
   // kInvalidArgument on levels that the atlas has not or a budget too small for any reply.
-  static Result<RegionQuery> Create(AtlasStore& store,
+  static Result<RegionQuery> Create(std::shared_ptr<TileView> tiles,
                                     const RegionRequest& request,
                                     Options options);
 
@@ -47,6 +44,7 @@ class RegionQuery {
   Result<std::optional<StoredTile>> Next();
 
   bool is_truncated() const { return is_truncated_; }
+  bool is_of_the_past() const { return request_.at_revision.has_value(); }
   const std::optional<TileId>& last_tried() const { return last_tried_; }
 
  private:
@@ -59,15 +57,14 @@ class RegionQuery {
     friend auto operator<=>(const Candidate&, const Candidate&) = default;
   };
 
-  RegionQuery(AtlasStore& store, const RegionRequest& request, Options options);
+  RegionQuery(std::shared_ptr<TileView> tiles, const RegionRequest& request, Options options);
   bool NextLevel();
   Status FillCandidates();
   std::optional<Candidate> ToCandidate(const TileId& id) const;
   Result<std::optional<StoredTile>> Take(StoredTile tile);
-  std::int64_t side_um() const;
   TileRect Rect() const;
 
-  AtlasStore* store_;
+  std::shared_ptr<TileView> tiles_;
   RegionRequest request_;
   Options options_;
   std::uint32_t level_ = 0;

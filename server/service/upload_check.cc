@@ -1,5 +1,6 @@
 #include "server/service/upload_check.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -8,6 +9,8 @@
 
 namespace atlas {
 namespace {
+
+constexpr std::size_t kMaxReasonBytes = 256;
 
 Status CheckTime(std::int64_t time_ms, std::int64_t now_ms) {
   if (time_ms < 0 || time_ms > now_ms + kMaxTimeAhead_ms) {
@@ -76,6 +79,23 @@ Result<NewKeyframe> CheckUpload(UploadRequest request,
   keyframe.blob = std::move(request.blob);
   keyframe.footprint = std::move(*footprint);
   return keyframe;
+}
+
+Status CheckAuthor(const std::string& author) {
+  return author.empty() ? Status() : ValidateName("author", author);
+}
+
+Status CheckSessionChange(const SessionChange& change) {
+  ATLAS_RETURN_IF_ERROR(change.key.Validate());
+  ATLAS_RETURN_IF_ERROR(CheckAuthor(change.author));
+  const bool is_line = std::none_of(change.reason.begin(), change.reason.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+  });
+  return is_line && change.reason.size() <= kMaxReasonBytes
+             ? Status()
+             : Status(StatusCode::kInvalidArgument,
+                      StrCat("session ", change.key, ": expected a reason of one line of at most ",
+                             kMaxReasonBytes, " bytes"));
 }
 
 Result<NewPose> CheckPose(const KeyframeRecord& keyframe,

@@ -27,6 +27,11 @@ Result<NewKeyframe> CheckUpload(UploadRequest request,
                                 const MapProfile& profile,
                                 std::int64_t now_ms);
 
+// A name, or empty.
+Status CheckAuthor(const std::string& author);
+// kInvalidArgument on names, and on a reason that is too long or holds control characters.
+Status CheckSessionChange(const SessionChange& change);
+
 // Placed with what is stored of its keyframe. kInvalidData names the keyframe whose pose is not one
 // or is tilted against its levelling.
 Result<NewPose> CheckPose(const KeyframeRecord& keyframe,

@@ -33,8 +33,13 @@ class AtlasStore {
   // was corrected since. Other content under the key: kConflict. Marks the footprint dirty.
   virtual void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) = 0;
   // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
-  // and marks nothing. Marks the union of the old and the new footprints.
+  // and marks nothing. Marks the union of the old and the new footprints. Neither uploads nor poses
+  // of a session that is not in the map mark anything.
   virtual void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) = 0;
+
+  // One transaction: the state, its line in the history, a mark on every tile that a keyframe of
+  // the session touches. A session that is so already: nothing changes. kNotFound: unknown.
+  virtual void ChangeSession(SessionChange change, Done<SessionChangeResult> done) = 0;
 
   // Leases up to `max_tiles` dirty tiles of the lowest level in the wave: a level starts when the
   // one below is done, so that each parent is built once.
@@ -55,11 +60,17 @@ class AtlasStore {
   virtual Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
   // The keyframes of live sessions whose footprints touch a level-0 tile.
   virtual Result<TileSources> GatherTile(const TileId& id) = 0;
+  // The same as of an earlier revision: the keyframes that were there, in sessions that were live,
+  // each with the pose it had. Some may not touch the tile. Errors as CheckRevision.
+  virtual Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) = 0;
+  // kInvalidArgument: the atlas is not there yet. kNotFound: so old that its history is gone.
+  virtual Status CheckRevision(std::uint64_t revision) = 0;
   virtual Result<Bytes> ReadKeyframeBlob(std::int64_t id) = 0;
   // Ids above `after_id` in order, up to `limit`.
   virtual Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                             std::uint32_t limit) = 0;
-  // One keyframe with its pose and session: every checksum around it is verified.
+  // One keyframe with its pose and session: every checksum around it is verified, those of its
+  // earlier poses too.
   virtual Result<KeyframeRecord> ReadKeyframe(std::int64_t id) = 0;
 
   // nullopt: there is no such tile.
@@ -72,13 +83,20 @@ class AtlasStore {
   // Tiles above `after_key` in key order, all levels, up to `limit`; `after_key` -1 is the start.
   virtual Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key,
                                                      std::uint32_t limit) = 0;
-  // Level-0 tiles that some footprint touches, above `after_key`, in key order.
-  virtual Result<std::vector<TileId>> ListFootprintTiles(std::int64_t after_key,
+  // Tiles of `level` in whose area some keyframe touches a level-0 tile, or did at an earlier pose:
+  // above `after_key` in key order, up to `limit`; -1 is the start. Others are and were empty.
+  virtual Result<std::vector<TileId>> ListFootprintTiles(std::uint8_t level,
+                                                         std::int64_t after_key,
                                                          std::uint32_t limit) = 0;
+  // Calls `visit` for every such tile in the rectangle, in key order.
+  virtual Status ScanFootprintTiles(const TileRect& rect,
+                                    const std::function<void(const TileId&)>& visit) = 0;
 
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
   virtual Result<std::vector<SessionRecord>> ListSessions() = 0;
+  // Verifies every checksum of a session's history.
+  virtual Status CheckSession(const SessionKey& key) = 0;
 };
 
 }  // namespace atlas

@@ -13,6 +13,7 @@
 #include "core/geometry/map_profile.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/tile_id.h"
+#include "server/store/session_types.h"
 
 namespace atlas {
 
@@ -22,9 +23,6 @@ struct AtlasIdentity {
   std::array<std::uint8_t, 16> atlas_id{};
   std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup
 };
-
-// Frozen numbers (docs/formats/store.md). Only kLive has behaviour yet.
-enum class SessionState : std::uint8_t { kStaged = 0, kLive = 1, kQuarantined = 2, kRetracted = 3 };
 
 struct PositionPrior {
   std::int64_t x_um = 0;
@@ -82,7 +80,7 @@ struct KeyframeRecord {
 
 // What a level-0 tile is fused from, read in one snapshot.
 struct TileSources {
-  std::uint64_t revision = 0;
+  std::uint64_t revision = 0;  // of the atlas, or the earlier one asked for
   std::vector<KeyframeRecord> keyframes;
 };
 
@@ -158,16 +156,6 @@ struct StoreCounts {
   std::uint64_t multilayer_cells = 0;  // level 0
   std::uint64_t dirty_tiles = 0;
   std::uint64_t store_bytes = 0;
-};
-
-struct SessionRecord {
-  SessionKey key;
-  SessionState state = SessionState::kLive;
-  std::uint64_t keyframes = 0;
-  std::uint64_t bytes = 0;
-  std::int64_t first_time_ms = 0;
-  std::int64_t last_time_ms = 0;
-  std::uint32_t last_sequence = 0;
 };
 
 // Tile coordinates of one level, both ends included.

@@ -91,6 +91,29 @@ KeyRange LevelRange(std::uint8_t level) {
   return RangeOf({TileId::kMinCoordinate, TileId::kMinCoordinate, kCoordinateBits}, level);
 }
 
+KeyRange Level0Range(const TileId& id) {
+  const std::int64_t side = std::int64_t{1} << id.level;
+  return RangeOf({id.x * side, id.y * side, id.level}, 0);
+}
+
+TileRect Level0Rect(const TileRect& rect) {
+  const auto first = [&rect](std::int64_t coordinate) {
+    const std::int64_t scaled = coordinate * (std::int64_t{1} << rect.level);
+    return static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(scaled, TileId::kMinCoordinate, TileId::kMaxCoordinate));
+  };
+  const auto last = [&rect](std::int64_t coordinate) {
+    const std::int64_t scaled = (coordinate + 1) * (std::int64_t{1} << rect.level) - 1;
+    return static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(scaled, TileId::kMinCoordinate, TileId::kMaxCoordinate));
+  };
+  return {0, first(rect.min_x), first(rect.min_y), last(rect.max_x), last(rect.max_y)};
+}
+
+TileId AncestorOf(const TileId& level0, std::uint8_t level) {
+  return {level, level0.x >> level, level0.y >> level};
+}
+
 std::int64_t ShardOf(const TileId& id) {
   TileId region = id;
   if (id.level < kShardBits) {

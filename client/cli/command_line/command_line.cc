@@ -76,7 +76,8 @@ CLI::App& SubcommandFor(CLI::App& root, const Command& command) {
   for (CLI::App* group = app->get_parent(); group != nullptr && group != &root;
        group = group->get_parent()) {
     group->require_subcommand(1);
-    group->description(command.Summary());
+    const std::string before = group->get_description();
+    group->description(before.empty() ? command.Summary() : before + "; " + command.Summary());
   }
   app->description(command.Summary());
   return *app;

@@ -15,6 +15,8 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeQueryCommand());
   commands.push_back(MakePosesApplyCommand());
   commands.push_back(MakeSessionsCommand());
+  commands.push_back(MakeSessionRetractCommand());
+  commands.push_back(MakeSessionRestoreCommand());
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
   commands.push_back(MakeSegmentCommand());

@@ -19,6 +19,7 @@ enum class Counter : std::uint8_t {
   kCells = 8,
   kMultilayerCells = 9,
   kSessions = 10,
+  kHistoryHorizon = 11,  // the oldest revision that can still be read
 };
 
 std::uint64_t ReadCounter(Connection& connection, Counter counter);

@@ -5,6 +5,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/pose_table.h"
 #include "server/store/sqlite/row_hash.h"
+#include "server/store/sqlite/session_state_table.h"
 #include "server/store/sqlite/session_table.h"
 #include "server/store/tile_ranges.h"
 
@@ -103,6 +104,44 @@ Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t i
   return std::move(row->record);
 }
 
+Result<KeyframeRecord> VerifyKeyframeRecord(Connection& connection, std::int64_t id) {
+  auto record = ReadKeyframeRecord(connection, id);
+  if (record) {
+    if (Status status = CheckPoseHistory(connection, id, record->pose); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return record;
+}
+
+Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connection,
+                                                           std::int64_t id,
+                                                           std::uint64_t revision) {
+  const auto pose = ReadPoseAt(connection, id, revision);
+  if (!pose) {
+    return Error(pose.error());
+  }
+  if (!*pose) {
+    return std::nullopt;
+  }
+  auto row = ReadRowById(connection, id);
+  if (!row) {
+    return Error(row.error());
+  }
+  const auto session = ReadSession(connection, row->session_id);
+  if (!session) {
+    return Error(session.error());
+  }
+  const auto state = ReadSessionStateAt(connection, row->session_id, revision);
+  if (!state) {
+    return Error(state.error());
+  }
+  row->record.key.session = session->record.key;
+  row->record.pose = **pose;
+  row->record.session_state = *state;
+  return std::move(row->record);
+}
+
 Result<KeyframeRecord> FindKeyframeRecord(Connection& connection, const KeyframeKey& key) {
   const auto session = FindSession(connection, key.session);
   if (!session) {
@@ -162,45 +201,6 @@ void InsertKeyframe(Connection& connection,
   BindPrior(query, keyframe.prior);
   query.Bind(row.blob_bytes).Bind(row.blob_hash).Bind(HashOf(row)).Bind(ByteSpan(keyframe.blob));
   query.Run();
-}
-
-std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id) {
-  Query row = connection.Prepare(
-      "SELECT tile_key FROM keyframe_tiles WHERE keyframe_id = ? ORDER BY tile_key");
-  row.Bind(keyframe_id);
-  std::vector<TileId> footprint;
-  while (row.Step()) {
-    row.Rewind();
-    if (const auto id = TileId::FromKey(row.Unsigned())) {
-      footprint.push_back(*id);
-    }
-  }
-  return footprint;
-}
-
-void WriteFootprint(Connection& connection,
-                    std::int64_t keyframe_id,
-                    std::span<const TileId> footprint) {
-  connection.Prepare("DELETE FROM keyframe_tiles WHERE keyframe_id = ?").Bind(keyframe_id).Run();
-  for (const TileId& tile : footprint) {
-    connection.Prepare("INSERT INTO keyframe_tiles (tile_key, keyframe_id) VALUES (?,?)")
-        .Bind(tile.Key())
-        .Bind(keyframe_id)
-        .Run();
-  }
-}
-
-std::vector<std::int64_t> KeyframesTouching(Connection& connection, const TileId& tile) {
-  Query row = connection.Prepare(
-      "SELECT keyframe_id FROM keyframe_tiles WHERE tile_key = ? "
-      "ORDER BY keyframe_id");
-  row.Bind(tile.Key());
-  std::vector<std::int64_t> ids;
-  while (row.Step()) {
-    row.Rewind();
-    ids.push_back(row.Int());
-  }
-  return ids;
 }
 
 }  // namespace atlas

@@ -1,9 +1,7 @@
-// Table keyframes, and keyframe_tiles, its index by the level-0 tiles that a keyframe touches.
+// Table keyframes: what was uploaded, unchanged.
 #pragma once
 
 #include <optional>
-#include <span>
-#include <vector>
 
 #include "core/base/status.h"
 #include "server/store/sqlite/connection.h"
@@ -24,6 +22,12 @@ Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
                                                    std::uint32_t sequence);
 // Row, session and pose. kNotFound, or kInvalidData when any of them is damaged.
 Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t id);
+// The same, and kInvalidData when a line of its poses' history is damaged.
+Result<KeyframeRecord> VerifyKeyframeRecord(Connection& connection, std::int64_t id);
+// With the pose and the session's state of that revision; nullopt: it was not there yet.
+Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connection,
+                                                           std::int64_t id,
+                                                           std::uint64_t revision);
 Result<KeyframeRecord> FindKeyframeRecord(Connection& connection, const KeyframeKey& key);
 // The blob, its hash verified.
 Result<Bytes> ReadBlob(Connection& connection, std::int64_t id);
@@ -33,11 +37,5 @@ void InsertKeyframe(Connection& connection,
                     std::int64_t id,
                     std::int64_t session_id,
                     std::uint64_t revision);
-
-std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id);
-void WriteFootprint(Connection& connection,
-                    std::int64_t keyframe_id,
-                    std::span<const TileId> footprint);
-std::vector<std::int64_t> KeyframesTouching(Connection& connection, const TileId& tile);
 
 }  // namespace atlas

@@ -18,6 +18,7 @@ enum class RowKind : std::uint8_t {
   kPoseHistory = 5,
   kPoseBatch = 6,
   kTile = 7,
+  kSessionState = 8,
 };
 
 // Integers as 8 bytes little-endian, text and bytes with their length before them.

@@ -9,7 +9,7 @@ namespace atlas {
 namespace {
 
 // Blobs stand last in their rows: the other columns are read without touching overflow pages. The
-// checksums of counters, keyframe_tiles and dirty_tiles are reserved and null.
+// checksums of counters, keyframe_tiles, footprint_history and dirty_tiles are reserved and null.
 constexpr const char* kTables = R"sql(
 CREATE TABLE meta (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -90,10 +90,24 @@ CREATE TABLE dirty_tiles (
   checksum INTEGER);
 CREATE INDEX dirty_since ON dirty_tiles (since);
 
+CREATE TABLE session_states (
+  id INTEGER PRIMARY KEY,
+  session_id INTEGER NOT NULL,
+  revision INTEGER NOT NULL, state INTEGER NOT NULL,
+  author TEXT NOT NULL, reason TEXT NOT NULL,
+  checksum INTEGER NOT NULL,
+  UNIQUE (session_id, revision));
+
+CREATE TABLE footprint_history (
+  tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,
+  checksum INTEGER,
+  PRIMARY KEY (tile_key, keyframe_id)) WITHOUT ROWID;
+
 INSERT INTO counters (id, name, value) VALUES
   (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),
   (5, 'keyframe_bytes', 0), (6, 'tiles', 0), (7, 'tile_bytes', 0), (8, 'cells', 0),
-  (9, 'multilayer_cells', 0), (10, 'sessions', 0);
+  (9, 'multilayer_cells', 0), (10, 'sessions', 0),
+  (11, 'history_horizon', 0);
 )sql";
 
 std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) {

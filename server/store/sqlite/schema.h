@@ -8,13 +8,13 @@
 namespace atlas {
 
 inline constexpr std::int64_t kStoreApplicationId = 0x52414131;  // "RAA1"
-inline constexpr std::int64_t kStoreSchemaVersion = 1;
+inline constexpr std::int64_t kStoreSchemaVersion = 2;
 
 // Makes the tables of an empty database and writes who it is, in one transaction.
 void CreateSchema(Connection& connection, const AtlasIdentity& identity);
 
-// kInvalidData on a database of another program or a damaged identity, kUnsupported on a newer
-// schema.
+// kInvalidData on a database of another program or a damaged identity, kUnsupported on another
+// schema version.
 Result<AtlasIdentity> ReadIdentity(Connection& connection);
 
 }  // namespace atlas

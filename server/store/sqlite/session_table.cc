@@ -6,6 +6,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/counters.h"
 #include "server/store/sqlite/row_hash.h"
+#include "server/store/sqlite/session_state_table.h"
 
 namespace atlas {
 namespace {
@@ -45,26 +46,6 @@ Result<SessionRow> ReadRow(Query& row) {
                                                   r.key, ") is damaged: wrong checksum"));
   }
   return result;
-}
-
-void WriteRow(Connection& connection, const SessionRow& row) {
-  const SessionRecord& r = row.record;
-  connection
-      .Prepare(
-          "INSERT OR REPLACE INTO sessions (id, vehicle, session, state, keyframes, bytes, "
-          "first_time_ms, last_time_ms, last_sequence, checksum) "
-          "VALUES (?,?,?,?,?,?,?,?,?,?)")
-      .Bind(row.id)
-      .Bind(std::string_view(r.key.vehicle))
-      .Bind(std::string_view(r.key.session))
-      .Bind(static_cast<std::int64_t>(r.state))
-      .Bind(r.keyframes)
-      .Bind(r.bytes)
-      .Bind(r.first_time_ms)
-      .Bind(r.last_time_ms)
-      .Bind(r.last_sequence)
-      .Bind(HashOf(row))
-      .Run();
 }
 
 }  // namespace
@@ -110,6 +91,35 @@ Result<std::vector<SessionRecord>> ReadSessions(Connection& connection) {
   return sessions;
 }
 
+Status CheckSessionHistory(Connection& connection, const SessionKey& key) {
+  const auto session = FindSession(connection, key);
+  if (!session) {
+    return session.error();
+  }
+  return *session ? CheckSessionStates(connection, (*session)->id, (*session)->record.state)
+                  : Status();
+}
+
+void WriteSession(Connection& connection, const SessionRow& row) {
+  const SessionRecord& r = row.record;
+  connection
+      .Prepare(
+          "INSERT OR REPLACE INTO sessions (id, vehicle, session, state, keyframes, bytes, "
+          "first_time_ms, last_time_ms, last_sequence, checksum) "
+          "VALUES (?,?,?,?,?,?,?,?,?,?)")
+      .Bind(row.id)
+      .Bind(std::string_view(r.key.vehicle))
+      .Bind(std::string_view(r.key.session))
+      .Bind(static_cast<std::int64_t>(r.state))
+      .Bind(r.keyframes)
+      .Bind(r.bytes)
+      .Bind(r.first_time_ms)
+      .Bind(r.last_time_ms)
+      .Bind(r.last_sequence)
+      .Bind(HashOf(row))
+      .Run();
+}
+
 Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key) {
   auto found = FindSession(connection, key);
   if (!found) {
@@ -121,7 +131,7 @@ Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& ke
   SessionRow row;
   row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));
   row.record.key = key;
-  WriteRow(connection, row);
+  WriteSession(connection, row);
   return row;
 }
 
@@ -133,7 +143,7 @@ void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe
   r.last_sequence = std::max(r.last_sequence, keyframe.key.sequence);
   ++r.keyframes;
   r.bytes += keyframe.blob.size();
-  WriteRow(connection, session);
+  WriteSession(connection, session);
 }
 
 }  // namespace atlas

@@ -19,9 +19,12 @@ struct SessionRow {
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
 Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
+// kInvalidData when its row or a line of its history is damaged.
+Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 
 // The live session `key`, made if it is new.
 Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key);
+void WriteSession(Connection& connection, const SessionRow& row);
 // Counts one more keyframe in.
 void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);
 

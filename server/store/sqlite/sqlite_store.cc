@@ -6,10 +6,13 @@
 #include "server/store/sqlite/counters.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/dirty_table.h"
+#include "server/store/sqlite/footprint_table.h"
+#include "server/store/sqlite/history_reads.h"
 #include "server/store/sqlite/keyframe_table.h"
 #include "server/store/sqlite/reader_pool.h"
 #include "server/store/sqlite/schema.h"
 #include "server/store/sqlite/session_table.h"
+#include "server/store/sqlite/session_transactions.h"
 #include "server/store/sqlite/tile_table.h"
 #include "server/store/sqlite/transactions.h"
 #include "server/store/sqlite/write_queue.h"
@@ -48,6 +51,11 @@ class SqliteStore final : public AtlasStore {
       return UpdatePosesInStore(connection, b);
     });
   }
+  void ChangeSession(SessionChange change, Done<SessionChangeResult> done) override {
+    Write<SessionChangeResult>(std::move(done), [c = std::move(change)](Connection& connection) {
+      return ChangeSessionInStore(connection, c);
+    });
+  }
   void ClaimDirty(ClaimRequest request, Done<ClaimResult> done) override {
     Write<ClaimResult>(std::move(done), [r = std::move(request)](Connection& connection) {
       return Result<ClaimResult>(ClaimTiles(connection, r));
@@ -78,6 +86,15 @@ class SqliteStore final : public AtlasStore {
 
   Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) override;
   Result<TileSources> GatherTile(const TileId& id) override;
+  Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) override {
+    return readers_.Run<TileSources>([&id, revision](Connection& connection) {
+      return GatherTileSourcesAt(connection, id, revision);
+    });
+  }
+  Status CheckRevision(std::uint64_t revision) override {
+    return ReadStatus(
+        [revision](Connection& connection) { return CheckRevisionKept(connection, revision); });
+  }
   Result<Bytes> ReadKeyframeBlob(std::int64_t id) override {
     return readers_.Run<Bytes>([id](Connection& connection) { return ReadBlob(connection, id); });
   }
@@ -85,7 +102,7 @@ class SqliteStore final : public AtlasStore {
                                                     std::uint32_t limit) override;
   Result<KeyframeRecord> ReadKeyframe(std::int64_t id) override {
     return readers_.Run<KeyframeRecord>(
-        [id](Connection& connection) { return ReadKeyframeRecord(connection, id); });
+        [id](Connection& connection) { return VerifyKeyframeRecord(connection, id); });
   }
 
   Result<std::optional<StoredTile>> ReadTile(const TileId& id) override {
@@ -100,8 +117,18 @@ class SqliteStore final : public AtlasStore {
       return Result<std::vector<TileSummary>>(ListTileRows(connection, after_key, limit));
     });
   }
-  Result<std::vector<TileId>> ListFootprintTiles(std::int64_t after_key,
-                                                 std::uint32_t limit) override;
+  Result<std::vector<TileId>> ListFootprintTiles(std::uint8_t level,
+                                                 std::int64_t after_key,
+                                                 std::uint32_t limit) override {
+    return readers_.Run<std::vector<TileId>>([=](Connection& connection) {
+      return ListFootprintRows(connection, level, after_key, limit);
+    });
+  }
+  Status ScanFootprintTiles(const TileRect& rect,
+                            const std::function<void(const TileId&)>& visit) override {
+    return ReadStatus(
+        [&](Connection& connection) { return ScanFootprintRows(connection, rect, visit); });
+  }
 
   Result<DirtyState> ReadDirtyState() override {
     return readers_.Run<DirtyState>(
@@ -112,8 +139,22 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<std::vector<SessionRecord>>(
         [](Connection& connection) { return ReadSessions(connection); });
   }
+  Status CheckSession(const SessionKey& key) override {
+    return ReadStatus(
+        [&key](Connection& connection) { return CheckSessionHistory(connection, key); });
+  }
 
  private:
+  // Runs `read`, which returns a Status, in one snapshot.
+  template <typename Read>
+  Status ReadStatus(Read&& read) {
+    const auto result = readers_.Run<bool>([&](Connection& connection) -> Result<bool> {
+      Status status = read(connection);
+      return status.ok() ? Result<bool>(true) : Error(std::move(status));
+    });
+    return result ? Status() : result.error();
+  }
+
   // Queues `work`, which returns a Result<T>; `done` gets it once it is on disk.
   template <typename T, typename Work>
   void Write(Done<T> done, Work work) {
@@ -163,7 +204,7 @@ Result<TileSources> SqliteStore::GatherTile(const TileId& id) {
       if (!record) {
         return Error(record.error());
       }
-      if (record->session_state == SessionState::kLive) {
+      if (IsInMap(record->session_state)) {
         sources.keyframes.push_back(std::move(*record));
       }
     }
@@ -203,31 +244,9 @@ Result<std::vector<std::optional<StoredTile>>> SqliteStore::ReadTiles(std::span<
 
 Status SqliteStore::ScanTiles(const TileRect& rect,
                               const std::function<void(const TileSummary&)>& visit) {
-  const auto result = readers_.Run<bool>([&](Connection& connection) {
+  return ReadStatus([&](Connection& connection) {
     ScanTileRows(connection, rect, visit);
-    return Result<bool>(true);
-  });
-  return result ? Status() : result.error();
-}
-
-Result<std::vector<TileId>> SqliteStore::ListFootprintTiles(std::int64_t after_key,
-                                                            std::uint32_t limit) {
-  using Ids = std::vector<TileId>;
-  return readers_.Run<Ids>([=](Connection& connection) -> Result<Ids> {
-    Query row = connection.Prepare(
-        "SELECT DISTINCT tile_key FROM keyframe_tiles WHERE tile_key > ? ORDER BY tile_key LIMIT "
-        "?");
-    row.Bind(after_key).Bind(limit);
-    Ids ids;
-    while (row.Step()) {
-      row.Rewind();
-      const auto id = TileId::FromKey(row.Unsigned());
-      if (!id) {
-        return Error(id.error().WithContext("store: footprint index"));
-      }
-      ids.push_back(*id);
-    }
-    return ids;
+    return Status();
   });
 }
 

@@ -8,8 +8,10 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/counters.h"
 #include "server/store/sqlite/dirty_table.h"
+#include "server/store/sqlite/footprint_table.h"
 #include "server/store/sqlite/keyframe_table.h"
 #include "server/store/sqlite/pose_table.h"
+#include "server/store/sqlite/session_state_table.h"
 #include "server/store/sqlite/session_table.h"
 #include "server/store/sqlite/tile_table.h"
 
@@ -21,43 +23,61 @@ bool IsSameUpload(const KeyframeRow& stored, const NewKeyframe& keyframe) {
          stored.record.time_ms == keyframe.time_ms;
 }
 
+template <typename Tiles>
+void MarkTiles(Connection& connection, const Tiles& tiles, std::uint64_t revision) {
+  for (const TileId& tile : tiles) {
+    MarkTile(connection, tile, revision, revision);
+  }
+}
+
 PutKeyframeResult AddKeyframe(Connection& connection,
                               const NewKeyframe& keyframe,
                               const SessionRow& session) {
   const std::uint64_t revision = NextRevision(connection);
   const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kLastKeyframeId, 1));
   InsertKeyframe(connection, keyframe, id, session.id, revision);
-  WritePose(connection, {id, keyframe.pose, revision, 0, keyframe.key.session.vehicle});
+  const std::string& author = keyframe.key.session.vehicle;
+  WritePose(connection, {id, keyframe.pose, revision, 0, author});
   WriteFootprint(connection, id, keyframe.footprint);
-  for (const TileId& tile : keyframe.footprint) {
-    MarkTile(connection, tile, revision, revision);
+  if (session.record.keyframes == 0) {
+    WriteSessionState(connection, {session.id, revision, session.record.state, author, ""});
+  }
+  const bool is_in_map = IsInMap(session.record.state);
+  if (is_in_map) {
+    MarkTiles(connection, keyframe.footprint, revision);
   }
   CountKeyframe(connection, session, keyframe);
   AddToCounter(connection, Counter::kKeyframes, 1);
   AddToCounter(connection, Counter::kKeyframeBytes,
                static_cast<std::int64_t>(keyframe.blob.size()));
-  return {false, revision, static_cast<std::uint32_t>(keyframe.footprint.size())};
+  return {false, revision, is_in_map ? static_cast<std::uint32_t>(keyframe.footprint.size()) : 0u};
 }
 
-// The tiles to mark for one pose of a batch; empty when the pose does not change.
-Result<std::vector<TileId>> MovePose(Connection& connection,
-                                     const NewPose& update,
-                                     const PoseChange& change) {
+// What one pose of a batch comes to.
+struct PoseMove {
+  bool is_changed = false;
+  std::vector<TileId> tiles;  // to be marked
+};
+
+Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const PoseChange& change) {
   const auto stored = FindKeyframeRecord(connection, update.key);
   if (!stored) {
     return Error(stored.error());
   }
   if (stored->pose == update.pose) {
-    return std::vector<TileId>();
+    return PoseMove{};
   }
   PoseChange numbered = change;
   numbered.keyframe_id = stored->id;
   numbered.pose = update.pose;
   WritePose(connection, numbered);
-  std::vector<TileId> tiles = ReadFootprint(connection, stored->id);
-  tiles.insert(tiles.end(), update.footprint.begin(), update.footprint.end());
+  PoseMove move{true, {}};
+  if (IsInMap(stored->session_state)) {
+    move.tiles = ReadFootprint(connection, stored->id);
+    move.tiles.insert(move.tiles.end(), update.footprint.begin(), update.footprint.end());
+  }
   WriteFootprint(connection, stored->id, update.footprint);
-  return tiles;
+  return move;
 }
 
 Status CheckKeysDiffer(const PoseBatch& batch) {
@@ -106,12 +126,12 @@ Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBat
   change.author = batch.author;
   std::set<TileId> marked;
   for (const NewPose& update : batch.poses) {
-    const auto tiles = MovePose(connection, update, change);
-    if (!tiles) {
-      return Error(tiles.error());
+    const auto move = MovePose(connection, update, change);
+    if (!move) {
+      return Error(move.error());
     }
-    result.updated += tiles->empty() ? 0u : 1u;
-    marked.insert(tiles->begin(), tiles->end());
+    result.updated += move->is_changed ? 1u : 0u;
+    marked.insert(move->tiles.begin(), move->tiles.end());
   }
   if (result.updated == 0) {
     result.revision = change.revision - 1;
@@ -120,9 +140,7 @@ Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBat
   result.revision = NextRevision(connection);
   result.batch = AddToCounter(connection, Counter::kBatch, 1);
   result.tiles_marked = static_cast<std::uint32_t>(marked.size());
-  for (const TileId& tile : marked) {
-    MarkTile(connection, tile, result.revision, result.revision);
-  }
+  MarkTiles(connection, marked, result.revision);
   WritePoseBatch(connection, batch, result);
   return result;
 }
@@ -148,9 +166,7 @@ Result<FinishResult> FinishTileInStore(Connection& connection,
 
 std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids) {
   const std::uint64_t revision = NextRevision(connection);
-  for (const TileId& id : ids) {
-    MarkTile(connection, id, revision, revision);
-  }
+  MarkTiles(connection, ids, revision);
   return static_cast<std::uint32_t>(ids.size());
 }
 

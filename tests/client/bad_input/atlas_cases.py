@@ -181,6 +181,7 @@ def without_daemon_cases(cases, drives):
     listener.close()
     for line in (["ingest", drives.good], ["wait"], ["status"], ["point", "0", "0"],
                  ["query", "--center", "0,0", "--radius", "5"], ["sessions"], ["digest"], ["verify"],
+                 ["session", "retract", "vehicle/good"], ["digest", "--at", "1"], ["point", "0", "0", "--at", "1"],
                  ["localize", drives.good], ["plan", "--from", "0,0,0", "--to", "1,0,0"],
                  ["render", "-o", drives.folder / "never.png"]):
         done = gone.call(*line, "--json")

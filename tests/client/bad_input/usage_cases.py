@@ -38,7 +38,9 @@ USAGE = {
     ],
     "poses": [[], ["apply"], ["revert"], ["apply", "a", "b"]],
     "sessions": [["more"]],
-    "digest": [["more"], ["--timeout", "-1"]],
+    "session": [[], ["retract"], ["restore"], ["purge", "vehicle/good"], ["retract", "vehicle/good", "more"],
+                ["restore", "vehicle"], ["retract", "vehicle/good/1"], ["retract", "--at", "1", "vehicle/good"]],
+    "digest": [["more"], ["--timeout", "-1"], ["--at"], ["--at", "-1"], ["--at", "first"], ["--at", "1", "--at", "2"]],
     "verify": [["more"], ["--rebuild=often"], ["--timeout", "x"]],
     "segment": [
         [], ["DRIVE", "--threshold", "0"], ["DRIVE", "--threshold", "-1"], ["DRIVE", "--threshold", "nan"],
@@ -113,7 +115,7 @@ def odd_but_right_cases(cases, drives):
 
 
 def help_cases(cases):
-    for line in ([], *([command] for command in USAGE), ["poses", "apply"]):
+    for line in ([], *([command] for command in USAGE), ["poses", "apply"], ["session", "retract"]):
         done = cases.call(*line, "--help")
         cases.report.equal(f"{line} --help: exit code", done.returncode, 0)
         cases.report.check(f"{line} --help: on stdout", "Usage: atlas" in done.stdout and not done.stderr,

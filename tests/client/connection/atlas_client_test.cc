@@ -182,5 +182,37 @@ TEST(AtlasClientTest, WaitThatTimesOutIsTimeout) {
   EXPECT_EQ(wait.error().code(), StatusCode::kTimeout);
 }
 
+TEST(AtlasClientTest, AnOldDaemonIsNotAskedForThePast) {
+  TestPeer peer([](PeerSocket& socket) {
+    wire::Envelope hello;
+    hello.mutable_hello_reply()->set_protocol_major(kProtocolMajor);
+    hello.mutable_hello_reply()->set_protocol_minor(1);
+    hello.mutable_hello_reply()->set_profile(ProfileToWire({}));
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(hello));
+    socket.Drain();
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  const auto digest = client->Digest(std::chrono::milliseconds(10), 3);
+  ASSERT_FALSE(digest);
+  EXPECT_EQ(digest.error().code(), StatusCode::kUnsupported);
+  RegionQuery query;
+  query.at_revision = 3;
+  EXPECT_EQ(client->QueryRegion(query, nullptr).error(), digest.error());
+}
+
+TEST(AtlasClientTest, ASessionThatIsNoneIsNotAskedFor) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    socket.Drain();
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  for (const SessionKey& key : {SessionKey{"", "day"}, SessionKey{"bus", "a/b"}}) {
+    EXPECT_EQ(client->ChangeSession(key, SessionAction::kRetract, "me").error().code(),
+              StatusCode::kInvalidArgument);
+  }
+}
+
 }  // namespace
 }  // namespace atlas

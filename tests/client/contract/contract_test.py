@@ -24,6 +24,7 @@ KEYS = {
     "query": "type tiles bytes revision truncated",
     "poses": "updated tiles_marked revision batch",
     "sessions": "sessions",
+    "session": "vehicle session state changed tiles_marked revision",
     "digest": "digest tiles revision",
     "verify": "checked damaged mismatched",
     "segment": "precision recall f1 missed_curb false_road ms_per_scan scans",
@@ -37,7 +38,7 @@ LAYER = "z_m sigma_m occupancy traversable observations column"
 COLUMN = "base_m segment_m probabilities"
 TILE = "type level x y revision bytes"
 SCAN = "type scan pose health error_m error_deg"
-LATER = ("retract", "restore", "bounded")  # not before they work
+LATER = ("compact", "--anchor", "--staged")  # not before they work
 
 
 def lines_of(cases, work, drive):
@@ -51,6 +52,7 @@ def lines_of(cases, work, drive):
         "query": ["query", "--center", "0,0", "--radius", "20", "-o", f"{work}/tiles"],
         "poses": ["poses", "apply", correction],
         "sessions": ["sessions"],
+        "session": ["session", "restore", "vehicle/good"],
         "digest": ["digest"],
         "verify": ["verify", "--rebuild"],
         "segment": ["segment", drive, "--curbs"],

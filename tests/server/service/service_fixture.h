@@ -80,6 +80,8 @@ class ServiceTest : public ::testing::Test {
     // Less than the drive: caches must not matter.
     service.fusion.building.keyframe_bytes = 1u << 20;
     service.fusion.building.surveys = {100'000, 100'000};
+    service.past_cache_bytes = 1u << 20;
+    service.scratch_directory = directory_;
     service_ = std::make_unique<AtlasService>(
         *store_, [] { return kTestNow_ms; }, [](LogLevel, const std::string&) {}, service);
   }
@@ -97,9 +99,19 @@ class ServiceTest : public ::testing::Test {
       service_->UpdatePoses({std::move(updates), "tester", 0}, std::move(done));
     });
   }
+  Result<SessionChangeResult> Change(const std::string& session, SessionAction action) {
+    return Await<SessionChangeResult>([&](auto done) {
+      service_->ChangeSession({{"bus", session}, action, "tester", "why not"}, std::move(done));
+    });
+  }
   static Patience Long() { return {std::chrono::seconds(60), {}}; }
   AtlasDigest Digest() {
     auto digest = service_->Digest(Long());
+    EXPECT_TRUE(digest.has_value()) << digest.error().message();
+    return digest.value_or(AtlasDigest());
+  }
+  AtlasDigest DigestAt(std::uint64_t revision) {
+    auto digest = service_->DigestAt(revision, Long());
     EXPECT_TRUE(digest.has_value()) << digest.error().message();
     return digest.value_or(AtlasDigest());
   }

@@ -111,7 +111,7 @@ TEST_F(DurabilityTest, ADirectoryOfOtherFilesIsLeftAlone) {
 
 TEST_F(DurabilityTest, ANewerSchemaIsRefused) {
   Open();
-  Tamper("PRAGMA user_version = 2");
+  Tamper("PRAGMA user_version = 3");
   EXPECT_EQ(OpenCode(), StatusCode::kUnsupported);
 }
 

@@ -174,7 +174,7 @@ TEST_F(TileStoreTest, ScanFindsExactlyTheRectangle) {
   }
   EXPECT_EQ(store_->ListTiles(-1, 1000)->size(), 256u);
   EXPECT_EQ(store_->ListTiles(static_cast<std::int64_t>(seen[0].Key()), 5)->size(), 5u);
-  EXPECT_EQ(store_->ListFootprintTiles(-1, 1000)->size(), 256u);
+  EXPECT_EQ(store_->ListFootprintTiles(0, -1, 1000)->size(), 256u);
 }
 
 TEST(TileRangesTest, CoverHoldsEveryKeyOfTheRectangle) {

@@ -1,4 +1,5 @@
-// Commands about the atlas as a whole: what it holds, whether it is fused and sound, its poses.
+// Commands about the atlas as a whole: what it holds, whether it is fused and sound, its poses and
+// sessions.
 #pragma once
 
 #include <memory>
@@ -9,6 +10,8 @@ namespace atlas {
 
 std::unique_ptr<Command> MakeDigestCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
+std::unique_ptr<Command> MakeSessionRestoreCommand();
+std::unique_ptr<Command> MakeSessionRetractCommand();
 std::unique_ptr<Command> MakeSessionsCommand();
 std::unique_ptr<Command> MakeStatusCommand();
 std::unique_ptr<Command> MakeVerifyCommand();

@@ -22,12 +22,15 @@ class DigestCommand : public Command {
     return "SHA-256 over all tiles, once everything is fused";
   }
 
-  void Declare(ArgumentSet& arguments) override { DeclareTimeout(arguments, timeout_); }
+  void Declare(ArgumentSet& arguments) override {
+    DeclareTimeout(arguments, timeout_);
+    arguments.Optional("--at", "REVISION", at_revision_, "Of the atlas as it was at this revision");
+  }
 
   Status Run(CommandContext& context) override {
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const Result<DigestSummary> digest = client->Digest(timeout_);
+    const Result<DigestSummary> digest = client->Digest(timeout_, at_revision_);
     if (!digest) return digest.error();
     if (context.is_json) {
       context.PrintJson({{"digest", Hex(digest->sha256)},
@@ -42,6 +45,7 @@ class DigestCommand : public Command {
 
  private:
   std::chrono::milliseconds timeout_{600'000};
+  std::optional<std::uint64_t> at_revision_;
 };
 
 }  // namespace

@@ -48,12 +48,15 @@ class PointCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("X", "M", x_m_, "World coordinates of the place");
     arguments.Required("Y", "M", y_m_, "");
+    arguments.Optional("--at", "REVISION", at_revision_, "As the atlas was at this revision");
   }
 
   Status Run(CommandContext& context) override {
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    MapView view(*client);
+    MapViewOptions options;
+    options.at_revision = at_revision_;
+    MapView view(*client, options);
     const auto layers = view.LayersAt({x_m_, y_m_});
     if (!layers) return layers.error();
     if (context.is_json) {
@@ -71,6 +74,7 @@ class PointCommand : public Command {
  private:
   double x_m_ = 0.0;
   double y_m_ = 0.0;
+  std::optional<std::uint64_t> at_revision_;
 };
 
 }  // namespace

@@ -23,6 +23,7 @@ class QueryCommand : public Command {
     arguments.Required("--radius", "R", radius_m_, "Radius of the area, metres");
     arguments.Optional("--level", "L", level_, "Finest level sent; 0 is the finest there is [0]");
     arguments.Optional("--budget", "BYTES", budget_bytes_, "Stop before the reply gets larger");
+    arguments.Optional("--at", "REVISION", at_revision_, "As the atlas was at this revision");
     arguments.Optional("-o,--output", "DIR", directory_, "Write the tiles here, as L_X_Y.tile");
   }
 
@@ -65,6 +66,7 @@ class QueryCommand : public Command {
     query.disc = {center_m_, radius_m_};
     query.finest_level = static_cast<std::uint8_t>(level_);
     query.budget_bytes = budget_bytes_.value_or(0);
+    query.at_revision = at_revision_;
     return query;
   }
 
@@ -100,6 +102,7 @@ class QueryCommand : public Command {
   double radius_m_ = 0.0;
   std::uint32_t level_ = 0;
   std::optional<std::uint64_t> budget_bytes_;
+  std::optional<std::uint64_t> at_revision_;
   std::string directory_;
 };
 

@@ -1,0 +1,78 @@
+// `atlas session retract V/S` and `atlas session restore V/S`: a drive out of the map and back.
+#include "client/cli/commands/atlas/atlas_commands.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+Result<SessionKey> ParseSession(const std::string& text) {
+  const std::size_t slash = text.find('/');
+  if (slash == std::string::npos) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("'", text.substr(0, 80), "': expected VEHICLE/SESSION"));
+  }
+  SessionKey key{text.substr(0, slash), text.substr(slash + 1)};
+  if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
+  return key;
+}
+
+class SessionCommand : public Command {
+ public:
+  SessionCommand(std::string word, std::string summary, SessionAction action)
+      : word_(std::move(word)), summary_(std::move(summary)), action_(action) {}
+
+  std::string Name() const override { return "session " + word_; }
+  std::string Summary() const override { return summary_; }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Required("SESSION", "VEHICLE/SESSION", session_, "As `atlas sessions` lists it");
+  }
+
+  Status Run(CommandContext& context) override {
+    const Result<SessionKey> key = ParseSession(session_);
+    if (!key) return key.error();
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const auto done = client->ChangeSession(*key, action_, "atlas-session-" + word_);
+    if (!done) return done.error();
+    Print(*key, *done, context);
+    return {};
+  }
+
+ private:
+  static void Print(const SessionKey& key,
+                    const SessionChangeSummary& done,
+                    const CommandContext& context) {
+    if (context.is_json) {
+      context.PrintJson({{"vehicle", key.vehicle},
+                         {"session", key.session},
+                         {"state", done.state},
+                         {"changed", done.is_changed},
+                         {"tiles_marked", done.tiles_marked},
+                         {"revision", done.revision}});
+    } else {
+      context.out << StrCat(key) << (done.is_changed ? " is " : " was already ") << done.state
+                  << ", " << done.tiles_marked << " tiles to be fused again, revision "
+                  << done.revision << '\n';
+    }
+  }
+
+  std::string word_;
+  std::string summary_;
+  SessionAction action_;
+  std::string session_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeSessionRetractCommand() {
+  return std::make_unique<SessionCommand>("retract", "Take a session out of the map",
+                                          SessionAction::kRetract);
+}
+
+std::unique_ptr<Command> MakeSessionRestoreCommand() {
+  return std::make_unique<SessionCommand>("restore", "Put a retracted session back into the map",
+                                          SessionAction::kRestore);
+}
+
+}  // namespace atlas

@@ -1,0 +1,157 @@
+#!/usr/bin/python3
+"""Sessions retracted and restored, and the atlas as of earlier revisions, through `atlas` and `atlasd`.
+Usage: history_test.py BIN_DIR DRIVE; DRIVE is a simulated street."""
+
+import contextlib
+import pathlib
+import sqlite3
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+
+from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
+
+PLACE = ("1", "-1.6")
+AREA = ("--center", "0,0", "--radius", "20")
+
+
+class Moment:
+    """Everything that the atlas shows at a revision, now or with --at."""
+
+    def __init__(self, cases, work, at=None):
+        past = () if at is None else ("--at", at)
+        digest = cases.run("digest", *past)
+        self.digest, self.tiles, self.revision = digest["digest"], digest["tiles"], digest["revision"]
+        self.layers = cases.run("point", *PLACE, *past)["layers"]
+        with tempfile.TemporaryDirectory(dir=work) as folder:
+            summary = cases.run("query", *AREA, "-o", folder, *past)
+            self.files = {file.name: file.read_bytes() for file in pathlib.Path(folder).iterdir()}
+        self.query = summary["tiles"], summary["bytes"], summary["truncated"]
+        self.query_revision = summary["revision"]
+
+
+def same(cases, name, found, expected):
+    for what in ("digest", "tiles", "layers", "files"):
+        is_same = getattr(found, what) == getattr(expected, what)
+        cases.report.check(f"{name}: {what}", is_same, getattr(found, what))
+
+
+def past_cases(cases, work, moments):
+    for name, moment in moments.items():
+        past = Moment(cases, work, moment.revision)
+        same(cases, f"{name}, read back", past, moment)
+        cases.report.equal(f"{name}, read back: revisions", (past.revision, past.query_revision),
+                           (moment.revision, moment.revision))
+    empty = Moment(cases, work, 0)
+    cases.report.equal("revision 0", (empty.tiles, empty.layers, empty.query[0], empty.revision), (0, [], 0, 0))
+
+
+def session_state(cases, name):
+    return {session["session"]: session["state"] for session in cases.run("sessions")["sessions"]}[name]
+
+
+def change(cases, word, name, state, is_news):
+    before = cases.run("status")["revision"]
+    done = cases.run("session", word, f"vehicle/{name}")
+    cases.report.check(f"{word}: keys", {"tiles_marked", "revision", "state", "changed"} <= set(done), done)
+    cases.report.equal(f"{word}: state", (done["state"], session_state(cases, name)), (state, state))
+    cases.report.equal(f"{word}: something changed", (done["changed"], done["tiles_marked"] > 0), (is_news, is_news))
+    if not is_news:
+        cases.report.equal(f"{word} again: revision", (done["revision"], cases.run("status")["revision"]),
+                           (before, before))
+    cases.run("wait")
+
+
+def live_cases(cases, drives, work):
+    """What the atlas was at each of a few revisions."""
+    moments = {}
+
+    def remember(name):
+        moments[name] = Moment(cases, work)
+        return moments[name]
+
+    cases.run("ingest", drives.good, *NEAR)
+    one = remember("one session")
+    cases.report.check("one session: tiles", one.tiles > 0 and one.layers and one.files, vars(one))
+    cases.run("ingest", drives.good, *NEAR, "--session", "second", "--shuffle", "3")
+    two = remember("two sessions")
+    cases.report.check("two sessions: another map", two.digest != one.digest, two.digest)
+    change(cases, "retract", "second", "retracted", True)
+    same(cases, "the second retracted", remember("the second retracted"), one)
+    change(cases, "retract", "second", "retracted", False)
+    text = cases.call("session", "retract", "vehicle/second")
+    cases.report.equal("retract twice: exit code and stderr", (text.returncode, text.stderr), (0, ""))
+    cases.report.check("sessions as a table", "retracted" in cases.call("sessions").stdout)
+    done = cases.run("ingest", drives.good, *NEAR, "--session", "second")
+    cases.report.equal("uploads to a retracted session", (done["acked"], done["duplicates"]), (5, 5))
+    correction = pathlib.Path(work) / "corrections.txt"
+    correction.write_text("vehicle second 0 1 0 0 0.75 0 1 0 -1.6 0 0 1 1.8\n", encoding="ascii")
+    moved = cases.run("poses", "apply", correction)
+    cases.report.equal("poses of a retracted session", (moved["updated"], moved["tiles_marked"]), (1, 0))
+    same(cases, "still without the second", remember("still without the second"), one)
+    change(cases, "restore", "second", "live", True)
+    back = remember("back and moved")
+    cases.report.check("back and moved: another map", back.digest not in (one.digest, two.digest), back.digest)
+    change(cases, "restore", "second", "live", False)
+    change(cases, "retract", "good", "retracted", True)
+    remember("only the second")
+    change(cases, "retract", "second", "retracted", True)
+    cases.report.equal("nothing left", remember("nothing left").tiles, 0)
+    change(cases, "restore", "second", "live", True)
+    change(cases, "restore", "good", "live", True)
+    same(cases, "all restored", remember("all restored"), back)
+    return moments
+
+
+def refused_cases(cases):
+    for word in ("retract", "restore"):
+        for name in ("vehicle/nobody", "nobody/good"):
+            cases.refused(f"session {word} {name}", ["session", word, name], "not_found", name)
+        for name in ("vehicle", "", "/", "vehicle/", "/good", "vehicle/good/1", "a b/c", "ä/b", "x" * 65 + "/good"):
+            cases.refused(f"session {word} {name[:20]!r}", ["session", word, name], "invalid_argument")
+    revision = cases.run("status")["revision"]
+    for line in (["digest"], ["point", *PLACE], ["query", *AREA]):
+        name = f"{line[0]} --at"
+        for later in (revision + 1, 2**63, 2**64 - 1):
+            cases.refused(f"{name} {later}", [*line, "--at", later], "invalid_argument",
+                          f"there is no revision {later} yet")
+        for none in ("-1", "x", "", "1.5", "18446744073709551616", "nan", "1e3"):
+            cases.refused(f"{name} {none!r}", [*line, "--at", none], "invalid_argument")
+    cases.refused("digest --at in no time", ["digest", "--at", revision, "--timeout", "0"], "timeout", "in time")
+
+
+def forgotten_cases(cases, revision):
+    for line in (["digest"], ["point", *PLACE], ["query", *AREA]):
+        cases.refused(f"{line[0]} --at before the horizon", [*line, "--at", revision - 1], "not_found",
+                      f"the oldest is {revision}")
+        done = cases.call(*line, "--at", revision, "--json")
+        cases.report.equal(f"{line[0]} --at the horizon", done.returncode, 0)
+
+
+def main():
+    bin_dir, source = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+    report = Report()
+    with tempfile.TemporaryDirectory() as work:
+        data = work + "/atlas"
+        drives = Drives(source, work + "/drives")
+        with Daemon(bin_dir, data, *SMALL) as daemon:
+            cases = Cases(report, bin_dir, daemon.server)
+            moments = live_cases(cases, drives, work)
+            refused_cases(cases)
+        with Daemon(bin_dir, data) as daemon:
+            cases = Cases(report, bin_dir, daemon.server)
+            past_cases(cases, work, moments)
+            report.equal("nothing left of the digests' scratch", [path.name for path in pathlib.Path(data).iterdir()
+                                                                  if "scratch" in path.name], [])
+        horizon = moments["two sessions"].revision
+        with contextlib.closing(sqlite3.connect(data + "/atlas.db")) as database, database:
+            database.execute("UPDATE counters SET value = ? WHERE name = 'history_horizon'", (horizon,))
+        with Daemon(bin_dir, data) as daemon:
+            forgotten_cases(Cases(report, bin_dir, daemon.server), horizon)
+    print(f"{report.checks} checks, {report.failed} failed")
+    return 1 if report.failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

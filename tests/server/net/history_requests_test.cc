@@ -1,0 +1,163 @@
+// Sessions retracted and restored, and the atlas as of earlier revisions, over a real socket.
+#include <map>
+
+#include "tests/server/net/net_fixture.h"
+
+namespace atlas {
+namespace {
+
+using Action = wire::ChangeSession::Action;
+
+class HistoryRequestTest : public NetTest {
+ protected:
+  static wire::Envelope ChangeOf(const std::string& session, Action action) {
+    wire::Envelope envelope;
+    envelope.set_request_id(5);
+    wire::ChangeSession& change = *envelope.mutable_change_session();
+    change.set_vehicle("bus");
+    change.set_session(session);
+    change.set_action(action);
+    change.set_author("tester");
+    return envelope;
+  }
+  static wire::Envelope DigestOf(std::uint64_t at_revision, std::uint32_t timeout_ms = 60'000) {
+    wire::Envelope envelope;
+    envelope.mutable_digest_request()->set_at_revision(at_revision);
+    envelope.mutable_digest_request()->set_timeout_ms(timeout_ms);
+    return envelope;
+  }
+  static wire::Envelope QueryAt(std::uint64_t at_revision, std::uint64_t budget_bytes = 0) {
+    wire::Envelope envelope = QueryOf(9, budget_bytes);
+    envelope.mutable_query_region()->set_at_revision(at_revision);
+    envelope.mutable_query_region()->set_timeout_ms(60'000);
+    return envelope;
+  }
+  // Tiles by key, and the end, of the query that is under way.
+  static std::map<std::uint64_t, wire::TileMessage> Receive(BlockingPeer& peer,
+                                                            wire::QueryEnd* end = nullptr) {
+    std::map<std::uint64_t, wire::TileMessage> tiles;
+    for (auto reply = peer.Receive(); reply; reply = peer.Receive()) {
+      if (!reply->has_tile()) {
+        EXPECT_TRUE(reply->has_query_end()) << reply->ShortDebugString();
+        if (end != nullptr) {
+          *end = reply->query_end();
+        }
+        return tiles;
+      }
+      tiles[reply->tile().key()] = reply->tile();
+    }
+    ADD_FAILURE() << "no end of the reply";
+    return tiles;
+  }
+};
+
+TEST_F(HistoryRequestTest, ASessionIsRetractedAndRestored) {
+  Serve();
+  UploadDrive(3);
+  const AtlasDigest before = Digest();
+  const auto peer = Connect();
+  for (const bool is_first : {true, false}) {
+    peer->Send(ChangeOf("day", wire::ChangeSession::RETRACT));
+    const auto reply = peer->Receive();
+    ASSERT_TRUE(reply->has_change_session_reply()) << reply->ShortDebugString();
+    EXPECT_EQ(reply->change_session_reply().changed(), is_first);
+    EXPECT_EQ(reply->change_session_reply().state(), "retracted");
+    EXPECT_EQ(reply->change_session_reply().tiles_marked() > 0, is_first);
+  }
+  EXPECT_EQ(Digest().tiles, 0u);
+  wire::Envelope sessions;
+  sessions.mutable_sessions_request();
+  peer->Send(sessions);
+  EXPECT_EQ(peer->Receive()->sessions_reply().sessions(0).state(), "retracted");
+  peer->Send(ChangeOf("day", wire::ChangeSession::RESTORE));
+  EXPECT_EQ(peer->Receive()->change_session_reply().state(), "live");
+  EXPECT_EQ(Digest().sha256, before.sha256);
+}
+
+TEST_F(HistoryRequestTest, BadSessionChangesAreTyped) {
+  Serve();
+  UploadDrive(1);
+  const auto peer = Connect();
+  const auto code = [&](const wire::Envelope& request) {
+    peer->Send(request);
+    return CodeOf(peer->Receive());
+  };
+  EXPECT_EQ(code(ChangeOf("dusk", wire::ChangeSession::RETRACT)), StatusCode::kNotFound);
+  EXPECT_EQ(code(ChangeOf("a/b", wire::ChangeSession::RETRACT)), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code(ChangeOf("day", wire::ChangeSession::NONE)), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code(ChangeOf("day", static_cast<Action>(7))), StatusCode::kInvalidArgument);
+  EXPECT_EQ(service_->ListSessions()->at(0).state, SessionState::kLive);
+}
+
+TEST_F(HistoryRequestTest, AQueryOfThePastSendsItsTilesWithItsRevision) {
+  Serve();
+  UploadDrive(3);
+  const std::uint64_t revision = Digest().revision;
+  const auto peer = Connect();
+  peer->Send(QueryOf(9));
+  const auto was = Receive(*peer);
+  UploadDrive(6);
+  Digest();
+  wire::QueryEnd end;
+  peer->Send(QueryAt(revision));
+  const auto past = Receive(*peer, &end);
+  ASSERT_EQ(past.size(), was.size());
+  for (const auto& [key, tile] : past) {
+    EXPECT_EQ(tile.payload_hash(), was.at(key).payload_hash());
+    EXPECT_EQ(tile.revision(), revision);
+  }
+  EXPECT_EQ(end.revision(), revision);
+  EXPECT_EQ(end.tiles(), was.size());
+  peer->Send(QueryAt(0));
+  EXPECT_TRUE(Receive(*peer, &end).empty());
+  EXPECT_EQ(end.revision(), 0u);
+  peer->Send(QueryAt(revision, 3'000));
+  EXPECT_LT(Receive(*peer, &end).size(), was.size());
+  EXPECT_TRUE(end.truncated());
+  EXPECT_LE(end.bytes(), 3'000u);
+}
+
+TEST_F(HistoryRequestTest, ADigestOfThePastIsWhatItWas) {
+  Serve();
+  UploadDrive(2);
+  const AtlasDigest was = Digest();
+  UploadDrive(5);
+  const auto peer = Connect();
+  peer->Send(DigestOf(was.revision));
+  const auto reply = peer->Receive();
+  ASSERT_TRUE(reply->has_digest_reply()) << reply->ShortDebugString();
+  EXPECT_EQ(reply->digest_reply().sha256(), BytesToWire(was.sha256));
+  EXPECT_EQ(reply->digest_reply().revision(), was.revision);
+}
+
+TEST_F(HistoryRequestTest, RevisionsToComeAndNoTimeAreTyped) {
+  Serve();
+  UploadDrive(2);
+  Digest();
+  const auto peer = Connect();
+  peer->Send(DigestOf(1'000'000));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kInvalidArgument);
+  peer->Send(QueryAt(1'000'000));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kInvalidArgument);
+  peer->Send(DigestOf(2, 0));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kTimeout);
+  wire::Envelope hasty = QueryAt(2);
+  hasty.mutable_query_region()->clear_timeout_ms();
+  peer->Send(hasty);
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kTimeout);
+  ExpectServes();
+}
+
+TEST_F(HistoryRequestTest, RequestsForThePastTakePlaces) {
+  net_.max_waits = 0;
+  Serve();
+  UploadDrive(1);
+  const auto peer = Connect();
+  peer->Send(DigestOf(1));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kUnavailable);
+  peer->Send(QueryAt(1));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kUnavailable);
+}
+
+}  // namespace
+}  // namespace atlas
