@@ -37,7 +37,8 @@ constexpr Setting kSettings[] = {
      "new atlas: segments a column: 2, 4, 8 or 16 (8)"},
     {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT",
      "new atlas: metres a segment (1)"},
-    {"map.preset", "--preset", "ATLASD_PRESET", "new atlas: fusion preset: strict, bounded or paper (strict)"},
+    {"map.preset", "--preset", "ATLASD_PRESET",
+     "new atlas: fusion preset: strict, bounded or paper (strict)"},
 };
 
 using Settings = std::map<std::string, GivenSetting>;

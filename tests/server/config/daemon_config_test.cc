@@ -82,7 +82,8 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
 
 TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
   const std::string file = File(
-      "data = '/file'\nworkers = 1\ncache_mib = 9\nsurvey_mib = 0\nlisten = '127.0.0.1:1'\nlog_level = 'error'\n"
+      "data = '/file'\nworkers = 1\ncache_mib = 9\nsurvey_mib = 0\nlisten = "
+      "'127.0.0.1:1'\nlog_level = 'error'\n"
       "[map]\ncell_size = 0.2\nsegments = 4\nsegment_height = 0.5\npreset = 'strict'\n");
   SetVariable("ATLASD_WORKERS", "2");
   SetVariable("ATLASD_LISTEN", "127.0.0.1:2");
