@@ -54,7 +54,9 @@ TileLayer EvidenceFolder::FoldLayer(std::span<const SegmentView> segments,
   const CellLayer& surface = layers[layer];
   const std::int32_t* above = layer + 1 < layers.size() ? &layers[layer + 1].altitude_mm : nullptr;
   const ColumnSpan span = ColumnSpanOf(surface.altitude_mm, above, profile_);
-  const FoldClamp clamp{profile_.stretch_clamp, profile_.carry_clamp, profile_.evidence_clamp};
+  const FoldClamp clamp{static_cast<std::int8_t>(profile_.stretch_clamp),
+                        static_cast<std::int8_t>(profile_.carry_clamp),
+                        static_cast<std::int8_t>(profile_.evidence_clamp)};
   int occupancy = 0;
   ColumnSum sum;
   for (const std::uint32_t i : order_) {
@@ -64,8 +66,8 @@ TileLayer EvidenceFolder::FoldLayer(std::span<const SegmentView> segments,
     occupancy = FoldEvidence(occupancy, segments[i].segment->occupancy, clamp);
     const Segment& segment = *segments[i].segment;
     if (segment.column_seen != 0) {
-      sum.Fold(segments[i].column, segment.column_seen,
-               std::int64_t{span.base} - segment.column_base, clamp);
+      sum.Fold(segment.column, segment.column_seen, std::int64_t{span.base} - segment.column_base,
+               clamp);
     }
   }
   constexpr std::uint32_t kMaxObservations = std::numeric_limits<std::uint16_t>::max();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -30,10 +31,11 @@ class FrameResampler {
                  const SigmaTable& sigmas,
                  const MapProfile& profile);
 
-  // Calls visit(cell, observation) for the cells of the band that the keyframe saw; cells count
+  // Calls visit(cell, observation) for the cells of the band that the keyframe saw, and for those
+  // of a row expect(cell) before: the one chance to have their memory fetched in time. Cells count
   // row by row from the band's first one.
-  template <typename Visitor>
-  void Visit(const TileBand& band, Visitor&& visit) const;
+  template <typename Expect, typename Visitor>
+  void Visit(const TileBand& band, const Expect& expect, const Visitor& visit) const;
 
  private:
   static constexpr int kFineBits = 31;    // of u and v, in cells
@@ -45,8 +47,21 @@ class FrameResampler {
     std::int64_t end = 0;
   };
   RowSpan DiscSpan(std::int64_t j, std::int64_t first_i, std::int64_t cells) const;
-  // False when the cell was not seen. Requires a point inside the disc, cells x 2^16.
-  bool Observe(std::int64_t u_q16, std::int64_t v_q16, Observation& out) const;
+
+  // A cell of the map that lies inside the disc.
+  struct Place {
+    std::uint32_t cell = 0;   // of the band
+    std::uint32_t index = 0;  // of the keyframe's cell
+    std::uint32_t d2 = 0;     // squared distance from the sensor, cells
+    std::int16_t ix = 0;      // of the keyframe's cell
+    std::int16_t iy = 0;
+  };
+  static constexpr std::size_t kMaxRowCells = 256;  // MapProfile's largest tile
+  using Row = std::array<Place, kMaxRowCells>;
+  // Fills `row` with the places of row `y` of the band; returns their number.
+  std::size_t FindPlaces(const TileBand& band, std::int32_t y, Row& row) const;
+  // False when the cell was not seen.
+  bool Observe(const Place& place, Observation& out) const;
   std::int32_t NearestLattice(std::int32_t z_mm) const {
     return static_cast<std::int32_t>(RoundDiv(z_mm, segment_height_mm_));
   }
@@ -62,65 +77,50 @@ class FrameResampler {
   std::int64_t v_origin_;
   std::int64_t limit_q32_;      // squared radius
   bool is_level_;               // no residual tilt
+  std::int32_t level_mm_;       // the sensor's altitude, if so
   std::int32_t level_lattice_;  // of the sensor, if so
 };
 
-// Inline: it runs once for every cell that every keyframe saw.
-inline bool FrameResampler::Observe(std::int64_t u_q16,
-                                    std::int64_t v_q16,
-                                    Observation& out) const {
-  const auto ix = static_cast<std::int32_t>(u_q16 >> kCoarseBits);
-  const auto iy = static_cast<std::int32_t>(v_q16 >> kCoarseBits);
-  const std::size_t index = keyframe_.grid.Index(ix, iy);
-  const KeyframeCell& seen = keyframe_.cells[index];
+// Inline: these run once for every cell that every keyframe saw.
+inline bool FrameResampler::Observe(const Place& place, Observation& out) const {
+  const KeyframeCell& seen = keyframe_.cells[place.index];
   if (seen.source == AltitudeSource::kNone) {
     return false;
   }
-  std::int64_t z_um = placement_.z_um;
+  std::int32_t sensor_mm = level_mm_;
   if (!is_level_) {
-    const std::int64_t slope_half_cells = std::int64_t{placement_.slope_x} * (2 * ix + 1) +
-                                          std::int64_t{placement_.slope_y} * (2 * iy + 1);
-    z_um += (slope_half_cells * cell_size_um_) >> kFineBits;
+    const std::int64_t slope_half_cells = std::int64_t{placement_.slope_x} * (2 * place.ix + 1) +
+                                          std::int64_t{placement_.slope_y} * (2 * place.iy + 1);
+    const std::int64_t tilt_um = (slope_half_cells * cell_size_um_) >> kFineBits;
+    sensor_mm = static_cast<std::int32_t>(RoundDiv(placement_.z_um + tilt_um, 1000));
   }
-  // Rounded with the cell's own altitude, a whole number of millimetres: the same for every cell.
-  const auto sensor_mm = static_cast<std::int32_t>(RoundDiv(z_um, 1000));
   out.altitude_mm = sensor_mm + seen.altitude_mm;
-  out.column = keyframe_.columns[index] & column_mask_;
+  out.column = keyframe_.columns[place.index] & column_mask_;
   if (out.column != 0) {
     out.column_base = (is_level_ ? level_lattice_ : NearestLattice(sensor_mm)) +
-                      keyframe_.anchors[keyframe_.BlockIndex(ix, iy)];
+                      keyframe_.anchors[keyframe_.BlockIndex(place.ix, place.iy)];
   }
-  const std::int64_t d2 = (u_q16 * u_q16 + v_q16 * v_q16) >> (2 * kCoarseBits);
-  out.distance_step = sigmas_.Step(static_cast<std::size_t>(d2));
+  out.distance_step = sigmas_.Step(place.d2);
   out.source = seen.source;
   out.occupancy = seen.occupancy;
   return true;
 }
 
-template <typename Visitor>
-void FrameResampler::Visit(const TileBand& band, Visitor&& visit) const {
-  constexpr int kShift = kFineBits - kCoarseBits;
-  const std::int64_t first_i = std::int64_t{band.id.x} * tile_cells_;
-  const std::int64_t first_j = std::int64_t{band.id.y} * tile_cells_ + band.first_row;
-  const std::int64_t cos = placement_.cos_yaw;
-  const std::int64_t sin = placement_.sin_yaw;
+template <typename Expect, typename Visitor>
+void FrameResampler::Visit(const TileBand& band, const Expect& expect, const Visitor& visit) const {
+  Row row;
   Observation observation;
   for (std::int32_t y = 0; y < band.rows; ++y) {
-    const std::int64_t j = first_j + y;
-    const RowSpan row = DiscSpan(j, first_i, tile_cells_);
-    // The centre of cell (i, j) is at (2 i + 1, 2 j + 1) half cells.
-    std::int64_t u = cos * (2 * row.begin + 1) + sin * (2 * j + 1) - u_origin_;
-    std::int64_t v = cos * (2 * j + 1) - sin * (2 * row.begin + 1) - v_origin_;
-    auto cell = static_cast<std::size_t>(y * std::int64_t{tile_cells_} + row.begin - first_i);
-    for (std::int64_t i = row.begin; i < row.end; ++i) {
-      const std::int64_t u_q16 = u >> kShift;
-      const std::int64_t v_q16 = v >> kShift;
-      if (u_q16 * u_q16 + v_q16 * v_q16 < limit_q32_ && Observe(u_q16, v_q16, observation)) {
-        visit(cell, observation);
+    const std::size_t count = FindPlaces(band, y, row);
+    for (std::size_t i = 0; i < count; ++i) {
+      __builtin_prefetch(&keyframe_.cells[row[i].index]);
+      __builtin_prefetch(&keyframe_.columns[row[i].index]);
+      expect(row[i].cell);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (Observe(row[i], observation)) {
+        visit(row[i].cell, observation);
       }
-      ++cell;
-      u += 2 * cos;
-      v -= 2 * sin;
     }
   }
 }

@@ -16,9 +16,11 @@ void PaperSurvey::Add(const FrameOnMap& frame, const Keyframe& keyframe) {
   const auto number = static_cast<std::uint32_t>(frames_.size());
   frames_.push_back({frame.key.sequence, frame.time_ms});
   FrameResampler(frame, keyframe, sigmas_, profile_)
-      .Visit(band_, [&](std::size_t cell, const Observation& observation) {
-        seen_.push_back({cell, number, observation});
-      });
+      .Visit(
+          band_, [](std::size_t) {},
+          [&](std::size_t cell, const Observation& observation) {
+            seen_.push_back({cell, number, observation});
+          });
 }
 
 StretchSurvey PaperSurvey::Finish() {

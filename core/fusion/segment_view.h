@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
 #include "core/fusion/segment.h"
 
@@ -10,7 +9,6 @@ namespace atlas {
 
 struct SegmentView {
   const Segment* segment = nullptr;
-  std::span<const std::int16_t> column;
   std::int64_t last_time_ms = 0;  // of the keyframe that saw it last
   std::uint32_t stretch = 0;      // its place in canonical order
   std::uint32_t session = 0;      // FusionStretch's numbers

@@ -49,15 +49,15 @@ void Take(std::vector<T>& values, ByteSpan& rest) {
 StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
     : profile_(profile),
       band_(band),
-      lanes_(ColumnLanes(profile.column_segments)),
-      clamp_{profile.stretch_clamp, profile.driven_clamp},
+      clamp_{static_cast<std::int8_t>(profile.stretch_clamp),
+             static_cast<std::int8_t>(profile.driven_clamp)},
       occupancy_units_{0, profile.miss_units, profile.hit_units},
       heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone) {}
 
 std::size_t StretchSurvey::bytes() const {
   return sizeof(*this) + frames_.capacity() * sizeof(StretchFrame) +
          heads_.capacity() * sizeof(std::uint32_t) + segments_.capacity() * sizeof(Segment) +
-         columns_.capacity() * sizeof(std::int16_t) + packed_.capacity();
+         packed_.capacity();
 }
 
 void StretchSurvey::Pack() {
@@ -65,18 +65,15 @@ void StretchSurvey::Pack() {
     return;
   }
   Bytes plain;
-  plain.reserve(sizeof(std::uint64_t) + ByteSize(heads_) + ByteSize(segments_) +
-                ByteSize(columns_));
+  plain.reserve(sizeof(std::uint64_t) + ByteSize(heads_) + ByteSize(segments_));
   Append(std::vector<std::uint64_t>{segments_.size()}, plain);
   Append(heads_, plain);
   Append(segments_, plain);
-  Append(columns_, plain);
   packed_ = Compress(plain, kPackLevel);
   packed_size_ = plain.size();
   packed_.shrink_to_fit();
   heads_ = std::vector<std::uint32_t>();
   segments_ = std::vector<Segment>();
-  columns_ = std::vector<std::int16_t>();
 }
 
 void StretchSurvey::Unpack() {
@@ -91,8 +88,6 @@ void StretchSurvey::Unpack() {
   Take(heads_, rest);
   segments_.resize(count[0]);
   Take(segments_, rest);
-  columns_.resize(count[0] * lanes_);
-  Take(columns_, rest);
   packed_ = Bytes();
 }
 
@@ -102,7 +97,12 @@ void StretchSurvey::Add(const FrameOnMap& frame,
   assert(frames_.empty() || frames_.back().sequence < frame.key.sequence);
   AddFrame({frame.key.sequence, frame.time_ms});
   const FrameResampler resampler(frame, keyframe, sigmas, profile_);
-  resampler.Visit(band_, [&](std::size_t cell, const Observation& observation) {
+  const auto expect = [this](std::size_t cell) {
+    if (heads_[cell] != Segment::kNone) {
+      __builtin_prefetch(&segments_[heads_[cell]], 1);
+    }
+  };
+  resampler.Visit(band_, expect, [&](std::size_t cell, const Observation& observation) {
     Join(cell, observation, sigmas);
   });
 }
@@ -173,11 +173,11 @@ std::uint32_t StretchSurvey::AddSegment(std::size_t cell,
   segment.reference_mm = representative.altitude_mm;
   SetRepresentative(representative, segment);
   segment.is_strong = is_strong;
-  segment.column_base = ColumnBaseIndex(representative.altitude_mm, profile_) - kColumnMargin;
+  segment.column_base = ColumnBaseIndex(representative.altitude_mm, profile_) -
+                        ColumnMargin(profile_.column_segments);
   segment.next = heads_[cell];
   heads_[cell] = index;
   segments_.push_back(segment);
-  columns_.resize(columns_.size() + lanes_);
   return index;
 }
 
@@ -198,7 +198,7 @@ void StretchSurvey::AddEvidence(const Observation& observation,
       clamp_.usual);
   if (observation.column != 0) {
     AddNibbles(observation.column, std::int64_t{observation.column_base} - segment.column_base,
-               clamp_, std::span(columns_).subspan(index * lanes_, lanes_), segment.column_seen);
+               clamp_, segment.column, segment.column_seen);
   }
 }
 

@@ -58,9 +58,6 @@ class StretchSurvey {
   // First segment of a cell, the next by Segment::next, or Segment::kNone. Cells row by row.
   std::uint32_t First(std::size_t cell) const { return heads_[cell]; }
   const Segment& At(std::uint32_t segment) const { return segments_[segment]; }
-  std::span<const std::int16_t> Column(std::uint32_t segment) const {
-    return std::span(columns_).subspan(segment * lanes_, lanes_);
-  }
 
  private:
   // Of a cell's segments of one kind the nearest to an altitude, the later one of two.
@@ -78,15 +75,13 @@ class StretchSurvey {
 
   MapProfile profile_;
   TileBand band_;
-  std::size_t lanes_;
   EvidenceClamp clamp_;
   std::array<std::int16_t, 3> occupancy_units_;  // by Occupancy
   std::vector<StretchFrame> frames_;
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;
-  std::vector<std::int16_t> columns_;  // lanes_ a segment
-  Bytes packed_;                       // instead of heads_, segments_ and columns_
-  std::size_t packed_size_ = 0;        // of what it unpacks to
+  Bytes packed_;                 // instead of heads_ and segments_
+  std::size_t packed_size_ = 0;  // of what it unpacks to
 };
 
 }  // namespace atlas

@@ -26,8 +26,8 @@ void TileCombiner::CollectSegments(std::span<const SurveyedStretch> stretches, s
     const StretchSurvey& survey = *stretch.survey;
     for (std::uint32_t i = survey.First(cell); i != Segment::kNone; i = survey.At(i).next) {
       const Segment& segment = survey.At(i);
-      segments_.push_back({&segment, survey.Column(i), survey.frames()[segment.last_frame].time_ms,
-                           number, stretch.session, stretch.vehicle});
+      segments_.push_back({&segment, survey.frames()[segment.last_frame].time_ms, number,
+                           stretch.session, stretch.vehicle});
     }
   }
 }

@@ -70,17 +70,17 @@ Status ValidateFusion(const MapProfile& profile) {
   if (profile.stretch_keyframes < 16 || profile.stretch_keyframes > 4'096) {
     return OutOfRange("keyframes per stretch", profile.stretch_keyframes, "16 to 4096");
   }
-  if (profile.stretch_clamp < 1 || profile.stretch_clamp > 127) {
-    return OutOfRange("stretch clamp", profile.stretch_clamp, "1 to 127");
+  if (profile.evidence_clamp < 64 || profile.evidence_clamp > 127) {
+    return OutOfRange("evidence clamp", profile.evidence_clamp, "64 to 127");
   }
-  if (profile.evidence_clamp < 1 || profile.evidence_clamp > 127) {
-    return OutOfRange("evidence clamp", profile.evidence_clamp, "1 to 127");
+  if (profile.stretch_clamp < 64 || profile.stretch_clamp > profile.evidence_clamp) {
+    return OutOfRange("stretch clamp", profile.stretch_clamp, "64 to the evidence clamp");
   }
   if (profile.carry_clamp < 0 || profile.carry_clamp > profile.evidence_clamp) {
     return OutOfRange("carry clamp", profile.carry_clamp, "0 to the evidence clamp");
   }
-  if (profile.driven_clamp < profile.stretch_clamp || profile.driven_clamp > 16'384) {
-    return OutOfRange("driven clamp", profile.driven_clamp, "the stretch clamp to 16384");
+  if (profile.driven_clamp < profile.stretch_clamp || profile.driven_clamp > 127) {
+    return OutOfRange("driven clamp", profile.driven_clamp, "the stretch clamp to 127");
   }
   return {};
 }

@@ -77,7 +77,7 @@ struct MapProfile {
   std::int16_t carry_clamp = 48;
   // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: seven
   // hits more than misses fill it again, so that what merely follows the vehicle does not.
-  std::int16_t driven_clamp = 192;
+  std::int16_t driven_clamp = 127;
 
   std::optional<GeodeticOrigin> origin;
 

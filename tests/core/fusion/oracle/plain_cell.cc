@@ -13,7 +13,6 @@ namespace atlas::testing {
 namespace {
 
 constexpr std::size_t kMaxSegments = 32;  // of one stretch and kind in a cell
-constexpr int kMargin = 4;                // of a stretch's column, below and above
 
 bool SameStretch(const PlacedKeyframe& a, const PlacedKeyframe& b, const MapProfile& profile) {
   return a.key.sequence / profile.stretch_keyframes == b.key.sequence / profile.stretch_keyframes &&
@@ -123,7 +122,8 @@ PlainCell::Segment& PlainCell::SegmentFor(const PlainObservation& observation,
   }
   Segment& segment = segments_.emplace_back();
   segment.first = observation.placed;
-  segment.column_base = ColumnBaseIndex(observation.altitude_mm, profile_) - kMargin;
+  segment.column_base = ColumnBaseIndex(observation.altitude_mm, profile_) -
+                        std::clamp((16 - profile_.column_segments) / 2, 1, 4);
   return segment;
 }
 
@@ -145,11 +145,10 @@ void PlainCell::AddTo(const PlainObservation& observation,
 }
 
 void PlainCell::AddColumn(const PlainObservation& observation, Segment& segment) const {
-  const int kept = profile_.column_segments <= 8 ? 16 : 24;
   for (int nibble = 0; nibble < profile_.column_segments; ++nibble) {
     const std::uint8_t state = NibbleAt(observation.column, nibble);
     const std::int64_t k = std::int64_t{observation.column_base} + nibble - segment.column_base;
-    if (state == 0 || k < 0 || k >= kept) {
+    if (state == 0 || k < 0 || k >= 16) {
       continue;
     }
     int& sum = segment.column[static_cast<std::size_t>(k)];
@@ -341,7 +340,7 @@ std::uint64_t PlainCell::PublishColumn(std::span<const Segment* const> in_order,
     bool is_seen = false;
     for (const Segment* segment : in_order) {
       const std::int64_t own = lattice - segment->column_base;
-      if (own >= 0 && own < 24 && segment->is_seen[static_cast<std::size_t>(own)]) {
+      if (own >= 0 && own < 16 && segment->is_seen[static_cast<std::size_t>(own)]) {
         is_seen = true;
         sum = Folded(sum, segment->column[static_cast<std::size_t>(own)], profile_);
       }

@@ -45,8 +45,8 @@ class PlainCell {
     std::int64_t observations = 0;
     int occupancy = 0;
     int column_base = 0;
-    std::array<int, 24> column{};
-    std::array<bool, 24> is_seen{};
+    std::array<int, 16> column{};
+    std::array<bool, 16> is_seen{};
     int layer = -1;
     bool is_kept = true;
   };
