@@ -81,7 +81,7 @@ void AddNibbles(std::uint64_t nibbles,
   const Lanes usual = All(clamp.usual);
   const Lanes sum = AddSaturating(before, added, usual);
   // Below -usual, where the vehicle was, a mere miss goes no deeper and a hit adds up from there.
-  const Lanes deep = before + Max(added, Lanes{});
+  const Lanes deep = Min(before, Lanes{}) + Max(added, Lanes{});
   const Lanes usually = before < -usual ? deep : sum;
   const Lanes is_free = added == All(kNibbleEvidence[kNibbleFree]);
   evidence = std::bit_cast<ColumnLanes>(is_free ? -All(clamp.driven) : usually);

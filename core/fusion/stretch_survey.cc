@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cstdlib>
-#include <cstring>
 #include <limits>
 
 #include "core/base/compression.h"
@@ -32,15 +31,14 @@ std::size_t ByteSize(const std::vector<T>& values) {
 
 template <typename T>
 void Append(const std::vector<T>& values, Bytes& out) {
-  const std::size_t begin = out.size();
-  out.resize(begin + ByteSize(values));
-  std::memcpy(out.data() + begin, values.data(), ByteSize(values));
+  const auto* begin = reinterpret_cast<const std::uint8_t*>(values.data());
+  out.insert(out.end(), begin, begin + ByteSize(values));
 }
 
 // Fills `values` from the front of `rest`.
 template <typename T>
 void Take(std::vector<T>& values, ByteSpan& rest) {
-  std::memcpy(values.data(), rest.data(), ByteSize(values));
+  std::copy_n(rest.begin(), ByteSize(values), reinterpret_cast<std::uint8_t*>(values.data()));
   rest = rest.subspan(ByteSize(values));
 }
 
@@ -107,62 +105,83 @@ void StretchSurvey::Add(const FrameOnMap& frame,
   });
 }
 
-// An observation belongs to the segment whose representative is nearest in altitude (the paper's
-// eq. 2), if the two would be one layer. What was guessed says nothing of the altitude where ground
-// was measured, but lends its occupancy and column to the nearest ground.
+// An observation belongs to the segment that was seen last of those as close as one layer always
+// may be, else to the nearest in altitude (the paper's eq. 2), if the two would be one layer. What
+// was guessed says nothing of the altitude where ground was measured, but lends its occupancy and
+// column to the ground.
 void StretchSurvey::Join(std::size_t cell,
                          const Observation& observation,
                          const SigmaTable& sigmas) {
   const auto frame = static_cast<std::uint32_t>(frames_.size() - 1);
   if (!observation.is_strong()) {
-    const Nearest ground = Find(cell, observation.altitude_mm, true);
+    const Match ground = Find(cell, observation.altitude_mm, true);
     if (ground.distance_mm < profile_.other_layer_mm) {
+      MoveToFront(cell, ground);
       AddEvidence(observation, 0, frame, ground.segment);
       return;
     }
   }
-  Nearest nearest = Find(cell, observation.altitude_mm, observation.is_strong());
-  if (!IsOneLayer(observation, nearest, sigmas) && nearest.alike < kMaxCellSegments) {
-    nearest.segment = AddSegment(cell, observation, observation.is_strong());
-  } else if (observation.distance_step < segments_[nearest.segment].distance_step) {
-    SetRepresentative(observation, segments_[nearest.segment]);  // of two equally near the first
+  const Match match = Find(cell, observation.altitude_mm, observation.is_strong());
+  if (!IsOneLayer(observation, match, sigmas) && match.alike < kMaxCellSegments) {
+    AddSegment(cell, observation, observation.is_strong());
+  } else {
+    MoveToFront(cell, match);
+    if (observation.distance_step < segments_[match.segment].distance_step) {
+      SetRepresentative(observation, segments_[match.segment]);  // of two equally near the first
+    }
   }
   AddEvidence(observation, sigmas.Weight(observation.source, observation.distance_step), frame,
-              nearest.segment);
+              heads_[cell]);
 }
 
 // Eq. 1 and the gates.
 bool StretchSurvey::IsOneLayer(const Observation& observation,
-                               const Nearest& nearest,
+                               const Match& match,
                                const SigmaTable& sigmas) const {
-  if (nearest.distance_mm <= profile_.same_layer_mm) {
+  if (match.distance_mm <= profile_.same_layer_mm) {
     return true;
   }
-  if (nearest.distance_mm >= profile_.other_layer_mm) {
+  if (match.distance_mm >= profile_.other_layer_mm) {
     return false;
   }
-  const Segment& segment = segments_[nearest.segment];
+  const Segment& segment = segments_[match.segment];
   return OverlapsAsOneLayer(
       {segment.altitude_mm, sigmas.Sigma100um(segment.source, segment.distance_step)},
       {observation.altitude_mm, sigmas.Sigma100um(observation.source, observation.distance_step)});
 }
 
-StretchSurvey::Nearest StretchSurvey::Find(std::size_t cell,
-                                           std::int32_t altitude_mm,
-                                           bool is_strong) const {
-  Nearest nearest;
-  for (std::uint32_t i = heads_[cell]; i != Segment::kNone; i = segments_[i].next) {
-    if (segments_[i].is_strong == is_strong) {
-      const std::int64_t distance_mm =
-          std::abs(std::int64_t{segments_[i].altitude_mm} - altitude_mm);
-      ++nearest.alike;
-      if (distance_mm < nearest.distance_mm) {
-        nearest.segment = i;
-        nearest.distance_mm = distance_mm;
-      }
+// A cell's segments stand in the order in which they were seen last: several decks cost little more
+// than one.
+StretchSurvey::Match StretchSurvey::Find(std::size_t cell,
+                                         std::int32_t altitude_mm,
+                                         bool is_strong) const {
+  Match nearest;
+  std::uint32_t before = Segment::kNone;
+  for (std::uint32_t i = heads_[cell]; i != Segment::kNone; before = i, i = segments_[i].next) {
+    const Segment& segment = segments_[i];
+    if (segment.is_strong != is_strong) {
+      continue;
+    }
+    const std::int64_t distance_mm = std::abs(std::int64_t{segment.altitude_mm} - altitude_mm);
+    ++nearest.alike;
+    if (distance_mm < nearest.distance_mm) {
+      nearest.segment = i;
+      nearest.distance_mm = distance_mm;
+      nearest.before = before;
+    }
+    if (distance_mm <= profile_.same_layer_mm) {
+      break;
     }
   }
   return nearest;
+}
+
+void StretchSurvey::MoveToFront(std::size_t cell, const Match& match) {
+  if (match.before != Segment::kNone) {
+    segments_[match.before].next = segments_[match.segment].next;
+    segments_[match.segment].next = heads_[cell];
+    heads_[cell] = match.segment;
+  }
 }
 
 std::uint32_t StretchSurvey::AddSegment(std::size_t cell,

@@ -60,18 +60,20 @@ class StretchSurvey {
   const Segment& At(std::uint32_t segment) const { return segments_[segment]; }
 
  private:
-  // Of a cell's segments of one kind the nearest to an altitude, the later one of two.
-  struct Nearest {
+  // One of a cell's segments of a kind.
+  struct Match {
     std::uint32_t segment = Segment::kNone;
-    std::uint32_t alike = 0;  // segments of the kind
+    std::uint32_t before = Segment::kNone;  // whose next it is, if not the cell's first
+    std::uint32_t alike = 0;                // segments of the kind that were looked at
     std::int64_t distance_mm = std::numeric_limits<std::int64_t>::max();
   };
 
   void Join(std::size_t cell, const Observation& observation, const SigmaTable& sigmas);
   bool IsOneLayer(const Observation& observation,
-                  const Nearest& nearest,
+                  const Match& match,
                   const SigmaTable& sigmas) const;
-  Nearest Find(std::size_t cell, std::int32_t altitude_mm, bool is_strong) const;
+  Match Find(std::size_t cell, std::int32_t altitude_mm, bool is_strong) const;
+  void MoveToFront(std::size_t cell, const Match& match);
 
   MapProfile profile_;
   TileBand band_;

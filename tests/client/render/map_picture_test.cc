@@ -221,7 +221,10 @@ TEST(ScaleBarTest, IsAsLongAsItSays) {
 
 class PngTest : public testing::Test {
  protected:
-  PngTest() : folder_(std::filesystem::path(testing::TempDir()) / "atlas_png_test") {
+  PngTest()
+      : folder_(
+            std::filesystem::path(testing::TempDir()) /
+            (std::string("png_") + testing::UnitTest::GetInstance()->current_test_info()->name())) {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }

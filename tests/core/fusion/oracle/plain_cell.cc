@@ -84,20 +84,25 @@ void PlainCell::FindSegments(std::span<const PlainObservation> observations) {
   }
 }
 
-// Of the stretch's segments of a kind the one nearest in altitude, the later one of two.
+// Of the stretch's segments of a kind the one seen last of those as close as one layer always may
+// be, else the nearest in altitude; of two equally near ones the one seen last.
 PlainCell::Nearest PlainCell::FindNearest(std::int64_t altitude_mm,
                                           bool is_strong,
                                           std::size_t stretch_begin) {
   Nearest nearest;
-  for (std::size_t i = segments_.size(); i-- > stretch_begin;) {
+  for (std::size_t i = stretch_begin; i < segments_.size(); ++i) {
     Segment& segment = segments_[i];
-    const std::int64_t distance_mm = std::abs(segment.representative->altitude_mm - altitude_mm);
-    if (segment.representative->is_strong() == is_strong) {
-      ++nearest.alike;
-      if (nearest.segment == nullptr || distance_mm < nearest.distance_mm) {
-        nearest.segment = &segment;
-        nearest.distance_mm = distance_mm;
-      }
+    if (segment.representative->is_strong() != is_strong) {
+      continue;
+    }
+    ++nearest.alike;
+    const std::int64_t distance_mm = std::max<std::int64_t>(
+        std::abs(segment.representative->altitude_mm - altitude_mm), profile_.same_layer_mm);
+    if (nearest.segment == nullptr || distance_mm < nearest.distance_mm ||
+        (distance_mm == nearest.distance_mm &&
+         segment.last->key.sequence > nearest.segment->last->key.sequence)) {
+      nearest.segment = &segment;
+      nearest.distance_mm = distance_mm;
     }
   }
   return nearest;
