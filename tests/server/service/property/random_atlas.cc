@@ -58,6 +58,7 @@ class Drawing {
   AtlasScript script_;
   double centre_x_m_ = 0.0;
   double centre_y_m_ = 0.0;
+  std::uint32_t decks_ = 1;
   std::vector<SessionKey> sessions_;
   std::vector<Eigen::Quaterniond> levels_;         // R_level_sensor of each frame
   std::vector<std::vector<QuantizedPose>> poses_;  // of each frame, as they were drawn
@@ -73,7 +74,7 @@ std::array<std::int32_t, 4> Quantized(const Eigen::Quaterniond& rotation) {
 
 void Drawing::DrawProfile() {
   MapProfile& profile = script_.profile;
-  profile.tile_cells = 16;  // 1.6 m
+  profile.tile_cells = OneIn(8) ? 32 : 16;  // 1.6 m; with 32 fusion may go in bands
   profile.levels = static_cast<std::uint8_t>(1 + Below(5));
   profile.column_segments = static_cast<std::uint8_t>(2u << Below(4));
   profile.segment_height_mm = OneIn(3) ? 1'000 : 500;
@@ -84,6 +85,7 @@ void Drawing::DrawProfile() {
   const std::array<double, 4> far_m{0.0, 0.8, -1'234.0, 1'600'000.0};
   centre_x_m_ = OneOf(far_m);
   centre_y_m_ = OneOf(far_m);
+  decks_ = 1 + Below(4);
 }
 
 void Drawing::DrawFrames() {
@@ -105,7 +107,7 @@ void Drawing::DrawFrames() {
 
 void Drawing::DrawSession(const SessionKey& key) {
   std::uint32_t sequence = Below(20);
-  const std::uint32_t count = 1 + Below(5);
+  const std::uint32_t count = 1 + Below(8);
   for (std::uint32_t i = 0; i < count; ++i) {
     ScriptFrame frame{{key, sequence}, {}};
     levels_.push_back(DrawTilt(5.0));
@@ -161,14 +163,14 @@ Eigen::Quaterniond Drawing::DrawTilt(double max_deg) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis));
 }
 
-// Near the others as a rule, on one of four decks, at times one that the frame had before.
+// Near the others as a rule, on one of the decks, at times one that the frame had before.
 QuantizedPose Drawing::DrawPose(std::size_t frame) {
   std::vector<QuantizedPose>& before = poses_[frame];
   if (!before.empty() && OneIn(3)) {
     return before[Below(static_cast<std::uint32_t>(before.size()))];
   }
   const double away_m = OneIn(12) ? 9.0 : 0.0;
-  const double deck_m = 1.3 * Below(4);
+  const double deck_m = 1.3 * Below(decks_);
   Pose T_world_sensor = Pose::Identity();
   T_world_sensor.translation() =
       Eigen::Vector3d{centre_x_m_ + away_m + 1.5 * Unit(), centre_y_m_ + 1.5 * Unit(), deck_m};
@@ -265,7 +267,7 @@ void Drawing::AddChance() {
 
 void Drawing::DrawSteps() {
   AddUploads(1 + Below(4));
-  const std::uint32_t count = 4 + Below(14);
+  const std::uint32_t count = 6 + Below(18);
   const std::uint32_t noted = OneIn(4) ? Below(count) : count;
   for (std::uint32_t i = 0; i < count; ++i) {
     AddChance();
