@@ -1,0 +1,194 @@
+#include "tests/server/service/property/model_atlas.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include <openssl/evp.h>
+
+#include "core/fusion/keyframe_placement.h"
+#include "core/tile/tile_codec.h"
+#include "core/tile/tile_pyramid.h"
+#include "tests/core/fusion/oracle/plain_fusion.h"
+
+namespace atlas::testing {
+
+Result<PutKeyframeResult> ModelAtlas::Put(const Placing& placing) {
+  const auto found = frames_.find(placing.frame);
+  if (found != frames_.end()) {
+    return found->second.content == placing.content ? Result<PutKeyframeResult>({true, 0, 0})
+                                                    : Error(StatusCode::kConflict, "other content");
+  }
+  frames_[placing.frame] = {placing.content, placing.pose};
+  sessions_.emplace(SessionOf(placing.frame), true);
+  if (!IsLive(placing.frame)) {
+    return PutKeyframeResult{};
+  }
+  const std::vector<TileId> footprint = Footprint(placing.frame);
+  return PutKeyframeResult{false, 0, Touch({footprint.begin(), footprint.end()})};
+}
+
+Result<PoseBatchResult> ModelAtlas::Move(const std::vector<Placing>& placings) {
+  std::set<std::size_t> moved;
+  bool is_twice = false;
+  for (const Placing& placing : placings) {
+    if (!frames_.contains(placing.frame)) {
+      return Error(StatusCode::kNotFound, "no such keyframe");
+    }
+    is_twice = !moved.insert(placing.frame).second || is_twice;
+  }
+  if (is_twice) {
+    return Error(StatusCode::kInvalidData, "twice in the batch");
+  }
+  PoseBatchResult result;
+  std::set<TileId> tiles;
+  const auto add_footprint = [&](std::size_t frame) {
+    if (IsLive(frame)) {
+      const std::vector<TileId> footprint = Footprint(frame);
+      tiles.insert(footprint.begin(), footprint.end());
+    }
+  };
+  for (const Placing& placing : placings) {
+    QuantizedPose& pose = frames_.at(placing.frame).pose;
+    if (pose != placing.pose) {
+      ++result.updated;
+      add_footprint(placing.frame);
+      pose = placing.pose;
+      add_footprint(placing.frame);
+    }
+  }
+  result.tiles_marked = Touch(tiles);
+  return result;
+}
+
+Result<SessionChangeResult> ModelAtlas::Change(const SessionKey& key, SessionAction action) {
+  const auto session = sessions_.find(key);
+  if (session == sessions_.end()) {
+    return Error(StatusCode::kNotFound, "no such session");
+  }
+  const bool is_live = action == SessionAction::kRestore;
+  SessionChangeResult result;
+  result.state = is_live ? SessionState::kLive : SessionState::kRetracted;
+  result.is_changed = std::exchange(session->second, is_live) != is_live;
+  if (result.is_changed) {
+    std::set<TileId> tiles;
+    for (const auto& [index, frame] : frames_) {
+      if (SessionOf(index) == key) {
+        const std::vector<TileId> footprint = Footprint(index);
+        tiles.insert(footprint.begin(), footprint.end());
+      }
+    }
+    result.tiles_marked = Touch(tiles);
+  }
+  return result;
+}
+
+PlacedKeyframe ModelAtlas::Placed(std::size_t index, const Frame& frame) const {
+  const ScriptFrame& script = script_.frames[index];
+  const FrameContent& content = script.contents[frame.content];
+  return {script.key, content.time_ms,
+          PlaceKeyframe(frame.pose, content.keyframe->level_quaternion).value(), content.keyframe};
+}
+
+std::vector<TileId> ModelAtlas::Footprint(std::size_t index) const {
+  const PlacedKeyframe placed = Placed(index, frames_.at(index));
+  return FootprintTiles(placed.placement, placed.keyframe->grid, script_.profile);
+}
+
+// How many there are at level 0.
+std::uint32_t ModelAtlas::Touch(const std::set<TileId>& tiles) {
+  for (TileId id : tiles) {
+    touched_.insert(id.Key());
+    while (id.level + 1 < script_.profile.levels) {
+      id = id.Parent();
+      touched_.insert(id.Key());
+    }
+  }
+  return static_cast<std::uint32_t>(tiles.size());
+}
+
+std::set<std::uint64_t> ModelAtlas::TakeTouched() {
+  return std::exchange(touched_, {});
+}
+
+// Asks for every tile near a keyframe, not only for those of its footprint.
+std::map<TileId, Tile> ModelAtlas::FuseLevel0() const {
+  std::map<TileId, std::vector<PlacedKeyframe>> near;
+  for (const auto& [index, frame] : frames_) {
+    if (!IsLive(index)) {
+      continue;
+    }
+    const PlacedKeyframe placed = Placed(index, frame);
+    const double side_m = script_.profile.tile_size_m();
+    const double reach_m = script_.profile.cell_size_m() * (placed.keyframe->grid.radius_cells + 2);
+    const auto tile_at = [side_m](std::int64_t position_um, double offset_m) {
+      return static_cast<std::int32_t>(
+          std::floor((1e-6 * static_cast<double>(position_um) + offset_m) / side_m));
+    };
+    const std::int32_t last_y = tile_at(placed.placement.y_um, reach_m);
+    const std::int32_t last_x = tile_at(placed.placement.x_um, reach_m);
+    for (std::int32_t y = tile_at(placed.placement.y_um, -reach_m); y <= last_y; ++y) {
+      for (std::int32_t x = tile_at(placed.placement.x_um, -reach_m); x <= last_x; ++x) {
+        near[TileId{0, x, y}].push_back(placed);
+      }
+    }
+  }
+  std::map<TileId, Tile> tiles;
+  for (const auto& [id, keyframes] : near) {
+    Tile tile = PlainFuseTile(id, keyframes, script_.profile);
+    if (!tile.is_empty()) {
+      tiles.emplace(id, std::move(tile));
+    }
+  }
+  return tiles;
+}
+
+std::map<TileId, Tile> ModelAtlas::BuildParents(const std::map<TileId, Tile>& children) const {
+  std::map<TileId, Tile> parents;
+  for (const auto& [child, tile] : children) {
+    const TileId id = child.Parent();
+    if (parents.contains(id)) {
+      continue;
+    }
+    std::array<const Tile*, 4> four{};
+    for (std::size_t i = 0; i < four.size(); ++i) {
+      const auto found = children.find(id.Children()[i]);
+      four[i] = found == children.end() ? nullptr : &found->second;
+    }
+    parents.emplace(id, BuildParentTile(id, four, script_.profile));
+  }
+  return parents;
+}
+
+ModelAtlas::Payloads ModelAtlas::Tiles() const {
+  Payloads payloads;
+  std::map<TileId, Tile> level = FuseLevel0();
+  for (int l = 0; l < script_.profile.levels; ++l) {
+    for (const auto& [id, tile] : level) {
+      payloads.emplace(id.Key(), EncodeTilePayload(tile, script_.profile));
+    }
+    level = BuildParents(level);
+  }
+  return payloads;
+}
+
+std::array<std::uint8_t, 32> DigestOf(const ModelAtlas::Payloads& tiles) {
+  Bytes all;
+  const auto add_number = [&all](std::uint64_t value) {
+    for (int shift = 56; shift >= 0; shift -= 8) {
+      all.push_back(static_cast<std::uint8_t>(value >> shift));
+    }
+  };
+  for (const auto& [key, payload] : tiles) {
+    add_number(key);
+    add_number(payload.size());
+    all.insert(all.end(), payload.begin(), payload.end());
+  }
+  std::array<std::uint8_t, 32> sha256{};
+  if (EVP_Digest(all.data(), all.size(), sha256.data(), nullptr, EVP_sha256(), nullptr) != 1) {
+    std::abort();
+  }
+  return sha256;
+}
+
+}  // namespace atlas::testing
