@@ -21,6 +21,15 @@ install_packages "${BUILD_PACKAGES[@]}" "${TEST_PACKAGES[@]}"
 find_data "$root"
 [[ -n ${ATLAS_DATA:-} ]] || echo "ATLAS_DATA is not set and ../shared/data is not there: tests on real drives will be skipped"
 
+# How many lives of an atlas the property test of this build has compared with the oracle.
+report_property() {
+  awk '/^property: / { shards++; cases += $2; steps += $4; restarts += $6; digests += $10; past += $15 }
+    END {
+      if (shards) printf "property test: %d cases, %d steps, %d restarts, %d digests and %d of the past equal the oracle\n",
+        cases, steps, restarts, digests, past
+    }' "build/$1/Testing/Temporary/LastTest.log"
+}
+
 # run PRESET CTEST_ARGUMENT...: configures, builds, tests.
 run() {
   local preset=$1
@@ -29,6 +38,7 @@ run() {
   cmake --preset "$preset" >/dev/null
   cmake --build "build/$preset"
   ctest --test-dir "build/$preset" --output-on-failure --no-tests=error --timeout 900 -j 2 "$@"
+  report_property "$preset"
 }
 
 scale=1
