@@ -28,6 +28,7 @@ struct alignas(64) Segment {
   std::int16_t occupancy = 0;       // evidence, units of ln(9)/64
   AltitudeSource source = AltitudeSource::kNone;  // the representative's
   bool is_strong = false;                         // some altitude was measured or interpolated
+  bool is_used = false;                           // it was part of a layer when combined last
   ColumnLanes column{};
 };
 static_assert(sizeof(Segment) == 64);  // one line of a cache: it is read for every observation

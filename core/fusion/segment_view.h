@@ -8,11 +8,10 @@
 namespace atlas {
 
 struct SegmentView {
-  const Segment* segment = nullptr;
+  Segment* segment = nullptr;
   std::int64_t last_time_ms = 0;  // of the keyframe that saw it last
   std::uint32_t stretch = 0;      // its place in canonical order
-  std::uint32_t session = 0;      // FusionStretch's numbers
-  std::uint32_t vehicle = 0;
+  std::uint32_t vehicle = 0;      // FusionStretch's number
 };
 
 // By the keyframe that saw it last: its time, then vehicle, session and sequence.

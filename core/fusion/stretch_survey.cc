@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "core/base/compression.h"
+#include "core/fusion/packed_arrays.h"
 #include "core/tile/column_lattice.h"
 #include "core/tile/layer_association.h"
 
@@ -22,26 +22,6 @@ void SetRepresentative(const Observation& observation, Segment& segment) {
   segment.source = observation.source;
 }
 
-constexpr int kPackLevel = 1;
-
-template <typename T>
-std::size_t ByteSize(const std::vector<T>& values) {
-  return values.size() * sizeof(T);
-}
-
-template <typename T>
-void Append(const std::vector<T>& values, Bytes& out) {
-  const auto* begin = reinterpret_cast<const std::uint8_t*>(values.data());
-  out.insert(out.end(), begin, begin + ByteSize(values));
-}
-
-// Fills `values` from the front of `rest`.
-template <typename T>
-void Take(std::vector<T>& values, ByteSpan& rest) {
-  std::copy_n(rest.begin(), ByteSize(values), reinterpret_cast<std::uint8_t*>(values.data()));
-  rest = rest.subspan(ByteSize(values));
-}
-
 }  // namespace
 
 StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
@@ -50,7 +30,8 @@ StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
       clamp_{static_cast<std::int8_t>(profile.stretch_clamp),
              static_cast<std::int8_t>(profile.driven_clamp)},
       occupancy_units_{0, profile.miss_units, profile.hit_units},
-      heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone) {}
+      heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone),
+      touched_(heads_.size()) {}
 
 std::size_t StretchSurvey::bytes() const {
   return sizeof(*this) + frames_.capacity() * sizeof(StretchFrame) +
@@ -58,35 +39,25 @@ std::size_t StretchSurvey::bytes() const {
          packed_.capacity();
 }
 
-void StretchSurvey::Pack() {
-  if (!packed_.empty()) {
-    return;
+void StretchSurvey::FindCells(CellSet& cells) const {
+  for (std::size_t cell = 0; cell < heads_.size(); ++cell) {
+    if (heads_[cell] != Segment::kNone) {
+      cells.Insert(cell);
+    }
   }
-  Bytes plain;
-  plain.reserve(sizeof(std::uint64_t) + ByteSize(heads_) + ByteSize(segments_));
-  Append(std::vector<std::uint64_t>{segments_.size()}, plain);
-  Append(heads_, plain);
-  Append(segments_, plain);
-  packed_ = Compress(plain, kPackLevel);
-  packed_size_ = plain.size();
-  packed_.shrink_to_fit();
-  heads_ = std::vector<std::uint32_t>();
-  segments_ = std::vector<Segment>();
+}
+
+void StretchSurvey::Pack() {
+  if (packed_.empty()) {
+    packed_ = PackArrays(heads_, segments_);
+  }
 }
 
 void StretchSurvey::Unpack() {
-  if (packed_.empty()) {
-    return;
+  if (!packed_.empty()) {
+    UnpackArrays(packed_, heads_, segments_);
+    packed_ = Bytes();
   }
-  const Bytes plain = *Decompress(packed_, packed_size_);  // made by Pack() in this process
-  ByteSpan rest = plain;
-  std::vector<std::uint64_t> count(1);
-  Take(count, rest);
-  heads_.resize(static_cast<std::size_t>(band_.rows) * profile_.tile_cells);
-  Take(heads_, rest);
-  segments_.resize(count[0]);
-  Take(segments_, rest);
-  packed_ = Bytes();
 }
 
 void StretchSurvey::Add(const FrameOnMap& frame,
@@ -101,6 +72,7 @@ void StretchSurvey::Add(const FrameOnMap& frame,
     }
   };
   resampler.Visit(band_, expect, [&](std::size_t cell, const Observation& observation) {
+    touched_.Insert(cell);
     Join(cell, observation, sigmas);
   });
 }
@@ -187,16 +159,20 @@ void StretchSurvey::MoveToFront(std::size_t cell, const Match& match) {
 std::uint32_t StretchSurvey::AddSegment(std::size_t cell,
                                         const Observation& representative,
                                         bool is_strong) {
-  const auto index = static_cast<std::uint32_t>(segments_.size());
   Segment segment;
   segment.reference_mm = representative.altitude_mm;
   SetRepresentative(representative, segment);
   segment.is_strong = is_strong;
   segment.column_base = ColumnBaseIndex(representative.altitude_mm, profile_) -
                         ColumnMargin(profile_.column_segments);
-  segment.next = heads_[cell];
-  heads_[cell] = index;
+  return AddSegment(cell, segment);
+}
+
+std::uint32_t StretchSurvey::AddSegment(std::size_t cell, const Segment& segment) {
+  const auto index = static_cast<std::uint32_t>(segments_.size());
   segments_.push_back(segment);
+  segments_.back().next = heads_[cell];
+  heads_[cell] = index;
   return index;
 }
 

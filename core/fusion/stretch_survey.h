@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/base/bytes.h"
+#include "core/fusion/cell_set.h"
 #include "core/fusion/column_evidence.h"
 #include "core/fusion/frame_resampler.h"
 #include "core/fusion/observation.h"
@@ -42,6 +43,8 @@ class StretchSurvey {
   // The same by hand: frames, then segments and the observations that belong to them.
   void AddFrame(const StretchFrame& frame) { frames_.push_back(frame); }
   std::uint32_t AddSegment(std::size_t cell, const Observation& representative, bool is_strong);
+  // As it is, before the cell's others.
+  std::uint32_t AddSegment(std::size_t cell, const Segment& segment);
   void AddEvidence(const Observation& observation,
                    std::int64_t weight,
                    std::uint32_t frame,
@@ -57,7 +60,13 @@ class StretchSurvey {
 
   // First segment of a cell, the next by Segment::next, or Segment::kNone. Cells row by row.
   std::uint32_t First(std::size_t cell) const { return heads_[cell]; }
-  const Segment& At(std::uint32_t segment) const { return segments_[segment]; }
+  Segment& At(std::uint32_t segment) { return segments_[segment]; }
+
+  // Cells that were observed since these were cleared last.
+  const CellSet& touched() const { return touched_; }
+  void ClearTouched() { touched_.Clear(); }
+  // Inserts the cells that have segments.
+  void FindCells(CellSet& cells) const;
 
  private:
   // One of a cell's segments of a kind.
@@ -82,8 +91,8 @@ class StretchSurvey {
   std::vector<StretchFrame> frames_;
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;
-  Bytes packed_;                 // instead of heads_ and segments_
-  std::size_t packed_size_ = 0;  // of what it unpacks to
+  CellSet touched_;
+  Bytes packed_;  // instead of heads_ and segments_
 };
 
 }  // namespace atlas

@@ -4,9 +4,9 @@
 #include <cassert>
 #include <utility>
 
+#include "core/fusion/cell_combiner.h"
 #include "core/fusion/fusion_stretch.h"
 #include "core/fusion/survey_frames.h"
-#include "core/fusion/tile_combiner.h"
 
 namespace atlas {
 namespace {
@@ -46,44 +46,67 @@ class TileFuser {
       : frames_(frames),
         source_(source),
         profile_(profile),
-        sigmas_(profile, MaxRadiusCells(frames)) {}
+        sigmas_(profile, MaxRadiusCells(frames)),
+        combiner_(sigmas_, profile) {}
 
   Status Fuse(std::span<const FusionStretch> stretches, std::size_t max_bytes, Tile& tile) {
     const std::int32_t side = profile_.tile_cells;
     const std::int32_t rows = RowsWithin(max_bytes, stretches, profile_);
-    TileCombiner combiner(sigmas_, profile_, std::size_t{stretches.back().session} + 1);
+    contributed_.assign(std::size_t{stretches.back().session} + 1, false);
     for (std::int32_t first = 0; first < side; first += rows) {
       const TileBand band{tile.id, first, std::min(rows, side - first)};
-      ATLAS_RETURN_IF_ERROR(FuseBand(band, stretches, combiner, tile));
+      ATLAS_RETURN_IF_ERROR(FuseBand(band, stretches, tile));
     }
-    NameContributors(stretches, combiner.contributed(), tile);
+    NameContributors(stretches, tile);
     return {};
   }
 
  private:
-  Status FuseBand(const TileBand& band,
-                  std::span<const FusionStretch> stretches,
-                  TileCombiner& combiner,
-                  Tile& tile) const {
+  Status FuseBand(const TileBand& band, std::span<const FusionStretch> stretches, Tile& tile) {
     std::vector<StretchSurvey> surveys;
     surveys.reserve(stretches.size());
-    std::vector<SurveyedStretch> surveyed;
     for (const FusionStretch& stretch : stretches) {
       StretchSurvey& survey = surveys.emplace_back(band, profile_);
       ATLAS_RETURN_IF_ERROR(
           SurveyFrames(stretch.frames, frames_, source_, {profile_, sigmas_}, survey));
-      surveyed.push_back({&survey, stretch.session, stretch.vehicle});
     }
-    combiner.Combine(band, surveyed, tile);
+    const std::size_t side = profile_.tile_cells;
+    const std::size_t first = static_cast<std::size_t>(band.first_row) * side;
+    for (std::size_t cell = 0; cell < static_cast<std::size_t>(band.rows) * side; ++cell) {
+      CombineCell(stretches, surveys, cell, tile.layers);
+      tile.cell_begin[first + cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
+    }
     return {};
   }
 
-  static void NameContributors(std::span<const FusionStretch> stretches,
-                               const std::vector<bool>& contributed,
-                               Tile& tile) {
+  void CombineCell(std::span<const FusionStretch> stretches,
+                   std::span<StretchSurvey> surveys,
+                   std::size_t cell,
+                   std::vector<TileLayer>& out) {
+    segments_.clear();
+    for (std::uint32_t i = 0; i < surveys.size(); ++i) {
+      for (std::uint32_t k = surveys[i].First(cell); k != Segment::kNone;
+           k = surveys[i].At(k).next) {
+        Segment& segment = surveys[i].At(k);
+        segments_.push_back(
+            {&segment, surveys[i].frames()[segment.last_frame].time_ms, i, stretches[i].vehicle});
+      }
+    }
+    if (segments_.empty()) {
+      return;
+    }
+    combiner_.Combine(segments_, out);
+    for (std::size_t i = 0; i < segments_.size(); ++i) {
+      if (combiner_.IsUsed(i)) {
+        contributed_[stretches[segments_[i].stretch].session] = true;
+      }
+    }
+  }
+
+  void NameContributors(std::span<const FusionStretch> stretches, Tile& tile) const {
     for (const FusionStretch& stretch : stretches) {
       const bool is_new = tile.contributors.empty() || tile.contributors.back() != *stretch.key;
-      if (contributed[stretch.session] && is_new) {
+      if (contributed_[stretch.session] && is_new) {
         tile.contributors.push_back(*stretch.key);  // in canonical order
       }
     }
@@ -93,6 +116,9 @@ class TileFuser {
   const KeyframeSource& source_;
   const MapProfile& profile_;
   SigmaTable sigmas_;
+  CellCombiner combiner_;
+  std::vector<SegmentView> segments_;  // of a cell
+  std::vector<bool> contributed_;      // by session: a segment of it was used in some cell
 };
 
 }  // namespace

@@ -1,111 +1,332 @@
 #include "core/fusion/tile_surveys.h"
 
 #include <algorithm>
+#include <cassert>
 #include <tuple>
 #include <utility>
 
-#include "core/fusion/survey_frames.h"
-#include "core/fusion/tile_combiner.h"
+#include "core/fusion/bounded_choice.h"
 
 namespace atlas {
+namespace {
+
+// A stretch settles when its session goes on with another one, or when the tile was fused so many
+// times without it.
+constexpr std::uint32_t kOpenFusions = 16;
+
+void SortByStretch(std::vector<SegmentView>& segments) {
+  const auto is_before = [](const SegmentView& a, const SegmentView& b) {
+    return a.stretch < b.stretch;
+  };
+  if (!std::is_sorted(segments.begin(), segments.end(), is_before)) {
+    std::stable_sort(segments.begin(), segments.end(), is_before);
+  }
+}
+
+}  // namespace
 
 TileSurveys::Surveyed TileSurveys::Describe(const FrameOnMap& frame) {
   return {frame.key.sequence, frame.grid.radius_cells, frame.time_ms, frame.content,
           frame.placement};
 }
 
-Result<TileSurveys::Work> TileSurveys::Update(std::span<const FrameOnMap> frames,
-                                              const KeyframeSource& source,
-                                              const FusionContext& context) {
-  Work work;
-  std::vector<Stretch> updated;
-  for (const FusionStretch& wanted : CutStretches(id_, frames, context.profile)) {
-    std::vector<Surveyed> described;
-    for (const std::size_t i : wanted.frames) {
-      described.push_back(Describe(frames[i]));
+Result<std::size_t> TileSurveys::Update(std::span<const FrameOnMap> frames,
+                                        const KeyframeSource& source,
+                                        const FusionContext& context) {
+  const std::vector<std::size_t> expected = Expect(frames, context);
+  for (const std::size_t i : expected) {
+    const auto keyframe = source(i);
+    if (!keyframe) {
+      return Error(keyframe.error());
     }
-    Stretch stretch = TakeStretch(wanted, described, context.profile);
-    const std::size_t kept = stretch.frames.size();
-    const std::span rest = std::span(wanted.frames).subspan(kept);
-    if (Status status = SurveyFrames(rest, frames, source, context, stretch.survey); !status.ok()) {
-      return Error(std::move(status));
-    }
-    work.kept += kept;
-    work.surveyed += rest.size();
-    stretch.frames = std::move(described);
-    updated.push_back(std::move(stretch));
+    Add(frames[i], **keyframe, context);
   }
-  stretches_ = std::move(updated);
-  return work;
+  return expected.size();
 }
 
-// The stretch as it was, if what it has surveyed is how `frames` begin; else one without frames.
-TileSurveys::Stretch TileSurveys::TakeStretch(const FusionStretch& wanted,
-                                              std::span<const Surveyed> frames,
-                                              const MapProfile& profile) {
+std::vector<std::size_t> TileSurveys::Expect(std::span<const FrameOnMap> frames,
+                                             const FusionContext& context) {
+  assert(context.profile.preset != FusionPreset::kPaper);
+  ++expected_count_;
+  if (tile_.cell_begin.empty()) {
+    tile_ = EmptyTile(id_, context.profile);
+    touched_ = CellSet(tile_.cell_begin.size() - 1);
+    touched_.Fill();
+  }
+  const std::vector<FusionStretch> cut = CutStretches(id_, frames, context.profile);
+  std::vector<Wanted> wanted;
+  for (const FusionStretch& stretch : cut) {
+    wanted.push_back(Find(stretch, frames));
+  }
+  SurveyForgottenAgain(wanted);
+  TakeStretches(wanted, context.profile);
+  Settle(context.profile);
+
+  std::vector<std::size_t> expected;
+  awaited_.clear();
+  for (std::uint32_t i = 0; i < wanted.size(); ++i) {
+    const std::span rest = std::span(wanted[i].stretch->frames).subspan(wanted[i].kept);
+    expected.insert(expected.end(), rest.begin(), rest.end());
+    awaited_.insert(awaited_.end(), rest.size(), i);
+  }
+  std::reverse(awaited_.begin(), awaited_.end());
+  return expected;
+}
+
+void TileSurveys::Add(const FrameOnMap& frame,
+                      const Keyframe& keyframe,
+                      const FusionContext& context) {
+  stretches_[awaited_.back()].open->Add(frame, keyframe, context.sigmas);
+  awaited_.pop_back();
+}
+
+// What is there of a stretch already: what was surveyed of it, if that is how its frames begin.
+TileSurveys::Wanted TileSurveys::Find(const FusionStretch& stretch,
+                                      std::span<const FrameOnMap> frames) const {
+  Wanted wanted{&stretch, {}, kNone, 0};
+  for (const std::size_t i : stretch.frames) {
+    wanted.frames.push_back(Describe(frames[i]));
+  }
   const auto found = std::lower_bound(
-      stretches_.begin(), stretches_.end(), wanted, [](const Stretch& a, const FusionStretch& b) {
+      stretches_.begin(), stretches_.end(), stretch, [](const Stretch& a, const FusionStretch& b) {
         return std::tie(a.key, a.number) < std::tie(*b.key, b.number);
       });
-  const bool is_there =
-      found != stretches_.end() && found->key == *wanted.key && found->number == wanted.number;
-  // Equation 2 to the letter needs all observations of a session at once.
-  const bool can_grow = profile.preset != FusionPreset::kPaper;
-  const bool is_beginning = is_there && found->frames.size() <= frames.size() &&
-                            (can_grow || found->frames.size() == frames.size()) &&
-                            std::equal(found->frames.begin(), found->frames.end(), frames.begin());
-  Stretch stretch{
-      *wanted.key,
-      wanted.number,
-      wanted.session,
-      wanted.vehicle,
-      {},
-      is_beginning ? std::move(found->survey) : StretchSurvey(WholeTile(profile), profile)};
-  if (is_beginning) {
-    stretch.frames = found->frames;
+  if (found != stretches_.end() && found->key == *stretch.key && found->number == stretch.number &&
+      found->frames.size() <= wanted.frames.size() &&
+      std::equal(found->frames.begin(), found->frames.end(), wanted.frames.begin())) {
+    wanted.old = static_cast<std::uint32_t>(found - stretches_.begin());
+    wanted.kept = found->frames.size();
   }
-  return stretch;
+  return wanted;
 }
 
-Tile TileSurveys::Combine(const FusionContext& context) const {
+// What was forgotten did not count beside the settled segments as they were: where those change,
+// all that was forgotten is surveyed again.
+void TileSurveys::SurveyForgottenAgain(std::span<Wanted> wanted) const {
+  std::size_t unchanged = 0;
+  for (const Wanted& w : wanted) {
+    unchanged += w.old != kNone && !stretches_[w.old].open && w.kept == w.frames.size() ? 1u : 0u;
+  }
+  const auto settled =
+      std::count_if(stretches_.begin(), stretches_.end(), [](const Stretch& s) { return !s.open; });
+  if (unchanged == static_cast<std::size_t>(settled)) {
+    return;
+  }
+  for (Wanted& w : wanted) {
+    if (w.old != kNone && stretches_[w.old].has_forgotten) {
+      w.old = kNone;
+      w.kept = 0;
+    }
+  }
+}
+
+void TileSurveys::TakeStretches(std::span<Wanted> wanted, const MapProfile& profile) {
+  const TileBand whole{id_, 0, profile.tile_cells};
+  std::vector<std::uint32_t> settled_numbers(stretches_.size(), SettledSegments::kGone);
+  std::vector<Stretch> next;
+  for (std::uint32_t i = 0; i < wanted.size(); ++i) {
+    Wanted& w = wanted[i];
+    const bool grows = w.kept < w.frames.size();
+    Stretch stretch{*w.stretch->key, w.stretch->number, 0, {}, {}, false, 0, 0};
+    if (w.old == kNone) {
+      stretch.open.emplace(whole, profile);
+    } else {
+      stretch = std::move(stretches_[w.old]);
+      stretches_[w.old].open.reset();
+      if (!stretch.open && grows) {
+        stretch.open = Reopen(stretch, w.old, profile);
+      }
+      settled_numbers[w.old] = stretch.open ? SettledSegments::kGone : i;
+    }
+    stretch.vehicle = w.stretch->vehicle;
+    stretch.frames = std::move(w.frames);
+    stretch.grown_at = grows ? expected_count_ : stretch.grown_at;
+    next.push_back(std::move(stretch));
+  }
+  for (const Stretch& dropped : stretches_) {
+    if (dropped.open) {
+      dropped.open->FindCells(touched_);
+    }
+  }
+  settled_.Renumber(settled_numbers, touched_);
+  stretches_ = std::move(next);
+}
+
+StretchSurvey TileSurveys::Reopen(const Stretch& stretch,
+                                  std::uint32_t number,
+                                  const MapProfile& profile) const {
+  StretchSurvey survey({id_, 0, profile.tile_cells}, profile);
+  for (const Surveyed& frame : stretch.frames) {
+    survey.AddFrame({frame.sequence, frame.time_ms});
+  }
+  settled_.CopyTo(number, survey);
+  return survey;
+}
+
+bool TileSurveys::IsToSettle(std::size_t i) const {
+  const Stretch& stretch = stretches_[i];
+  const bool session_goes_on = i + 1 < stretches_.size() && stretches_[i + 1].key == stretch.key;
+  return stretch.open && stretch.grown_at != expected_count_ &&
+         (session_goes_on || expected_count_ - stretch.grown_at > kOpenFusions);
+}
+
+void TileSurveys::Settle(const MapProfile& profile) {
+  std::vector<std::uint32_t> settling;
+  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+    if (IsToSettle(i)) {
+      settling.push_back(i);
+    }
+  }
+  if (settling.empty()) {
+    return;
+  }
+  SettledSegments merged;
+  for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
+    segments_.clear();
+    CollectSettled(cell);
+    for (const std::uint32_t i : settling) {
+      CollectOpen(cell, i);
+    }
+    SortByStretch(segments_);
+    if (profile.preset == FusionPreset::kBounded) {
+      Forget(profile);
+    }
+    for (const SegmentView& view : segments_) {
+      merged.Append(*view.segment, view.stretch);
+    }
+    merged.EndCell();
+  }
+  settled_ = std::move(merged);
+  for (const std::uint32_t i : settling) {
+    stretches_[i].open.reset();
+  }
+}
+
+// Leaves those of segments_ that count while they all are there.
+void TileSurveys::Forget(const MapProfile& profile) {
+  const std::vector<SegmentView> all = segments_;
+  KeepLatestSegments(profile, segments_);
+  if (segments_.size() == all.size()) {
+    return;
+  }
+  std::size_t kept = 0;
+  for (const SegmentView& view : all) {
+    if (kept < segments_.size() && segments_[kept].segment == view.segment) {
+      ++kept;
+    } else {
+      SetUsed(view, false);
+      stretches_[view.stretch].has_forgotten = true;
+    }
+  }
+}
+
+const Tile& TileSurveys::Combine(const FusionContext& context) {
+  assert(awaited_.empty());
+  for (Stretch& stretch : stretches_) {
+    if (stretch.open) {
+      touched_.InsertAll(stretch.open->touched());
+      stretch.open->ClearTouched();
+    }
+  }
+  CellCombiner combiner(context.sigmas, context.profile);
   Tile tile = EmptyTile(id_, context.profile);
-  if (stretches_.empty()) {
-    return tile;
+  tile.layers.reserve(tile_.layers.size());
+  for (std::size_t cell = 0; cell + 1 < tile.cell_begin.size(); ++cell) {
+    if (touched_.Contains(cell)) {
+      CombineCell(cell, combiner, tile.layers);
+    } else {
+      const auto layers = tile_.Layers(cell);
+      tile.layers.insert(tile.layers.end(), layers.begin(), layers.end());
+    }
+    tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
   }
-  std::vector<SurveyedStretch> surveyed;
-  for (const Stretch& stretch : stretches_) {
-    surveyed.push_back({&stretch.survey, stretch.session, stretch.vehicle});
-  }
-  TileCombiner combiner(context.sigmas, context.profile,
-                        std::size_t{stretches_.back().session} + 1);
-  combiner.Combine(WholeTile(context.profile), surveyed, tile);
   for (const Stretch& stretch : stretches_) {
     const bool is_new = tile.contributors.empty() || tile.contributors.back() != stretch.key;
-    if (combiner.contributed()[stretch.session] && is_new) {
+    if (stretch.used > 0 && is_new) {
       tile.contributors.push_back(stretch.key);
     }
   }
-  return tile;
+  tile_ = std::move(tile);
+  touched_.Clear();
+  return tile_;
+}
+
+void TileSurveys::CombineCell(std::size_t cell,
+                              CellCombiner& combiner,
+                              std::vector<TileLayer>& out) {
+  segments_.clear();
+  CollectSettled(cell);
+  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+    CollectOpen(cell, i);
+  }
+  if (segments_.empty()) {
+    return;
+  }
+  SortByStretch(segments_);
+  for (const SegmentView& view : segments_) {
+    SetUsed(view, false);
+  }
+  combiner.Combine(segments_, out);
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    SetUsed(segments_[i], combiner.IsUsed(i));
+  }
+}
+
+void TileSurveys::SetUsed(const SegmentView& view, bool is_used) {
+  stretches_[view.stretch].used += static_cast<std::uint32_t>(is_used);
+  stretches_[view.stretch].used -= static_cast<std::uint32_t>(view.segment->is_used);
+  view.segment->is_used = is_used;
+}
+
+void TileSurveys::CollectSettled(std::size_t cell) {
+  const std::span segments = settled_.Segments(cell);
+  const std::span stretches = settled_.Stretches(cell);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    segments_.push_back(View(segments[i], stretches[i]));
+  }
+}
+
+void TileSurveys::CollectOpen(std::size_t cell, std::uint32_t stretch) {
+  std::optional<StretchSurvey>& open = stretches_[stretch].open;
+  if (open) {
+    for (std::uint32_t i = open->First(cell); i != Segment::kNone; i = open->At(i).next) {
+      segments_.push_back(View(open->At(i), stretch));
+    }
+  }
+}
+
+SegmentView TileSurveys::View(Segment& segment, std::uint32_t stretch) const {
+  return {&segment, stretches_[stretch].frames[segment.last_frame].time_ms, stretch,
+          stretches_[stretch].vehicle};
 }
 
 std::size_t TileSurveys::bytes() const {
-  std::size_t bytes = sizeof(*this);
+  std::size_t bytes = sizeof(*this) + settled_.bytes() +
+                      tile_.layers.capacity() * sizeof(TileLayer) +
+                      tile_.cell_begin.capacity() * sizeof(std::uint32_t);
   for (const Stretch& stretch : stretches_) {
-    bytes +=
-        sizeof(Stretch) + stretch.frames.capacity() * sizeof(Surveyed) + stretch.survey.bytes();
+    bytes += sizeof(Stretch) + stretch.frames.capacity() * sizeof(Surveyed) +
+             (stretch.open ? stretch.open->bytes() : 0);
   }
   return bytes;
 }
 
 void TileSurveys::Pack() {
+  settled_.Pack();
   for (Stretch& stretch : stretches_) {
-    stretch.survey.Pack();
+    if (stretch.open) {
+      stretch.open->Pack();
+    }
   }
+  tile_ = Tile();
 }
 
 void TileSurveys::Unpack() {
+  settled_.Unpack();
   for (Stretch& stretch : stretches_) {
-    stretch.survey.Unpack();
+    if (stretch.open) {
+      stretch.open->Unpack();
+    }
   }
 }
 

@@ -1,15 +1,25 @@
-// The surveys of a whole tile, kept from one fusion of it to the next: only stretches whose
-// keyframes or poses changed are surveyed again, and keyframes that follow the last one of their
-// stretch are added to its survey. The tile made of them is the one that FuseTile makes.
+// What the stretches of a tile saw, kept from one fusion of it to the next together with the tile
+// made of it: only stretches whose keyframes or poses changed are surveyed again, keyframes that
+// follow the last one of their stretch are added to its survey, and only cells that were observed
+// are combined again. The tile is the one that FuseTile makes. Not for preset paper, whose
+// equation 2 needs all observations of a session at once.
+//
+// A stretch is open while it grows; later its segments settle among those of the others. In preset
+// bounded, what can count no more is then forgotten, so that the size does not grow with the
+// passes; if a change could make it count again, its keyframes are asked for once more.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/fusion/cell_combiner.h"
+#include "core/fusion/cell_set.h"
 #include "core/fusion/fusion_context.h"
 #include "core/fusion/fusion_stretch.h"
+#include "core/fusion/settled_segments.h"
 #include "core/fusion/stretch_survey.h"
 #include "core/fusion/tile_fusion.h"
 
@@ -17,21 +27,20 @@ namespace atlas {
 
 class TileSurveys {
  public:
-  // What an update did, in keyframes of this tile.
-  struct Work {
-    std::size_t kept = 0;
-    std::size_t surveyed = 0;
-  };
-
   explicit TileSurveys(const TileId& id) : id_(id) {}
 
-  // Brings the surveys to what FuseTile would make of `frames`. Asks `source` for the keyframes
-  // that it surveys, in canonical order. After an error (the source's) the surveys are worth
-  // nothing.
-  Result<Work> Update(std::span<const FrameOnMap> frames,
-                      const KeyframeSource& source,
-                      const FusionContext& context);
-  Tile Combine(const FusionContext& context) const;
+  // Prepares for the tile to be made of `frames`, and returns which of them must be added first, in
+  // this order.
+  std::vector<std::size_t> Expect(std::span<const FrameOnMap> frames, const FusionContext& context);
+  void Add(const FrameOnMap& frame, const Keyframe& keyframe, const FusionContext& context);
+  // When all were added. Valid until the next call.
+  const Tile& Combine(const FusionContext& context);
+
+  // Expect() and Add(), with keyframes from `source`; returns how many were added. After an error,
+  // the source's, the surveys are worth nothing.
+  Result<std::size_t> Update(std::span<const FrameOnMap> frames,
+                             const KeyframeSource& source,
+                             const FusionContext& context);
 
   const TileId& id() const { return id_; }
   std::size_t bytes() const;
@@ -54,20 +63,48 @@ class TileSurveys {
   struct Stretch {
     SessionKey key;
     std::uint32_t number = 0;
-    std::uint32_t session = 0;  // FusionStretch's numbers
-    std::uint32_t vehicle = 0;
+    std::uint32_t vehicle = 0;  // FusionStretch's
     std::vector<Surveyed> frames;
-    StretchSurvey survey;
+    std::optional<StretchSurvey> open;  // else settled
+    bool has_forgotten = false;         // some of its segments, when it settled
+    std::uint32_t used = 0;             // segments that are part of a layer
+    std::uint32_t grown_at = 0;         // the count of Expect() calls then
+  };
+  static constexpr std::uint32_t kNone = SettledSegments::kGone;
+
+  // A stretch that the tile is to be made of.
+  struct Wanted {
+    const FusionStretch* stretch = nullptr;
+    std::vector<Surveyed> frames;
+    std::uint32_t old = kNone;  // its number in stretches_, if its survey can go on from there
+    std::size_t kept = 0;       // frames that were surveyed
   };
 
   static Surveyed Describe(const FrameOnMap& frame);
-  Stretch TakeStretch(const FusionStretch& wanted,
-                      std::span<const Surveyed> frames,
-                      const MapProfile& profile);
-  TileBand WholeTile(const MapProfile& profile) const { return {id_, 0, profile.tile_cells}; }
+  Wanted Find(const FusionStretch& stretch, std::span<const FrameOnMap> frames) const;
+  void SurveyForgottenAgain(std::span<Wanted> wanted) const;
+  void TakeStretches(std::span<Wanted> wanted, const MapProfile& profile);
+  StretchSurvey Reopen(const Stretch& stretch,
+                       std::uint32_t number,
+                       const MapProfile& profile) const;
+  bool IsToSettle(std::size_t i) const;
+  void Settle(const MapProfile& profile);
+  void Forget(const MapProfile& profile);
+  void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);
+  // Append a cell's segments to segments_.
+  void CollectSettled(std::size_t cell);
+  void CollectOpen(std::size_t cell, std::uint32_t stretch);
+  SegmentView View(Segment& segment, std::uint32_t stretch) const;
+  void SetUsed(const SegmentView& view, bool is_used);
 
   TileId id_;
-  std::vector<Stretch> stretches_;  // in canonical order
+  std::uint32_t expected_count_ = 0;  // calls of Expect()
+  std::vector<Stretch> stretches_;    // in canonical order
+  SettledSegments settled_;
+  std::vector<std::uint32_t> awaited_;  // stretches of the frames that must be added, last first
+  Tile tile_;                           // without cells: there is none
+  CellSet touched_;                     // cells that changed since it was made
+  std::vector<SegmentView> segments_;   // of a cell
 };
 
 }  // namespace atlas

@@ -92,7 +92,7 @@ Result<Tile> TileBuilder::Fuse(const TileId& id,
   if (!work) {
     return Error(work.error());
   }
-  Tile tile = surveys->Combine(context);
+  Tile tile = surveys->Combine(context);  // kept there too
   surveys_.Put(*std::move(surveys));
   return tile;
 }

@@ -34,7 +34,7 @@ class KeptTile {
     const auto work = surveys_.Update(frames, source, {profile_, sigmas_});
     EXPECT_TRUE(work.has_value());
     EXPECT_EQ(surveys_.Combine({profile_, sigmas_}), FuseTile({0, 0, 0}, keyframes, profile_));
-    return work->surveyed;
+    return *work;
   }
 
   TileSurveys& surveys() { return surveys_; }
@@ -48,14 +48,12 @@ class KeptTile {
 TEST(TileSurveysTest, FollowAnyChange) {
   for (std::uint32_t seed = 0; seed < testing::Scaled(40); ++seed) {
     MapProfile profile = DrivesProfile(seed);
-    if (seed % 8 == 7) {
-      profile.preset = FusionPreset::kPaper;
-    }
+    profile.preset = seed % 2 == 0 ? FusionPreset::kBounded : FusionPreset::kStrict;
     const auto all = RandomDrives(profile, seed);
     std::mt19937 random(seed);
     std::vector<PlacedKeyframe> current;
     KeptTile tile(profile);
-    for (int step = 0; step < 12; ++step) {
+    for (int step = 0; step < 60; ++step) {
       const std::size_t pick = random() % all.size();
       if (random() % 3 == 0 && !current.empty()) {
         current.erase(current.begin() +

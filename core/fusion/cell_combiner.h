@@ -1,0 +1,34 @@
+// The segments of one cell to its layers: which of them are one surface, and what they say of it
+// together.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/fusion/cell_layers.h"
+#include "core/fusion/evidence_folder.h"
+#include "core/fusion/segment_view.h"
+
+namespace atlas {
+
+// Reused from cell to cell.
+class CellCombiner {
+ public:
+  // Both must outlive the combiner.
+  CellCombiner(const SigmaTable& sigmas, const MapProfile& profile)
+      : profile_(profile), layer_builder_(sigmas, profile), folder_(profile) {}
+
+  // Appends the layers of a cell to `out`. Segments in canonical order; those that do not count are
+  // removed (preset bounded).
+  void Combine(std::vector<SegmentView>& segments, std::vector<TileLayer>& out);
+  // Whether segment `i` of those that are left is part of a layer.
+  bool IsUsed(std::size_t i) const { return layer_builder_.labels()[i] != kNoLayer; }
+
+ private:
+  const MapProfile& profile_;
+  CellLayerBuilder layer_builder_;
+  EvidenceFolder folder_;
+};
+
+}  // namespace atlas
