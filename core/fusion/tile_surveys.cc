@@ -311,6 +311,15 @@ std::size_t TileSurveys::bytes() const {
   return bytes;
 }
 
+std::size_t TileSurveys::ExpectedBytes(const MapProfile& profile) const {
+  constexpr std::size_t kCellBytes = 128;  // a segment or two of each stretch
+  std::size_t growing = 0;
+  for (std::size_t i = 0; i < awaited_.size(); ++i) {
+    growing += i == 0 || awaited_[i] != awaited_[i - 1] ? 1u : 0u;
+  }
+  return bytes() + growing * profile.tile_cells * profile.tile_cells * kCellBytes;
+}
+
 void TileSurveys::Pack() {
   settled_.Pack();
   for (Stretch& stretch : stretches_) {

@@ -44,6 +44,8 @@ class TileSurveys {
 
   const TileId& id() const { return id_; }
   std::size_t bytes() const;
+  // About what they will take when all expected frames were added.
+  std::size_t ExpectedBytes(const MapProfile& profile) const;
 
   // Compresses the surveys, to a fifth or so: Unpack() comes before anything else but bytes().
   void Pack();

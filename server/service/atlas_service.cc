@@ -296,7 +296,6 @@ Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience
     }
     AtlasVerifier::Options options;
     options.rebuild = rebuild;
-    options.building = options_.verification;
     options.check_stop = [&] {
       return CheckRunning(patience.stop);
     };

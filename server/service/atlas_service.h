@@ -50,8 +50,6 @@ struct ServiceStatus {
 
 struct ServiceOptions {
   FusionOptions fusion;
-  // Verification fuses from nothing: it keeps no surveys.
-  TileBuilderOptions verification{.surveys = {0, 0}};
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();

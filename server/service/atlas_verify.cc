@@ -31,7 +31,10 @@ Status CheckTileBlob(const StoredTile& tile, const MapProfile& profile) {
 }  // namespace
 
 AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
-    : store_(store), options_(std::move(options)), builder_(store, options_.building) {}
+    : store_(store),
+      options_(std::move(options)),
+      keyframes_(options_.keyframe_bytes),
+      builder_(store, keyframes_, options_.tile_bytes) {}
 
 Result<VerifyReport> AtlasVerifier::Run() {
   for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyKeyframes,

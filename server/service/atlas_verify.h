@@ -26,7 +26,8 @@ class AtlasVerifier {
  public:
   struct Options {
     bool rebuild = false;
-    TileBuilderOptions building;
+    std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded
+    std::size_t tile_bytes = std::size_t{128} << 20;      // of the tile that is rebuilt
     std::size_t max_findings = 20;
     // Asked between tiles; a failed status ends the verification with it.
     std::function<Status()> check_stop;
@@ -50,6 +51,7 @@ class AtlasVerifier {
 
   AtlasStore& store_;
   Options options_;
+  KeyframeCache keyframes_;
   TileBuilder builder_;
   std::uint64_t expected_keyframes_ = 0;  // what the sessions counted when it began
   VerifyReport report_;

@@ -32,7 +32,7 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
       clock_(std::move(clock)),
       log_(std::move(log)),
       options_(options),
-      builder_(store, options.building) {
+      refresher_(store, options.building) {
   for (unsigned i = 0; i < options_.workers; ++i) {
     threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
       RunWorker(stop, owner);
@@ -96,27 +96,32 @@ bool FusionScheduler::StartNextWave(std::uint64_t done) {
   return true;
 }
 
-// Builds one after the other while the store writes those before.
+// The store writes those that are done while the others are built.
 void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
                                   const std::stop_token& stop) {
-  std::vector<Unfinished> unfinished;
+  std::vector<TileId> ids;
   for (const TileClaim& claim : claims) {
     if (stop.stop_requested()) {
       GiveBack(claim, 0);
-      continue;
+    } else {
+      ids.push_back(claim.id);
     }
-    auto built = Build(claim.id);
+  }
+  std::vector<Unfinished> unfinished;
+  Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
+    const TileClaim& claim =
+        *std::find_if(claims.begin(), claims.end(), [&](const TileClaim& c) { return c.id == id; });
     if (!built) {
       PostponeFailed(claim, built.error());
-      continue;
+      return;
     }
-    damage_.Remove(claim.id);
+    damage_.Remove(id);
     ++tiles_built_;
     FinishedTile tile{claim, built->revision, std::move(built->content)};
     unfinished.push_back({claim, Begin<FinishResult>([&](auto done) {
                             store_.FinishTile(std::move(tile), std::move(done));
                           })});
-  }
+  });
   for (Unfinished& tile : unfinished) {
     const auto result = tile.result.get();
     if (!result && result.error().code() == StatusCode::kConflict) {
@@ -128,12 +133,23 @@ void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
   changes_.Notify();
 }
 
-// What it throws (no memory, say) is a failure of this tile, not the end of the process.
-Result<BuiltTile> FusionScheduler::Build(const TileId& id) {
+// What it throws (no memory, say) is a failure of these tiles, not the end of the process: they are
+// tried one by one then.
+void FusionScheduler::Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built) {
+  std::vector<TileId> rest(ids.begin(), ids.end());
   try {
-    return builder_.Build(id);
+    refresher_.Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
+      std::erase(rest, id);
+      on_built(id, std::move(built));
+    });
   } catch (const std::exception& error) {
-    return Error(StatusCode::kInternal, error.what());
+    if (rest.size() == 1) {
+      on_built(rest.front(), Error(StatusCode::kInternal, error.what()));
+      return;
+    }
+    for (const TileId& id : rest) {
+      Build(std::span(&id, 1), on_built);
+    }
   }
 }
 

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -17,7 +18,7 @@
 #include "server/service/change_signal.h"
 #include "server/service/damage_list.h"
 #include "server/service/log_sink.h"
-#include "server/service/tile_builder.h"
+#include "server/service/tile_refresher.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {
@@ -26,8 +27,8 @@ using WallClock = std::function<std::int64_t()>;  // ms since 1970
 
 struct FusionOptions {
   unsigned workers = 1;
-  TileBuilderOptions building;
-  std::uint32_t tiles_per_claim = 4;  // finished in one group commit
+  TileRefresherOptions building;
+  std::uint32_t tiles_per_claim = 16;  // built together and finished in one group commit
   std::int64_t lease_ms = 120'000;
   std::int64_t min_backoff_ms = 1'000;  // doubled with each failure of a tile
   std::int64_t max_backoff_ms = 60'000;
@@ -55,7 +56,7 @@ class FusionScheduler {
   std::vector<TileClaim> NextClaims(const std::string& owner);
   bool StartNextWave(std::uint64_t done);
   void BuildClaims(const std::vector<TileClaim>& claims, const std::stop_token& stop);
-  Result<BuiltTile> Build(const TileId& id);
+  void Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built);
   void GiveBack(const TileClaim& claim, std::int64_t retry_at_ms);
   void PostponeFailed(const TileClaim& claim, const Status& why);
   bool MarkDamagedChildren(const TileId& parent);
@@ -65,7 +66,7 @@ class FusionScheduler {
   WallClock clock_;
   LogSink log_;
   FusionOptions options_;
-  TileBuilder builder_;
+  TileRefresher refresher_;
   DamageList damage_;
   std::atomic<std::uint64_t> wave_ = 0;
   std::atomic<std::uint64_t> tiles_built_ = 0;

@@ -3,35 +3,12 @@
 #include <array>
 #include <utility>
 
-#include "core/base/str_cat.h"
-#include "core/fusion/keyframe_placement.h"
 #include "core/fusion/tile_fusion.h"
-#include "core/keyframe/keyframe_codec.h"
 #include "core/tile/tile_pyramid.h"
+#include "server/service/stored_keyframes.h"
 
 namespace atlas {
 namespace {
-
-Result<std::vector<FrameOnMap>> Placed(const std::vector<KeyframeRecord>& records) {
-  std::vector<FrameOnMap> frames;
-  frames.reserve(records.size());
-  for (const KeyframeRecord& record : records) {
-    const auto placement = PlaceKeyframe(record.pose, record.level_quaternion);
-    if (!placement) {
-      return Error(placement.error().WithContext(StrCat("keyframe ", record.key)));
-    }
-    frames.push_back({record.key, record.time_ms, *placement, record.grid});
-  }
-  return frames;
-}
-
-Result<Keyframe> ReadKeyframe(AtlasStore& store, std::int64_t id) {
-  const auto blob = store.ReadKeyframeBlob(id);
-  if (!blob) {
-    return Error(blob.error());
-  }
-  return DecodeKeyframe(*blob);
-}
 
 // Those of the four that some keyframe ever touched: the others need no look.
 Result<std::vector<TileId>> TouchedChildren(AtlasStore& store, const TileId& id) {
@@ -72,28 +49,17 @@ Result<Tile> PastTiles::BuildFromKeyframes(const TileId& id) {
   if (!sources) {
     return Error(sources.error());
   }
-  const auto frames = Placed(sources->keyframes);
+  const auto frames = PlaceKeyframes(sources->keyframes);
   if (!frames) {
     return Error(frames.error());
   }
-  return FuseTile(
-      id, *frames, [&](std::size_t i) { return Load(sources->keyframes[i]); }, profile_);
-}
-
-Result<KeyframeCache::Handle> PastTiles::Load(const KeyframeRecord& record) {
-  if (Status status = options_.check_stop(); !status.ok()) {
-    return Error(std::move(status));
-  }
-  auto keyframe = options_.keyframes->Get(
-      record.id, [this](std::int64_t id) { return ReadKeyframe(store_, id); });
-  if (!keyframe) {
-    return Error(keyframe.error().WithContext(StrCat("keyframe ", record.key)));
-  }
-  if ((*keyframe)->grid != record.grid) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("keyframe ", record.key, ": its grid is not the one of its row"));
-  }
-  return keyframe;
+  const auto source = [&](std::size_t i) -> Result<KeyframeCache::Handle> {
+    if (Status status = options_.check_stop(); !status.ok()) {
+      return Error(std::move(status));
+    }
+    return ReadKeyframe((*frames)[i], store_, *options_.keyframes);
+  };
+  return FuseTile(id, *frames, source, profile_);
 }
 
 Result<Tile> PastTiles::BuildFromChildren(const TileId& id, const OnTile& on_tile) {

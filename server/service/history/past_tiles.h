@@ -40,7 +40,6 @@ class PastTiles {
  private:
   Result<Tile> BuildFromKeyframes(const TileId& id);
   Result<Tile> BuildFromChildren(const TileId& id, const OnTile& on_tile);
-  Result<KeyframeCache::Handle> Load(const KeyframeRecord& record);
 
   AtlasStore& store_;
   const MapProfile profile_;

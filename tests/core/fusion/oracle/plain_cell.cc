@@ -309,7 +309,7 @@ TileLayer PlainCell::Publish(std::size_t index) const {
     }
   }
   std::stable_sort(in_order.begin(), in_order.end(), [](const Segment* a, const Segment* b) {
-    return a->last->time_ms < b->last->time_ms;
+    return std::tie(a->last->time_ms, a->last->key) < std::tie(b->last->time_ms, b->last->key);
   });
   const Layer& layer = layers_[index];
   int occupancy = 0;

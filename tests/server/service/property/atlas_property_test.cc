@@ -2,8 +2,9 @@
 // whatever order, its digest is the one that the oracle makes of the keyframes and poses that
 // count.
 //
-// ATLAS_PROPERTY_CASES: how many seeds, 1,000 times ATLAS_TEST_SCALE without it. ATLAS_PROPERTY_SEED:
-// only that one, a few times over, because threads do not run twice the same way.
+// ATLAS_PROPERTY_CASES: how many seeds, 1,000 times ATLAS_TEST_SCALE without it.
+// ATLAS_PROPERTY_SEED: only that one, a few times over, because threads do not run twice the same
+// way.
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>

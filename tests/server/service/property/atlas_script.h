@@ -15,7 +15,7 @@
 #include "core/geometry/map_profile.h"
 #include "core/geometry/pose.h"
 #include "core/keyframe/keyframe.h"
-#include "server/service/tile_builder.h"
+#include "server/service/tile_refresher.h"
 #include "server/store/session_types.h"
 
 namespace atlas::testing {
@@ -36,7 +36,7 @@ struct ScriptFrame {
 struct DaemonSetup {
   unsigned workers = 1;
   std::uint32_t tiles_per_claim = 4;
-  TileBuilderOptions building;
+  TileRefresherOptions building;
   std::size_t max_group = 64;
   std::size_t max_readers = 16;
 };
