@@ -1,58 +1,87 @@
 #include "core/fusion/bounded_choice.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <numeric>
+#include <span>
 
 #include "core/base/integer_math.h"
 
 namespace atlas {
 namespace {
 
-std::int64_t BandOf(const SegmentView& view, const MapProfile& profile) {
-  return FloorDiv(view.segment->altitude_mm, profile.band_mm);
+struct Candidate {
+  std::int64_t band = 0;
+  std::uint32_t index = 0;
+};
+
+// Whether some band may hold more than `limit`: counted by its last bits, so that others may be
+// taken for it.
+bool MayExceed(const std::vector<Candidate>& candidates, std::uint32_t limit) {
+  std::array<std::uint32_t, 64> counts{};
+  return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+    return ++counts[static_cast<std::size_t>(c.band) % counts.size()] > limit;
+  });
 }
 
-// Whether the band has room for `view` beside those that count already.
-bool HasRoom(const SegmentView& view,
-             const std::vector<SegmentView>& segments,
-             const std::vector<std::uint32_t>& kept,
-             const MapProfile& profile) {
-  const std::int64_t band = BandOf(view, profile);
-  std::uint32_t of_all = 0;
-  std::uint32_t of_vehicle = 0;
-  for (const std::uint32_t i : kept) {
-    if (BandOf(segments[i], profile) == band) {
-      ++of_all;
-      of_vehicle += segments[i].vehicle == view.vehicle ? 1u : 0u;
+// Those of one band, latest first: keeps those that count, and returns how many.
+std::size_t KeepOfBand(std::span<Candidate> band,
+                       const std::vector<SegmentView>& segments,
+                       const MapProfile& profile) {
+  std::size_t kept = 0;
+  for (const Candidate& candidate : band) {
+    const auto of_vehicle = static_cast<std::uint32_t>(
+        std::count_if(band.begin(), band.begin() + static_cast<std::ptrdiff_t>(kept),
+                      [&](const Candidate& other) {
+                        return segments[other.index].vehicle == segments[candidate.index].vehicle;
+                      }));
+    if (kept < profile.band_segments && of_vehicle < profile.band_vehicle_segments) {
+      band[kept++] = candidate;
     }
   }
-  return of_all < profile.band_segments && of_vehicle < profile.band_vehicle_segments;
+  return kept;
 }
 
 }  // namespace
 
 void KeepLatestSegments(const MapProfile& profile, std::vector<SegmentView>& segments) {
-  if (segments.size() <= profile.band_vehicle_segments &&
-      segments.size() <= profile.band_segments) {
+  const std::uint32_t limit =
+      std::min<std::uint32_t>(profile.band_segments, profile.band_vehicle_segments);
+  if (segments.size() <= limit) {
     return;
   }
-  std::vector<std::uint32_t> latest_first(segments.size());
-  std::iota(latest_first.begin(), latest_first.end(), 0u);
-  std::sort(latest_first.begin(), latest_first.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return WasSeenEarlier(segments[b], segments[a]);
+  std::vector<Candidate> candidates;
+  candidates.reserve(segments.size());
+  for (std::uint32_t i = 0; i < segments.size(); ++i) {
+    candidates.push_back({FloorDiv(segments[i].segment->altitude_mm, profile.band_mm), i});
+  }
+  if (!MayExceed(candidates, limit)) {
+    return;
+  }
+  std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+    return a.band != b.band ? a.band < b.band
+                            : WasSeenEarlier(segments[b.index], segments[a.index]);
   });
-  std::vector<std::uint32_t> kept;
-  for (const std::uint32_t i : latest_first) {
-    if (HasRoom(segments[i], segments, kept, profile)) {
-      kept.push_back(i);
+  std::vector<bool> counts(segments.size(), false);
+  for (std::size_t begin = 0; begin < candidates.size();) {
+    std::size_t end = begin;
+    while (end < candidates.size() && candidates[end].band == candidates[begin].band) {
+      ++end;
+    }
+    const auto band = std::span(candidates).subspan(begin, end - begin);
+    for (const Candidate& c : band.first(KeepOfBand(band, segments, profile))) {
+      counts[c.index] = true;
+    }
+    begin = end;
+  }
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (counts[i]) {
+      segments[next++] = segments[i];
     }
   }
-  std::sort(kept.begin(), kept.end());
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    segments[i] = segments[kept[i]];
-  }
-  segments.resize(kept.size());
+  segments.resize(next);
 }
 
 }  // namespace atlas

@@ -1,10 +1,13 @@
-// Arrays of plain values as one compressed blob and back, within one process.
+// Arrays of plain values as one compressed blob and back, within one process. Compressed are first
+// all first bytes of an array's values, then all second ones, and so on: that is faster and
+// smaller.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -14,47 +17,56 @@
 namespace atlas {
 namespace packed_arrays_internal {
 
+inline constexpr std::size_t kBlock = 512;  // values at a time, so that they stay in a cache
+
 template <typename T>
-void Append(const T* values, std::size_t count, Bytes& out) {
+void Append(const std::vector<T>& values, std::uint8_t*& out) {
   static_assert(std::is_trivially_copyable_v<T>);
-  const auto* begin = reinterpret_cast<const std::uint8_t*>(values);
-  out.insert(out.end(), begin, begin + count * sizeof(T));
-}
-
-template <typename T>
-void Take(T* values, std::size_t count, ByteSpan& rest) {
-  std::copy_n(rest.begin(), count * sizeof(T), reinterpret_cast<std::uint8_t*>(values));
-  rest = rest.subspan(count * sizeof(T));
-}
-
-template <typename T>
-void TakeArray(std::vector<T>& values, ByteSpan& rest) {
-  std::uint64_t count = 0;
-  Take(&count, 1, rest);
-  values.resize(count);
-  Take(values.data(), count, rest);
-}
-
-template <typename T>
-void AppendArray(std::vector<T>& values, Bytes& out) {
   const std::uint64_t count = values.size();
-  Append(&count, 1, out);
-  Append(values.data(), count, out);
-  values = std::vector<T>();
+  std::memcpy(out, &count, sizeof(count));
+  out += sizeof(count);
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(values.data());
+  for (std::size_t first = 0; first < count; first += kBlock) {
+    const std::size_t end = std::min<std::size_t>(count, first + kBlock);
+    for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
+      for (std::size_t i = first; i < end; ++i) {
+        out[byte * count + i] = bytes[i * sizeof(T) + byte];
+      }
+    }
+  }
+  out += count * sizeof(T);
+}
+
+template <typename T>
+void Take(const std::uint8_t*& in, std::vector<T>& values) {
+  std::uint64_t count = 0;
+  std::memcpy(&count, in, sizeof(count));
+  in += sizeof(count);
+  values.resize(count);
+  auto* bytes = reinterpret_cast<std::uint8_t*>(values.data());
+  for (std::size_t first = 0; first < count; first += kBlock) {
+    const std::size_t end = std::min<std::size_t>(count, first + kBlock);
+    for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
+      for (std::size_t i = first; i < end; ++i) {
+        bytes[i * sizeof(T) + byte] = in[byte * count + i];
+      }
+    }
+  }
+  in += count * sizeof(T);
 }
 
 }  // namespace packed_arrays_internal
 
-// Empties the arrays, memory and all.
 template <typename... T>
-Bytes PackArrays(std::vector<T>&... arrays) {
+Bytes PackArrays(const std::vector<T>&... arrays) {
   constexpr int kLevel = 1;
-  Bytes plain;
-  plain.reserve((... + (sizeof(std::uint64_t) + arrays.size() * sizeof(T))));
-  (packed_arrays_internal::AppendArray(arrays, plain), ...);
+  const std::uint64_t size = (... + (sizeof(std::uint64_t) + arrays.size() * sizeof(T)));
+  Bytes plain(size);
+  std::uint8_t* end = plain.data();
+  (packed_arrays_internal::Append(arrays, end), ...);
   Bytes packed = Compress(plain, kLevel);
-  const std::uint64_t size = plain.size();
-  packed_arrays_internal::Append(&size, 1, packed);
+  const auto* size_bytes = reinterpret_cast<const std::uint8_t*>(&size);
+  packed.insert(packed.end(), size_bytes, size_bytes + sizeof(size));
   packed.shrink_to_fit();
   return packed;
 }
@@ -63,11 +75,10 @@ Bytes PackArrays(std::vector<T>&... arrays) {
 template <typename... T>
 void UnpackArrays(ByteSpan packed, std::vector<T>&... arrays) {
   std::uint64_t size = 0;
-  ByteSpan size_bytes = packed.last(sizeof(size));
-  packed_arrays_internal::Take(&size, 1, size_bytes);
+  std::memcpy(&size, packed.last(sizeof(size)).data(), sizeof(size));
   const Bytes plain = Decompress(packed.first(packed.size() - sizeof(size)), size).value();
-  ByteSpan rest = plain;
-  (packed_arrays_internal::TakeArray(arrays, rest), ...);
+  const std::uint8_t* begin = plain.data();
+  (packed_arrays_internal::Take(begin, arrays), ...);
 }
 
 }  // namespace atlas

@@ -10,6 +10,14 @@ std::size_t SettledSegments::bytes() const {
 }
 
 void SettledSegments::Renumber(std::span<const std::uint32_t> numbers, CellSet& touched) {
+  bool is_same = true;
+  for (std::uint32_t i = 0; i < numbers.size(); ++i) {
+    is_same &= numbers[i] == i;
+  }
+  if (is_same || is_empty()) {
+    return;
+  }
+  packed_ = Bytes();
   std::size_t kept = 0;
   std::size_t i = 0;
   for (std::size_t cell = 0; cell < cell_end_.size(); ++cell) {
@@ -44,15 +52,18 @@ void SettledSegments::CopyTo(std::uint32_t stretch, StretchSurvey& survey) const
 }
 
 void SettledSegments::Pack() {
-  if (packed_.empty() && !cell_end_.empty()) {
+  if (packed_.empty()) {
     packed_ = PackArrays(cell_end_, segments_, stretches_);
   }
+  cell_end_ = std::vector<std::uint32_t>();
+  segments_ = std::vector<Segment>();
+  stretches_ = std::vector<std::uint32_t>();
 }
 
 void SettledSegments::Unpack() {
-  if (!packed_.empty()) {
-    UnpackArrays(packed_, cell_end_, segments_, stretches_);
-    packed_ = Bytes();
+  UnpackArrays(packed_, cell_end_, segments_, stretches_);
+  for (Segment& segment : segments_) {
+    segment.is_used = false;
   }
 }
 

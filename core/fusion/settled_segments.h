@@ -42,7 +42,7 @@ class SettledSegments {
   // Puts the segments of a stretch into `survey`, of the same cells and empty.
   void CopyTo(std::uint32_t stretch, StretchSurvey& survey) const;
 
-  // Compresses them; they come back with Unpack(), which comes before anything else.
+  // As StretchSurvey's.
   void Pack();
   void Unpack();
 
@@ -55,7 +55,7 @@ class SettledSegments {
   std::vector<std::uint32_t> cell_end_;  // offsets; empty: no cell has any
   std::vector<Segment> segments_;
   std::vector<std::uint32_t> stretches_;
-  Bytes packed_;  // instead of the above
+  Bytes packed_;  // the above, if not empty
 };
 
 }  // namespace atlas

@@ -51,12 +51,14 @@ void StretchSurvey::Pack() {
   if (packed_.empty()) {
     packed_ = PackArrays(heads_, segments_);
   }
+  heads_ = std::vector<std::uint32_t>();
+  segments_ = std::vector<Segment>();
 }
 
 void StretchSurvey::Unpack() {
-  if (!packed_.empty()) {
-    UnpackArrays(packed_, heads_, segments_);
-    packed_ = Bytes();
+  UnpackArrays(packed_, heads_, segments_);
+  for (Segment& segment : segments_) {
+    segment.is_used = false;
   }
 }
 
@@ -65,6 +67,7 @@ void StretchSurvey::Add(const FrameOnMap& frame,
                         const SigmaTable& sigmas) {
   assert(frames_.empty() || frames_.back().sequence < frame.key.sequence);
   AddFrame({frame.key.sequence, frame.time_ms});
+  packed_ = Bytes();
   const FrameResampler resampler(frame, keyframe, sigmas, profile_);
   const auto expect = [this](std::size_t cell) {
     if (heads_[cell] != Segment::kNone) {

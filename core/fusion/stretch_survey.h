@@ -54,7 +54,8 @@ class StretchSurvey {
   std::span<const StretchFrame> frames() const { return frames_; }
   std::size_t bytes() const;
 
-  // Compresses the segments; they come back with Unpack(), which comes before anything else.
+  // Compresses the segments; they come back, as not used, with Unpack(), which comes before
+  // anything else. What did not change since it was packed last is not compressed again.
   void Pack();
   void Unpack();
 
@@ -92,7 +93,7 @@ class StretchSurvey {
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;
   CellSet touched_;
-  Bytes packed_;  // instead of heads_ and segments_
+  Bytes packed_;  // heads_ and segments_, if not empty
 };
 
 }  // namespace atlas

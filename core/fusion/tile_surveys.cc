@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -10,9 +11,12 @@
 namespace atlas {
 namespace {
 
-// A stretch settles when its session goes on with another one, or when the tile was fused so many
-// times without it.
+// A stretch settles when its session went on with another one; when the tile was fused this often
+// without it; or when it is this much older than the latest, a visit that is over, and the tile was
+// fused a few times without it.
 constexpr std::uint32_t kOpenFusions = 16;
+constexpr std::int64_t kVisitMs = 60'000;
+constexpr std::uint32_t kVisitFusions = 2;
 
 void SortByStretch(std::vector<SegmentView>& segments) {
   const auto is_before = [](const SegmentView& a, const SegmentView& b) {
@@ -163,17 +167,25 @@ StretchSurvey TileSurveys::Reopen(const Stretch& stretch,
   return survey;
 }
 
-bool TileSurveys::IsToSettle(std::size_t i) const {
+bool TileSurveys::IsToSettle(std::size_t i, std::int64_t latest_ms) const {
   const Stretch& stretch = stretches_[i];
+  const std::uint32_t idle = expected_count_ - stretch.grown_at;
+  if (!stretch.open || idle == 0) {
+    return false;
+  }
   const bool session_goes_on = i + 1 < stretches_.size() && stretches_[i + 1].key == stretch.key;
-  return stretch.open && stretch.grown_at != expected_count_ &&
-         (session_goes_on || expected_count_ - stretch.grown_at > kOpenFusions);
+  const bool is_over = stretch.frames.back().time_ms < latest_ms - kVisitMs;
+  return session_goes_on || idle > kOpenFusions || (is_over && idle > kVisitFusions);
 }
 
 void TileSurveys::Settle(const MapProfile& profile) {
+  std::int64_t latest_ms = std::numeric_limits<std::int64_t>::min();
+  for (const Stretch& stretch : stretches_) {
+    latest_ms = std::max(latest_ms, stretch.frames.back().time_ms);
+  }
   std::vector<std::uint32_t> settling;
   for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
-    if (IsToSettle(i)) {
+    if (IsToSettle(i, latest_ms)) {
       settling.push_back(i);
     }
   }
@@ -320,9 +332,15 @@ std::size_t TileSurveys::ExpectedBytes(const MapProfile& profile) const {
   return bytes() + growing * profile.tile_cells * profile.tile_cells * kCellBytes;
 }
 
+// Repeated calls of either do nothing.
 void TileSurveys::Pack() {
+  if (is_packed_) {
+    return;
+  }
+  is_packed_ = true;
   settled_.Pack();
   for (Stretch& stretch : stretches_) {
+    stretch.used = 0;
     if (stretch.open) {
       stretch.open->Pack();
     }
@@ -331,6 +349,10 @@ void TileSurveys::Pack() {
 }
 
 void TileSurveys::Unpack() {
+  if (!is_packed_) {
+    return;
+  }
+  is_packed_ = false;
   settled_.Unpack();
   for (Stretch& stretch : stretches_) {
     if (stretch.open) {

@@ -89,7 +89,7 @@ class TileSurveys {
   StretchSurvey Reopen(const Stretch& stretch,
                        std::uint32_t number,
                        const MapProfile& profile) const;
-  bool IsToSettle(std::size_t i) const;
+  bool IsToSettle(std::size_t i, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
   void Forget(const MapProfile& profile);
   void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);
@@ -105,8 +105,9 @@ class TileSurveys {
   SettledSegments settled_;
   std::vector<std::uint32_t> awaited_;  // stretches of the frames that must be added, last first
   Tile tile_;                           // without cells: there is none
-  CellSet touched_;                     // cells that changed since it was made
-  std::vector<SegmentView> segments_;   // of a cell
+  bool is_packed_ = false;
+  CellSet touched_;                    // cells that changed since it was made
+  std::vector<SegmentView> segments_;  // of a cell
 };
 
 }  // namespace atlas

@@ -18,7 +18,7 @@ struct DaemonConfig {
   std::uint16_t port = 7447;
   int workers = 0;       // fusion threads; 0: one a core
   int cache_mib = 128;   // decoded keyframes, all workers together
-  int survey_mib = 384;  // what tiles keep from one fusion to the next
+  int survey_mib = 1024;  // what tiles keep from one fusion to the next
   std::string log_level = "info";
 
   // Of the map, given by whoever starts the daemon; checked against an atlas that exists already.
