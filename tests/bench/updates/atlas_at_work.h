@@ -1,0 +1,43 @@
+// A store and its service in a directory of their own, fed keyframe by keyframe: what a change
+// costs until it is served.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "core/base/status.h"
+#include "server/service/atlas_service.h"
+#include "server/store/atlas_store.h"
+
+namespace atlas::testing {
+
+struct UpdateCost {
+  double cpu_ms = 0;   // of the whole process
+  double wall_ms = 0;  // from the request to the fused tiles
+  std::uint64_t tiles = 0;
+};
+
+class AtlasAtWork {
+ public:
+  // Throws where the machine cannot do it.
+  AtlasAtWork(const MapProfile& profile, unsigned workers);
+  AtlasAtWork(const AtlasAtWork&) = delete;
+  AtlasAtWork& operator=(const AtlasAtWork&) = delete;
+  ~AtlasAtWork();
+
+  // Until it is in the tiles.
+  Result<UpdateCost> Upload(UploadRequest request);
+  Result<UpdateCost> UpdatePoses(PoseBatchRequest request);
+
+  AtlasService& service() { return *service_; }
+
+ private:
+  template <typename T, typename Begin>
+  Result<UpdateCost> Measure(const Begin& begin);
+
+  std::filesystem::path directory_;
+  std::unique_ptr<AtlasStore> store_;
+  std::unique_ptr<AtlasService> service_;
+};
+
+}  // namespace atlas::testing
