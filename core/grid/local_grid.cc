@@ -70,11 +70,11 @@ void AddReturns(const LeveledScan& scan,
       continue;
     }
     const auto cell = static_cast<std::size_t>(grid.Index(ix, iy));
-    const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
     const float range_m = scan.range_m[i];
-    const float ground_m = profile.GroundAt(range_m);
-    if (range_m >= profile.end.range_m &&  // the nearest one is there
-        Stands(scan.z[i] - ground_m, options)) {
+    const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
+    const bool is_behind = range_m >= profile.end.range_m;  // the nearest that stands is there
+    const float ground_m = is_behind ? profile.GroundAt(range_m) : 0.0F;
+    if (is_behind && Stands(scan.z[i] - ground_m, options)) {
       cells[cell].occupancy = Occupancy::kObstacle;
       altitudes.Add(static_cast<std::uint32_t>(cell), ground_m, AltitudeSource::kExtrapolated);
     } else if (scan.is_ground[i] != 0) {
