@@ -19,6 +19,19 @@ void CellLayerBuilder::Build(std::span<const SegmentView> segments) {
   AdoptWeak(segments);
 }
 
+// An obstacle stands on something, even where the height of its foot is a guess: on a layer of its
+// own where every measured one is of another deck.
+bool CellLayerBuilder::IsMaker(const Segment& segment,
+                               std::span<const SegmentView> segments) const {
+  const auto is_near = [&](const SegmentView& other) {
+    const std::int64_t distance_mm =
+        std::abs(std::int64_t{other.segment->altitude_mm} - segment.altitude_mm);
+    return other.segment->is_strong && distance_mm < profile_.other_layer_mm;
+  };
+  return all_make_ || segment.is_strong ||
+         (segment.occupancy > 0 && std::none_of(segments.begin(), segments.end(), is_near));
+}
+
 // Eq. 1 over the representatives of all sessions. Where they lie as close together as one layer
 // always may, there is nothing to sort.
 void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
@@ -27,7 +40,7 @@ void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
   std::int32_t lowest_mm = std::numeric_limits<std::int32_t>::max();
   std::int32_t highest_mm = std::numeric_limits<std::int32_t>::min();
   for (std::uint32_t i = 0; i < segments.size(); ++i) {
-    if (IsMaker(*segments[i].segment)) {
+    if (IsMaker(*segments[i].segment, segments)) {
       makers_.push_back(i);
       labels_[i] = 0;
       lowest_mm = std::min(lowest_mm, segments[i].segment->altitude_mm);
@@ -151,7 +164,7 @@ void CellLayerBuilder::AdoptWeak(std::span<const SegmentView> segments) {
     return;
   }
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (!segments[i].segment->is_strong) {
+    if (!segments[i].segment->is_strong && labels_[i] == kNoLayer) {
       labels_[i] = NearestLayer(segments[i].segment->altitude_mm);
       if (labels_[i] != kNoLayer) {
         layers_[labels_[i]].observations += segments[i].segment->observations;

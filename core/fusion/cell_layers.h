@@ -52,7 +52,7 @@ class CellLayerBuilder {
     std::int64_t last_time_ms = 0;
   };
 
-  bool IsMaker(const Segment& segment) const { return all_make_ || segment.is_strong; }
+  bool IsMaker(const Segment& segment, std::span<const SegmentView> segments) const;
   void LabelMakers(std::span<const SegmentView> segments);
   void ChainMakers(std::span<const SegmentView> segments);
   void Sum(std::span<const SegmentView> segments);
@@ -65,7 +65,7 @@ class CellLayerBuilder {
   const SigmaTable& sigmas_;
   const MapProfile& profile_;
 
-  bool all_make_ = true;  // else only strong segments make layers
+  bool all_make_ = true;  // else strong segments make layers, and obstacles far from all of these
   std::vector<std::uint32_t> makers_;
   std::vector<AltitudeEstimate> estimates_;
   std::vector<std::uint32_t> chain_labels_;

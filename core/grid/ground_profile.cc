@@ -7,18 +7,21 @@
 namespace atlas {
 namespace {
 
-// How far sample `i` is from the line that the ground followed before it, in height. That line is
-// taken over half the gap at least, so that noise is not extended into slope.
-float BendAt(std::span<const GroundSample> ground, std::size_t i) {
-  const GroundSample& before = ground[i - 1];
-  const float gap_m = ground[i].range_m - before.range_m;
-  std::size_t first = i - 1;
-  while (first > 0 && before.range_m - ground[first].range_m < 0.5F * gap_m) {
+// A slope is taken over at least this share of the gap that it is extended into, so that noise is
+// not extended into slope.
+constexpr float kSlopeBase = 0.5F;
+
+// Height at `range_m` on the line that the ground followed until its last sample.
+float Extend(std::span<const GroundSample> ground, float range_m) {
+  const GroundSample& last = ground.back();
+  const float gap_m = range_m - last.range_m;
+  std::size_t first = ground.size() - 1;
+  while (first > 0 && last.range_m - ground[first].range_m < kSlopeBase * gap_m) {
     --first;
   }
-  const float base_m = before.range_m - ground[first].range_m;
-  const float slope = base_m > 0.0F ? (before.z_m - ground[first].z_m) / base_m : 0.0F;
-  return std::abs(ground[i].z_m - before.z_m - slope * gap_m);
+  const float base_m = last.range_m - ground[first].range_m;
+  const float slope = base_m > 0.0F ? (last.z_m - ground[first].z_m) / base_m : 0.0F;
+  return last.z_m + slope * gap_m;
 }
 
 }  // namespace
@@ -116,7 +119,8 @@ void GroundProfiles::Join(std::span<const Return> returns,
       const float chord_m = before.z_m + slope * (r.range_m - before.range_m);
       is_crossed |= r.z_m < chord_m - options.max_chord_error_m;
     }
-    after.is_joined = !is_crossed && BendAt(ground, i) <= options.max_chord_error_m;
+    const float bend_m = std::abs(after.z_m - Extend(ground.first(i), after.range_m));
+    after.is_joined = !is_crossed && bend_m <= options.max_chord_error_m;
   }
 }
 
@@ -125,11 +129,35 @@ RayEnd GroundProfiles::FindEnd(std::span<const Return> returns,
                                const ProfileOptions& options) {
   for (const Return& r : returns) {
     const float height_m = r.z_m - profile.GroundAt(r.range_m);
-    if (r.is_ground ? IsTop(height_m, options) : height_m <= options.vehicle_clearance_m) {
+    if (r.is_ground ? Stands(height_m, options) : height_m <= options.vehicle_clearance_m) {
       return {r.range_m, !r.is_ground};
     }
   }
   return {profile.ground.back().range_m, false};
+}
+
+bool GroundProfiles::IsOnSlope(const Return& r,
+                               std::span<const Return> rising,
+                               std::span<const GroundSample> ground,
+                               const ProfileOptions& options) {
+  const GroundSample& last = ground.back();
+  const float gap_m = r.range_m - last.range_m;
+  const float slope_m = SlopeFrom(rising, kSlopeBase * gap_m, options) * gap_m;
+  return r.z_m <=
+         std::max(Extend(ground, r.range_m), last.z_m + slope_m) + options.max_ground_step_m;
+}
+
+float GroundProfiles::SlopeFrom(std::span<const Return> from,
+                                float base_m,
+                                const ProfileOptions& options) {
+  const Return& first = from.front();
+  for (const Return& r : from) {
+    if (r.is_ground && r.range_m > first.range_m && r.range_m >= first.range_m + base_m) {
+      const float slope = (r.z_m - first.z_m) / (r.range_m - first.range_m);
+      return slope <= options.max_ground_slope ? slope : 0.0F;
+    }
+  }
+  return 0.0F;
 }
 
 void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& options) {
@@ -137,12 +165,24 @@ void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& o
     return a.range_m != b.range_m ? a.range_m < b.range_m : a.z_m < b.z_m;
   });
   const std::size_t begin = ground_begin_.back();
-  for (const Return& r : returns) {
-    const GroundSample& last = ground_.back();
+  float highest_m = std::max(ground_[begin].z_m, ground_[begin + 1].z_m);
+  std::size_t rising = returns.size();  // the first ground since the last sample that is higher
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    const Return& r = returns[i];
+    const GroundSample last = ground_.back();
     const float reach_m =
         options.max_ground_slope * (r.range_m - last.range_m) + options.max_ground_step_m;
-    if (r.is_ground && std::abs(r.z_m - last.z_m) <= reach_m && r.range_m > last.range_m) {
+    if (!r.is_ground || r.range_m <= last.range_m) {
+      continue;
+    }
+    const bool is_higher = r.z_m > highest_m + options.max_ground_step_m;
+    rising = is_higher ? std::min(rising, i) : rising;
+    const std::span before(ground_.data() + begin, ground_.size() - begin);
+    if (std::abs(r.z_m - last.z_m) <= reach_m &&
+        (!is_higher || IsOnSlope(r, returns.subspan(rising), before, options))) {
       ground_.push_back({r.range_m, r.z_m});
+      highest_m = std::max(highest_m, r.z_m);
+      rising = returns.size();
     }
   }
   const std::span ground(ground_.data() + begin, ground_.size() - begin);

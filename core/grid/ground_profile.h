@@ -27,8 +27,9 @@ struct VehicleContact {
 struct ProfileOptions {
   float contact_radius_m = 1.5F;     // how far around the sensor the vehicle's plane is the ground
   float vehicle_clearance_m = 2.5F;  // higher above the ground a vehicle passes below
-  // A ground return must be reachable from the one before it at this slope plus this step; the roof
-  // of a car that was taken for ground is not.
+  // A ground return must be reachable from the one before it at this slope plus this step, and
+  // where it lies a step above all ground before it, the slope must show before the gap or behind
+  // it: the top of a car that was taken for ground is level, and so is the street before it.
   float max_ground_slope = 0.42F;  // tan 0.4 rad: what segmentation calls ground
   float max_ground_step_m = 0.25F;
   // Between two ground returns the ground is known (GroundSample::is_joined) when the second one is
@@ -37,9 +38,9 @@ struct ProfileOptions {
   float max_chord_error_m = 0.25F;
 };
 
-// Whether a return taken for ground lies so much above the ground below it that no vehicle gets up
-// there, and not so high that one passes below: the top of a car or a parapet.
-inline bool IsTop(float height_m, const ProfileOptions& options) {
+// Whether a return lies so much above the ground below it that no vehicle gets up there, and not so
+// high that one passes below: an obstacle, or the flat top of one that was taken for ground.
+inline bool Stands(float height_m, const ProfileOptions& options) {
   return height_m > options.max_ground_step_m && height_m <= options.vehicle_clearance_m;
 }
 
@@ -88,6 +89,15 @@ class GroundProfiles {
   void Sort(const LeveledScan& scan, const RayTable& rays);
   // Ends the ray that begins with the two `contact` samples.
   void BuildRay(std::span<Return> returns, const ProfileOptions& options);
+  // Whether `r`, higher than all ground before it, is on the slope that the ground had before the
+  // gap, or on that behind it. `rising`: the returns from the first such ground on.
+  static bool IsOnSlope(const Return& r,
+                        std::span<const Return> rising,
+                        std::span<const GroundSample> ground,
+                        const ProfileOptions& options);
+  // Slope from the first return of `from` to the next ground at least `base_m` behind it; 0 where
+  // there is none or no vehicle climbs it.
+  static float SlopeFrom(std::span<const Return> from, float base_m, const ProfileOptions& options);
   static RayEnd FindEnd(std::span<const Return> returns,
                         const RayProfile& profile,
                         const ProfileOptions& options);

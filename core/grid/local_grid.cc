@@ -51,29 +51,34 @@ class AltitudeGrid {
   std::vector<AltitudeSum> cells_;
 };
 
-// Ground returns of any deck; not the tops of things that stand on this one.
-void AddMeasured(const LeveledScan& scan,
-                 const RayTable& rays,
-                 const GroundProfiles& profiles,
-                 const ProfileOptions& options,
-                 AltitudeGrid& altitudes) {
+// Each return in its own cell: ground of any deck, or an obstacle that stands on this one.
+void AddReturns(const LeveledScan& scan,
+                const RayTable& rays,
+                const GroundProfiles& profiles,
+                const ProfileOptions& options,
+                AltitudeGrid& altitudes,
+                std::vector<KeyframeCell>& cells) {
   const GridGeometry& grid = rays.grid();
   const float cells_per_m = 1.0F / static_cast<float>(grid.cell_size_m());
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    if (scan.is_ground[i] == 0 || scan.range_m[i] >= rays.radius_m()) {
-      continue;
-    }
-    const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
-    const float range_m = scan.range_m[i];
-    if (range_m >= profile.end.range_m &&  // the nearest top is there
-        IsTop(scan.z[i] - profile.GroundAt(range_m), options)) {
+    if (scan.range_m[i] >= rays.radius_m()) {
       continue;
     }
     const auto ix = static_cast<std::int32_t>(std::floor(scan.x[i] * cells_per_m));
     const auto iy = static_cast<std::int32_t>(std::floor(scan.y[i] * cells_per_m));
-    if (grid.Contains(ix, iy)) {
-      altitudes.Add(static_cast<std::uint32_t>(grid.Index(ix, iy)), scan.z[i],
-                    AltitudeSource::kMeasured);
+    if (!grid.Contains(ix, iy)) {
+      continue;
+    }
+    const auto cell = static_cast<std::size_t>(grid.Index(ix, iy));
+    const float range_m = scan.range_m[i];
+    const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
+    const bool is_behind = range_m >= profile.end.range_m;  // the nearest that stands is there
+    const float ground_m = is_behind ? profile.GroundAt(range_m) : 0.0F;
+    if (is_behind && Stands(scan.z[i] - ground_m, options)) {
+      cells[cell].occupancy = Occupancy::kObstacle;
+      altitudes.Add(static_cast<std::uint32_t>(cell), ground_m, AltitudeSource::kExtrapolated);
+    } else if (scan.is_ground[i] != 0) {
+      altitudes.Add(static_cast<std::uint32_t>(cell), scan.z[i], AltitudeSource::kMeasured);
     }
   }
 }
@@ -124,7 +129,7 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
   LocalGrid grid;
   grid.cells.resize(rays.grid().size());
   AltitudeGrid altitudes(rays.grid().size());
-  AddMeasured(scan, rays, profiles, options, altitudes);
+  AddReturns(scan, rays, profiles, options, altitudes, grid.cells);
   for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
     const RayProfile profile = profiles.Ray(ray);
     AddAlongRay(profile, rays, ray, options, altitudes);

@@ -22,6 +22,10 @@ bool Overlaps(const Corner& first, std::int64_t length, std::int64_t side) {
   return first.x > -length && first.x < side && first.y > -length && first.y < side;
 }
 
+bool IsMeasured(const TileLayer& layer) {
+  return (layer.flags & TileLayer::kMeasured) != 0;
+}
+
 }  // namespace
 
 MapWindow::MapWindow(const MapProfile& profile,
@@ -65,10 +69,14 @@ void MapWindow::AddTile(const MapProfile& profile,
       if (!Contains(cell)) {
         continue;
       }
-      for (const TileLayer& layer :
-           tile.Layers(static_cast<std::size_t>(j * profile.tile_cells + i))) {
+      const auto layers = tile.Layers(static_cast<std::size_t>(j * profile.tile_cells + i));
+      const bool is_any_measured = std::any_of(layers.begin(), layers.end(), IsMeasured);
+      for (const TileLayer& layer : layers) {
+        if (is_any_measured && !IsMeasured(layer)) {
+          continue;  // what stands there does so at a guessed height
+        }
         const double z_m = layer.altitude_mm * 1e-3 - origin_.z();
-        if (layer.is_traversable() && (layer.flags & TileLayer::kMeasured) != 0) {
+        if (layer.is_traversable() && IsMeasured(layer)) {
           pending_surfaces_.emplace_back(static_cast<std::uint32_t>(Index(cell)),
                                          static_cast<float>(z_m));
         }

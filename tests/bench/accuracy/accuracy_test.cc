@@ -21,9 +21,9 @@ AccuracyScore Score(std::string_view world, std::size_t begin, std::size_t end) 
 TEST(AccuracyTest, AStreetIsMappedAsItIs) {
   const AccuracyScore score = Score("street", 60, 90);
   EXPECT_GT(score.layers_right.whole, 20000U);
-  EXPECT_GT(score.layers_right.value(), 0.97);
-  EXPECT_LT(score.altitude_rmse_m(), 0.05);
-  EXPECT_GT(score.static_kept_nearby.value(), 0.9);
+  EXPECT_GT(score.layers_right.value(), 0.99);
+  EXPECT_LT(score.altitude_rmse_m(), 0.03);
+  EXPECT_GT(score.static_kept.value(), 0.95);
 }
 
 TEST(AccuracyTest, BothRoadsOfAnOverpassAreMapped) {

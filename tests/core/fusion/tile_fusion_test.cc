@@ -185,6 +185,24 @@ TEST(TileFusionTest, GuessedAltitudesMakeNoLayerWhereGroundWasMeasured) {
   EXPECT_EQ(tile.contributors, (std::vector<SessionKey>{{"car", "a"}, {"car", "c"}}));
 }
 
+TEST(TileFusionTest, AnObstacleOnAnotherDeckStandsOnALayerOfItsOwn) {
+  // A parapet on the bridge, seen from there, and the road below, measured.
+  const PlacedKeyframe road = See({.z_m = 0.0}, {"car", "a", 1});
+  const auto parapet = [](double z_m, Occupancy occupancy) {
+    return See({.z_m = z_m, .occupancy = occupancy, .source = AltitudeSource::kExtrapolated},
+               {"car", "b", 1});
+  };
+  const auto layers = Middle({road, parapet(5.5, Occupancy::kObstacle)});
+  ASSERT_EQ(layers.size(), 2u);
+  EXPECT_EQ(layers[0].altitude_mm, 0);
+  EXPECT_EQ(layers[1].altitude_mm, 5'500);
+  EXPECT_EQ(layers[1].occupancy, SmallProfile().hit_units);
+  EXPECT_EQ(layers[1].flags & TileLayer::kMeasured, 0);
+  // A guess that says nothing of an obstacle makes none, nor does one that may stand on the road.
+  EXPECT_EQ(Middle({road, parapet(5.5, Occupancy::kUnknown)}).size(), 1u);
+  EXPECT_EQ(Middle({road, parapet(1.9, Occupancy::kObstacle)}).size(), 1u);
+}
+
 TEST(TileFusionTest, ACellHoldsABoundedNumberOfLayers) {
   std::vector<PlacedKeyframe> keyframes;
   for (std::uint32_t deck = 0; deck < 40; ++deck) {

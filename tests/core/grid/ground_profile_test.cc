@@ -64,6 +64,11 @@ class GroundProfileTest : public ::testing::Test {
   bool IsLastJoined(std::initializer_list<Drawn> returns) const {
     return Build(OneRay(returns)).Ray(0).ground.back().is_joined;
   }
+  // The same of the last but one.
+  bool IsLastButOneJoined(std::initializer_list<Drawn> returns) const {
+    const GroundProfiles profiles = Build(OneRay(returns));
+    return std::prev(profiles.Ray(0).ground.end(), 2)->is_joined;
+  }
 
   RayTable rays_{GridGeometry{100'000, 200}};
   ProfileOptions options_;
@@ -103,6 +108,41 @@ TEST_F(GroundProfileTest, GroundIsWhatCanBeReachedFromTheGroundBefore) {
   EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {5.1F, -1.45F, true}}), (std::vector<int>{50}));
 }
 
+TEST_F(GroundProfileTest, WhatIsHigherThanAStepMustBeOnASlopeThatShows) {
+  // A bonnet 0.9 m up beside a level street is near enough to the slope limit, and level.
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {7, -0.9F, true}, {8, -0.9F, true}, {12, -1.8F, true}}),
+            (std::vector<int>{50, 120}));
+  // The same where it is all there is, and where it ends in a windscreen.
+  EXPECT_TRUE(GroundRanges({{4.7F, -0.9F, true}, {4.9F, -0.9F, true}}).empty());
+  EXPECT_TRUE(
+      GroundRanges({{4.7F, -0.9F, true}, {6.4F, -0.85F, true}, {6.5F, -0.5F, true}}).empty());
+  // A rail 0.9 m up, one return wide.
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {9, -0.9F, true}}), (std::vector<int>{50}));
+  // Ramps of 18.5 degrees: first seen behind a gap, up to a crest, and behind a crest.
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {8, -0.8F, true}, {9.5F, -0.3F, true}}),
+            (std::vector<int>{50, 80, 95}));
+  EXPECT_EQ(GroundRanges({{3, -1.3F, true}, {6, -0.3F, true}, {9, 0.0F, true}, {14, 0.0F, true}}),
+            (std::vector<int>{30, 60, 90, 140}));
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {8, -2.8F, true}, {12, -4.1F, true}}),
+            (std::vector<int>{50, 80, 120}));
+  // A kerb, a lawn 0.1 m up.
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {5.1F, -1.68F, true}, {9, -1.68F, true}}),
+            (std::vector<int>{50, 51, 90}));
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {8, -1.7F, true}, {12, -1.7F, true}}),
+            (std::vector<int>{50, 80, 120}));
+}
+
+TEST_F(GroundProfileTest, AtTheFootOfARampTheFloorIsNoHigherThanWhatWasDriven) {
+  // The wheels' plane goes on below the floor ahead, which lies where the vehicle itself is.
+  const VehicleContact down{Eigen::Vector3f(0.3F, 0, 1.0F).normalized(), kHeight_m};
+  const LeveledScan scan = OneRay({{4, -1.85F, true}, {9, -1.85F, true}});
+  const GroundProfiles profiles(scan, rays_, down, options_);
+  EXPECT_EQ(profiles.Ray(0).ground.size(), 4U);
+  // The floor on both sides of a dip.
+  EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {7, -2.3F, true}, {9, -1.8F, true}}),
+            (std::vector<int>{50, 70, 90}));
+}
+
 TEST_F(GroundProfileTest, GroundUnderTheVehicleIsNotTakenFromReturns) {
   EXPECT_TRUE(GroundRanges({{1.2F, -1.2F, true}, {1.45F, -1.7F, true}}).empty());
 }
@@ -124,13 +164,14 @@ TEST_F(GroundProfileTest, AVehiclePassesBelowWhatHangsHigherThanItsClearance) {
 
 TEST_F(GroundProfileTest, ClearanceCountsFromTheGroundBelowAndNotFromTheVehicle) {
   // Up a ramp of 0.2 from 2 m on: 2 m above the ramp stands in the way, 3 m does not.
-  const Drawn ramp_a{2, -1.8F, true};
+  const Drawn foot{2, -1.8F, true};
+  const Drawn ramp_a{6, -1.0F, true};
   const Drawn ramp_b{12, 0.2F, true};
-  EXPECT_FLOAT_EQ(ObstacleRange({ramp_a, ramp_b, {7, -0.8F + 2.4F, false}}), 7.0F);
-  EXPECT_LT(ObstacleRange({ramp_a, ramp_b, {7, -0.8F + 2.6F, false}}), 0.0F);
+  EXPECT_FLOAT_EQ(ObstacleRange({foot, ramp_a, ramp_b, {7, -0.8F + 2.4F, false}}), 7.0F);
+  EXPECT_LT(ObstacleRange({foot, ramp_a, ramp_b, {7, -0.8F + 2.6F, false}}), 0.0F);
   // Beyond the last ground its height goes on.
-  EXPECT_FLOAT_EQ(ObstacleRange({ramp_a, ramp_b, {15, 0.2F + 2.4F, false}}), 15.0F);
-  EXPECT_LT(ObstacleRange({ramp_a, ramp_b, {15, 0.2F + 2.6F, false}}), 0.0F);
+  EXPECT_FLOAT_EQ(ObstacleRange({foot, ramp_a, ramp_b, {15, 0.2F + 2.4F, false}}), 15.0F);
+  EXPECT_LT(ObstacleRange({foot, ramp_a, ramp_b, {15, 0.2F + 2.6F, false}}), 0.0F);
 }
 
 TEST_F(GroundProfileTest, WhatIsBelowTheGroundIsAnObstacle) {
@@ -157,7 +198,8 @@ TEST_F(GroundProfileTest, StraightGroundIsKnownBetweenItsReturns) {
 }
 
 TEST_F(GroundProfileTest, BeyondABendTheGroundIsAGuess) {
-  EXPECT_FALSE(IsLastJoined({{5, -1.8F, true}, {6, -1.8F, true}, {9, -1.5F, true}}));
+  EXPECT_FALSE(IsLastButOneJoined(
+      {{5, -1.8F, true}, {6, -1.8F, true}, {9, -1.5F, true}, {11, -1.3F, true}}));
   EXPECT_FALSE(IsLastJoined({{5, -1.8F, true}, {6, -1.8F, true}, {9, -2.7F, true}}));
 }
 

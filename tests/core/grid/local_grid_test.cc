@@ -154,6 +154,44 @@ TEST_F(LocalGridTest, BehindAnObstacleTheLastGroundIsExtrapolatedAndUnknown) {
   EXPECT_EQ(At(grid, 12.35, 0.05).source, AltitudeSource::kNone);
 }
 
+TEST_F(LocalGridTest, WhatIsSeenToStandBehindAnObstacleIsOne) {
+  // A car's side, its bonnet taken for ground, its windscreen; a wall seen above it, as high as a
+  // vehicle and higher; a kerb behind.
+  LeveledScan scan;
+  AddReturn(scan, {6.0F, 0.05F, -1.8F}, true);
+  AddReturn(scan, {8.05F, 0.0705F, -1.2F}, false);
+  AddReturn(scan, {8.45F, 0.0745F, -0.9F}, true);
+  AddReturn(scan, {9.05F, 0.0805F, -0.7F}, false);
+  AddReturn(scan, {12.05F, 0.1105F, 0.6F}, false);
+  AddReturn(scan, {14.05F, 0.1305F, 0.9F}, false);
+  AddReturn(scan, {16.05F, 0.1505F, -1.6F}, false);
+  const LocalGrid grid = Build(scan);
+  for (const auto& [x, y] : {std::pair(8.05, 0.07), {8.45, 0.07}, {9.05, 0.08}, {12.05, 0.11}}) {
+    const KeyframeCell& cell = At(grid, x, y);
+    EXPECT_EQ(cell.occupancy, Occupancy::kObstacle) << x;
+    EXPECT_EQ(cell.source, AltitudeSource::kExtrapolated) << x;
+    EXPECT_EQ(cell.altitude_mm, -1800) << x;
+  }
+  EXPECT_EQ(At(grid, 10.05, 0.09).occupancy, Occupancy::kUnknown);
+  EXPECT_EQ(At(grid, 14.05, 0.13).occupancy, Occupancy::kUnknown);
+  EXPECT_EQ(At(grid, 16.05, 0.15).occupancy, Occupancy::kUnknown);
+}
+
+TEST_F(LocalGridTest, AParapetTakenForGroundIsAnObstacleAndTheLawnBehindIsGround) {
+  LeveledScan scan;
+  AddReturn(scan, {4.0F, 0.04F, -1.8F}, true);
+  AddReturn(scan, {5.05F, 0.0505F, -0.8F}, true);
+  AddReturn(scan, {5.15F, 0.0515F, -0.8F}, true);
+  AddReturn(scan, {11.05F, 0.1105F, -1.7F}, true);  // 0.1 m up
+  const LocalGrid grid = Build(scan);
+  EXPECT_EQ(At(grid, 4.55, 0.05).occupancy, Occupancy::kFree);
+  EXPECT_EQ(At(grid, 5.05, 0.05).occupancy, Occupancy::kObstacle);
+  EXPECT_EQ(At(grid, 5.15, 0.05).occupancy, Occupancy::kObstacle);
+  EXPECT_NE(At(grid, 5.05, 0.05).source, AltitudeSource::kMeasured);
+  EXPECT_EQ(At(grid, 11.05, 0.11).source, AltitudeSource::kMeasured);
+  EXPECT_EQ(At(grid, 11.05, 0.11).altitude_mm, -1700);
+}
+
 TEST_F(LocalGridTest, GroundMeasuredBehindAnObstacleIsKnownButNotFree) {
   LeveledScan scan;
   AddReturn(scan, {8.05F, 0.06F, -1.0F}, false);
@@ -182,8 +220,8 @@ TEST_F(LocalGridTest, AHitStaysAHitWhereOtherRaysPass) {
 }
 
 TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
-  // Any scan: a cell is an obstacle if a ray ends in it at one, else free if a ray passed it, else
-  // unknown.
+  // Any scan: a cell is an obstacle if a ray ends in it at one or something is seen to stand in it
+  // behind, else free if a ray passed it, else unknown.
   std::mt19937 random(81);
   std::uniform_real_distribution<float> coordinate(-21.0F, 21.0F);
   for (int round = 0; round < 5; ++round) {
@@ -211,6 +249,14 @@ TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
         } else if (end_m <= profile.end.range_m) {
           expected[rays_.Cells(ray)[step]] = Occupancy::kFree;
         }
+      }
+    }
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const RayProfile profile = profiles.Ray(rays_.Ray(scan.azimuth_rad[i]));
+      const float height_m = scan.z[i] - profile.GroundAt(scan.range_m[i]);
+      if (scan.range_m[i] < rays_.radius_m() && scan.range_m[i] >= profile.end.range_m &&
+          height_m > 0.25F && height_m <= 2.5F) {
+        hits.insert(static_cast<std::uint32_t>(Index(scan.x[i], scan.y[i])));
       }
     }
     for (const std::uint32_t cell : hits) {

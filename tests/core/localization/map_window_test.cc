@@ -171,6 +171,18 @@ TEST(MapWindowTest, OnlyMeasuredGroundThatCanBeDrivenIsASurface) {
   EXPECT_EQ(map.Window(kOrigin, 5.0).surfaces(), 1U);
 }
 
+TEST(MapWindowTest, WhatStandsAtAGuessedHeightBesideMeasuredGroundIsNoLine) {
+  // A parapet of another deck: how high its foot is was not measured.
+  PaintedMap map;
+  TileLayer parapet = ColumnLayer(5.5, 0b01);
+  parapet.flags = 0;
+  map.Put(0, 0, GroundLayer(0.0));
+  map.Put(0, 0, parapet);
+  map.Put(1, 0, parapet);  // all that the map knows there
+  map.Put(2, 0, ColumnLayer(5.5, 0b01));
+  EXPECT_EQ(map.Window(kOrigin, 5.0).lines(), 2U);
+}
+
 TEST(MapWindowTest, SlopesHaveTheirGradientAndLevelGroundHasNone) {
   for (const Eigen::Vector2d& gradient :
        {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.15, 0), Eigen::Vector2d(-0.1, 0.2)}) {

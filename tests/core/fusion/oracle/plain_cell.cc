@@ -193,13 +193,23 @@ void PlainCell::KeepLatest() {
   }
 }
 
+// No strong segment is of its deck.
+bool PlainCell::IsAlone(const Segment& segment) const {
+  return std::none_of(segments_.begin(), segments_.end(), [&](const Segment& other) {
+    return other.is_kept && other.representative->is_strong() &&
+           std::abs(std::int64_t{other.representative->altitude_mm} -
+                    segment.representative->altitude_mm) < profile_.other_layer_mm;
+  });
+}
+
 // Eq. 1.
 void PlainCell::ChainLayers(bool all_make) {
   makers_.clear();
   layers_.clear();
   for (Segment& segment : segments_) {
     segment.layer = -1;
-    if (segment.is_kept && (all_make || segment.representative->is_strong())) {
+    if (segment.is_kept && (all_make || segment.representative->is_strong() ||
+                            (segment.occupancy > 0 && IsAlone(segment)))) {
       makers_.push_back(&segment);
     }
   }
@@ -283,7 +293,7 @@ void PlainCell::KeepBestLayers() {
 
 void PlainCell::AdoptWeak() {
   for (Segment& segment : segments_) {
-    if (!segment.is_kept || segment.representative->is_strong()) {
+    if (!segment.is_kept || segment.representative->is_strong() || segment.layer >= 0) {
       continue;
     }
     std::int64_t nearest_mm = profile_.other_layer_mm;

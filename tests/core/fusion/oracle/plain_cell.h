@@ -71,6 +71,7 @@ class PlainCell {
   void AddTo(const PlainObservation& observation, std::int64_t weight, Segment& segment) const;
   void AddColumn(const PlainObservation& observation, Segment& segment) const;
   void KeepLatest();
+  bool IsAlone(const Segment& segment) const;
   void ChainLayers(bool all_make);
   void SumLayer(Layer& layer) const;
   void KeepBestLayers();
