@@ -88,7 +88,7 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
                                               : std::max(1U, std::thread::hardware_concurrency());
   options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
   const std::size_t survey_bytes = static_cast<std::size_t>(config.survey_mib) << 20;
-  options.fusion.building.surveys = {survey_bytes / 2, survey_bytes - survey_bytes / 2};
+  options.fusion.building.surveys = {survey_bytes / 3 * 2, survey_bytes / 3};
   options.scratch_directory = config.data;
   return options;
 }

@@ -14,8 +14,8 @@
 namespace atlas {
 
 struct SurveyCacheLimits {
-  std::size_t plain_bytes = std::size_t{128} << 20;
-  std::size_t packed_bytes = std::size_t{256} << 20;
+  std::size_t plain_bytes = std::size_t{1} << 30;
+  std::size_t packed_bytes = std::size_t{512} << 20;
 };
 
 class SurveyCache {

@@ -12,7 +12,7 @@
 namespace atlas::testing {
 namespace {
 
-constexpr Patience kPatience{std::chrono::minutes(10), {}};
+constexpr std::chrono::minutes kPatience{10};
 
 std::int64_t NowMs() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -66,7 +66,8 @@ Result<UpdateCost> AtlasAtWork::Measure(const Begin& begin) {
   if (!accepted) {
     return Error(accepted.error());
   }
-  if (Status status = service_->WaitForRevision(accepted->revision, kPatience); !status.ok()) {
+  if (Status status = service_->WaitForRevision(accepted->revision, {kPatience, {}});
+      !status.ok()) {
     return Error(std::move(status));
   }
   const std::chrono::duration<double, std::milli> wall_ms = std::chrono::steady_clock::now() - wall;
