@@ -1,6 +1,8 @@
 // Integer arithmetic with stated rounding, for the paths where every machine must agree.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace atlas {
@@ -21,27 +23,25 @@ constexpr std::int64_t RoundDiv(std::int64_t a, std::int64_t b) {
 
 constexpr std::int64_t RoundDiv128(Int128 a, std::int64_t b) {
   const Int128 shifted = a + b / 2;
+  if (shifted == static_cast<std::int64_t>(shifted)) {  // much faster, and usual
+    return FloorDiv(static_cast<std::int64_t>(shifted), b);
+  }
   const Int128 quotient = shifted / b;
   return static_cast<std::int64_t>(quotient - static_cast<Int128>(shifted % b < 0));
 }
 
 // floor(sqrt(value)).
-constexpr std::uint64_t Isqrt(std::uint64_t value) {
-  std::uint64_t result = 0;
-  std::uint64_t bit = std::uint64_t{1} << 62;
-  while (bit > value) {
-    bit >>= 2;
+inline std::uint64_t Isqrt(std::uint64_t value) {
+  constexpr std::uint64_t kMax = 0xFFFF'FFFF;
+  // A floating-point guess, put right in integers: the same everywhere, however it was rounded.
+  auto root = std::min(static_cast<std::uint64_t>(std::sqrt(static_cast<double>(value))), kMax);
+  while (root * root > value) {
+    --root;
   }
-  while (bit != 0) {
-    if (value >= result + bit) {
-      value -= result + bit;
-      result = (result >> 1) + bit;
-    } else {
-      result >>= 1;
-    }
-    bit >>= 2;
+  while (root < kMax && (root + 1) * (root + 1) <= value) {
+    ++root;
   }
-  return result;
+  return root;
 }
 
 }  // namespace atlas

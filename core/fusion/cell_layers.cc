@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "core/base/integer_math.h"
+#include "core/base/small_sort.h"
 #include "core/tile/tile.h"
 
 namespace atlas {
@@ -59,7 +60,7 @@ void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
 }
 
 void CellLayerBuilder::ChainMakers(std::span<const SegmentView> segments) {
-  std::stable_sort(makers_.begin(), makers_.end(), [&](std::uint32_t a, std::uint32_t b) {
+  SmallStableSort(makers_.begin(), makers_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return segments[a].segment->altitude_mm < segments[b].segment->altitude_mm;
   });
   estimates_.clear();

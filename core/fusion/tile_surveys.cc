@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/base/small_sort.h"
 #include "core/fusion/bounded_choice.h"
 
 namespace atlas {
@@ -22,9 +23,7 @@ void SortByStretch(std::vector<SegmentView>& segments) {
   const auto is_before = [](const SegmentView& a, const SegmentView& b) {
     return a.stretch < b.stretch;
   };
-  if (!std::is_sorted(segments.begin(), segments.end(), is_before)) {
-    std::stable_sort(segments.begin(), segments.end(), is_before);
-  }
+  SmallStableSort(segments.begin(), segments.end(), is_before);
 }
 
 }  // namespace

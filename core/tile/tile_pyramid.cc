@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/base/integer_math.h"
+#include "core/base/small_sort.h"
 #include "core/tile/column_lattice.h"
 #include "core/tile/layer_association.h"
 #include "core/tile/sigma_code.h"
@@ -101,7 +102,7 @@ class ParentCellBuilder {
     if (children_.empty()) {
       return;
     }
-    std::stable_sort(children_.begin(), children_.end(), [](const auto& a, const auto& b) {
+    SmallStableSort(children_.begin(), children_.end(), [](const auto& a, const auto& b) {
       return a.layer->altitude_mm < b.layer->altitude_mm;
     });
     FindGroups();

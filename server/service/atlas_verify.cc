@@ -34,7 +34,7 @@ AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
     : store_(store),
       options_(std::move(options)),
       keyframes_(options_.keyframe_bytes),
-      builder_(store, keyframes_, options_.tile_bytes) {}
+      builder_(store, keyframes_, tiles_, options_.tile_bytes) {}
 
 Result<VerifyReport> AtlasVerifier::Run() {
   for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyKeyframes,

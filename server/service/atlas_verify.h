@@ -52,6 +52,7 @@ class AtlasVerifier {
   AtlasStore& store_;
   Options options_;
   KeyframeCache keyframes_;
+  TileCache tiles_{0};  // what is verified is read
   TileBuilder builder_;
   std::uint64_t expected_keyframes_ = 0;  // what the sessions counted when it began
   VerifyReport report_;

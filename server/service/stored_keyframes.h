@@ -5,10 +5,13 @@
 
 #include "core/base/status.h"
 #include "core/fusion/tile_fusion.h"
-#include "server/service/keyframe_cache.h"
+#include "core/keyframe/keyframe.h"
+#include "server/service/lru_cache.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {
+
+using KeyframeCache = LruCache<Keyframe>;  // decoded, by id
 
 // In the same order; their `content` is the keyframe's id. kInvalidData names a pose that is none.
 Result<std::vector<FrameOnMap>> PlaceKeyframes(const std::vector<KeyframeRecord>& records);

@@ -1,7 +1,9 @@
 #include "server/service/tile_builder.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
 #include "core/fusion/tile_fusion.h"
@@ -25,9 +27,19 @@ std::optional<TileContent> ToContent(const Tile& tile, const MapProfile& profile
   return content;
 }
 
-TileBuilder::TileBuilder(AtlasStore& store, KeyframeCache& keyframes, std::size_t tile_bytes)
+void TileCache::Insert(std::uint64_t payload_hash, std::shared_ptr<const Tile> tile) {
+  const std::size_t bytes = sizeof(Tile) + tile->layers.size() * sizeof(TileLayer) +
+                            tile->cell_begin.size() * sizeof(std::uint32_t);
+  tiles_.Insert(payload_hash, std::move(tile), bytes);
+}
+
+TileBuilder::TileBuilder(AtlasStore& store,
+                         KeyframeCache& keyframes,
+                         TileCache& tiles,
+                         std::size_t tile_bytes)
     : store_(store),
       keyframes_(keyframes),
+      tiles_(tiles),
       tile_bytes_(tile_bytes),
       profile_(store.identity().profile) {}
 
@@ -59,25 +71,50 @@ Result<BuiltTile> TileBuilder::BuildFromChildren(const TileId& id) {
   if (!state) {
     return Error(state.error());
   }
-  const auto stored = store_.ReadTiles(id.Children());
+  const std::array<TileId, 4> ids = id.Children();
+  std::vector<TileSummary> stored;
+  const Status scanned =
+      store_.ScanTiles({ids[0].level, ids[0].x, ids[0].y, ids[3].x, ids[3].y},
+                       [&](const TileSummary& child) { stored.push_back(child); });
+  if (!scanned.ok()) {
+    return Error(scanned);
+  }
+  std::array<std::shared_ptr<const Tile>, 4> tiles;
+  std::array<const Tile*, 4> children{};
+  for (const TileSummary& summary : stored) {
+    auto child = ReadChild(summary);
+    if (!child) {
+      return Error(child.error());
+    }
+    const auto place = std::find(ids.begin(), ids.end(), summary.id) - ids.begin();
+    tiles[static_cast<std::size_t>(place)] = *child;
+    children[static_cast<std::size_t>(place)] = child->get();
+  }
+  auto parent = std::make_shared<const Tile>(BuildParentTile(id, children, profile_));
+  BuiltTile built{state->revision, ToContent(*parent, profile_)};
+  if (built.content) {
+    tiles_.Insert(built.content->payload_hash, std::move(parent));
+  }
+  return built;
+}
+
+// Null if it has been removed since: then this tile was marked again.
+Result<std::shared_ptr<const Tile>> TileBuilder::ReadChild(const TileSummary& child) {
+  if (auto found = tiles_.Find(child.payload_hash)) {
+    return found;
+  }
+  const auto stored = store_.ReadTile(child.id);
   if (!stored) {
     return Error(stored.error());
   }
-  std::array<Tile, 4> tiles;
-  std::array<const Tile*, 4> children{};
-  for (std::size_t i = 0; i < children.size(); ++i) {
-    const auto& child = (*stored)[i];
-    if (!child) {
-      continue;
-    }
-    auto tile = DecodeTile(child->blob, profile_);
-    if (!tile) {
-      return Error(tile.error().WithContext(StrCat("tile ", child->id)));
-    }
-    tiles[i] = std::move(*tile);
-    children[i] = &tiles[i];
+  if (!*stored) {
+    return std::shared_ptr<const Tile>();
   }
-  return BuiltTile{state->revision, ToContent(BuildParentTile(id, children, profile_), profile_)};
+  auto tile = DecodeTile((*stored)->blob, profile_);
+  if (!tile) {
+    return Error(tile.error().WithContext(StrCat("tile ", child.id)));
+  }
+  return std::make_shared<const Tile>(*std::move(tile));
 }
 
 }  // namespace atlas

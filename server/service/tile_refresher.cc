@@ -14,8 +14,9 @@ TileRefresher::TileRefresher(AtlasStore& store, const TileRefresherOptions& opti
       sigmas_(profile_, Keyframe::kMaxRadiusCells),
       group_bytes_(options.group_bytes),
       keyframes_(options.keyframe_bytes),
+      tiles_(options.tile_bytes),
       surveys_(options.surveys),
-      builder_(store, keyframes_, options.group_bytes) {}
+      builder_(store, keyframes_, tiles_, options.group_bytes) {}
 
 void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) {
   std::vector<Job> jobs;
@@ -71,7 +72,11 @@ void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
       on_built(id, Error(std::move(job.status)));
       continue;
     }
-    auto content = ToContent(job.surveys.Combine(context()), profile_);
+    const Tile& tile = job.surveys.Combine(context());
+    auto content = ToContent(tile, profile_);
+    if (content) {
+      tiles_.Insert(content->payload_hash, std::make_shared<const Tile>(tile));
+    }
     surveys_.Put(std::move(job.surveys));
     on_built(id, BuiltTile{job.revision, std::move(content)});
   }

@@ -10,7 +10,7 @@
 #include "core/base/status.h"
 #include "core/fusion/sigma_table.h"
 #include "core/fusion/tile_surveys.h"
-#include "server/service/keyframe_cache.h"
+#include "server/service/stored_keyframes.h"
 #include "server/service/survey_cache.h"
 #include "server/service/tile_builder.h"
 #include "server/store/atlas_store.h"
@@ -19,6 +19,7 @@ namespace atlas {
 
 struct TileRefresherOptions {
   std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded keyframes, all workers together
+  std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
   SurveyCacheLimits surveys;                            // kept from one time to the next
   std::size_t group_bytes = std::size_t{128} << 20;     // surveys of the tiles at hand, a worker
 };
@@ -52,6 +53,7 @@ class TileRefresher {
   const SigmaTable sigmas_;
   const std::size_t group_bytes_;
   KeyframeCache keyframes_;
+  TileCache tiles_;
   SurveyCache surveys_;
   TileBuilder builder_;  // for what is not done here
 };

@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "server/service/atlas_digest.h"
-#include "server/service/keyframe_cache.h"
+#include "server/service/stored_keyframes.h"
 #include "server/service/region_query.h"
 #include "server/store/atlas_store.h"
 
