@@ -2,7 +2,8 @@
 # Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize] [--long]
 #   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, and TSan over
 #               the tests labelled threads
-#   --long      ten times as many random worlds in the tests that make them, and clang-tidy over all sources
+#   --long      ten times as many random worlds in the tests that make them, the same payloads from
+#               g++ and clang++, and clang-tidy over all sources
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
@@ -51,6 +52,7 @@ if ((sanitize)); then
   run tsan -L threads
 fi
 if ((long)); then
+  deploy/compilers.sh
   echo "== clang-tidy"
   deploy/tidy.sh
 fi
