@@ -28,8 +28,8 @@ constexpr auto kNibbleOf = [] {
 }  // namespace
 
 std::uint8_t NibbleFromEvidence(int evidence) {
-  return kNibbleOf[static_cast<std::size_t>(
-      std::clamp(evidence, -kEvidenceLimit, kEvidenceLimit) + kEvidenceLimit)];
+  return kNibbleOf[static_cast<std::size_t>(std::clamp(evidence, -kEvidenceLimit, kEvidenceLimit) +
+                                            kEvidenceLimit)];
 }
 
 double EvidenceProbability(int evidence) {

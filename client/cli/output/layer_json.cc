@@ -27,7 +27,9 @@ boost::json::object LayerJson(const TileLayer& layer, const MapProfile& profile)
           {"sigma_m", layer.sigma_100um / 1e4},
           {"occupancy", Rounded(EvidenceProbability(layer.occupancy), 4)},
           {"traversable", layer.is_traversable()},
+          {"measured", (layer.flags & TileLayer::kMeasured) != 0},
           {"observations", layer.observations},
+          {"confirmed", layer.confirmed_s},
           {"column", ColumnJson(layer, profile)}};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <ctime>
 #include <iomanip>
 #include <sstream>
 
@@ -80,6 +81,15 @@ std::string BytesText(std::uint64_t bytes) {
     ++unit;
   }
   return FixedText(value, unit == 0 || value >= 100.0 ? 0 : 1) + " " + kUnits[unit];
+}
+
+std::string UtcText(std::uint32_t seconds) {
+  const std::time_t time = seconds;
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  std::ostringstream text;
+  text << std::put_time(&utc, "%Y-%m-%d %H:%M:%S");
+  return text.str();
 }
 
 }  // namespace atlas

@@ -35,5 +35,7 @@ class FactList {
 std::string FixedText(double value, int decimals);
 // "12.4 MB": powers of 1000.
 std::string BytesText(std::uint64_t bytes);
+// "2026-03-01 12:30:05", UTC, of seconds since 1970.
+std::string UtcText(std::uint32_t seconds);
 
 }  // namespace atlas

@@ -9,8 +9,8 @@
 #include <mutex>
 
 #include "server/service/atlas_digest.h"
-#include "server/service/stored_keyframes.h"
 #include "server/service/region_query.h"
+#include "server/service/stored_keyframes.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -18,7 +18,7 @@ from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 KEYS = {
     "ingest": "keyframes acked duplicates metres bytes_sent frontend_ms_per_scan sensor_height_m sessions wall_s",
     "wait": "revision dirty_tiles",
-    "status": "revision keyframes sessions tiles dirty_tiles damaged_tiles store_bytes tile_bytes keyframe_bytes "
+    "status": "revision preset keyframes sessions tiles dirty_tiles damaged_tiles store_bytes tile_bytes keyframe_bytes "
               "cells multilayer_cells rss_bytes",
     "point": "layers",
     "query": "type tiles bytes revision truncated",
@@ -34,7 +34,7 @@ KEYS = {
     "render": "width height metres_per_pixel",
     "simulate": "scans metres",
 }
-LAYER = "z_m sigma_m occupancy traversable observations column"
+LAYER = "z_m sigma_m occupancy traversable measured observations confirmed column"
 COLUMN = "base_m segment_m probabilities"
 TILE = "type level x y revision bytes"
 SCAN = "type scan pose health error_m error_deg"

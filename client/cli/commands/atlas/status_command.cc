@@ -5,8 +5,9 @@
 namespace atlas {
 namespace {
 
-boost::json::object StatusJson(const AtlasStatus& status) {
+boost::json::object StatusJson(const AtlasStatus& status, const MapProfile& profile) {
   return {{"revision", status.revision},
+          {"preset", FusionPresetName(profile.preset)},
           {"keyframes", status.keyframes},
           {"sessions", status.sessions},
           {"tiles", status.tiles},
@@ -20,8 +21,9 @@ boost::json::object StatusJson(const AtlasStatus& status) {
           {"rss_bytes", status.rss_bytes}};
 }
 
-void PrintStatus(const AtlasStatus& status, std::ostream& out) {
+void PrintStatus(const AtlasStatus& status, const MapProfile& profile, std::ostream& out) {
   FactList facts;
+  facts.Add("preset", std::string(FusionPresetName(profile.preset)));
   facts.Add("revision", std::to_string(status.revision));
   facts.Add("sessions", std::to_string(status.sessions));
   facts.Add("keyframes",
@@ -50,9 +52,9 @@ class StatusCommand : public Command {
     const Result<AtlasStatus> status = client->ReadStatus();
     if (!status) return status.error();
     if (context.is_json) {
-      context.PrintJson(StatusJson(*status));
+      context.PrintJson(StatusJson(*status, client->profile()));
     } else {
-      PrintStatus(*status, context.out);
+      PrintStatus(*status, client->profile(), context.out);
     }
     return {};
   }

@@ -28,14 +28,14 @@ void PrintLayers(const std::vector<TileLayer>& layers,
     return;
   }
   TextTable table({">layer", ">z m", ">sigma m", ">occupancy", "traversable", ">observations",
-                   "column (lowest first)"});
+                   "last seen", "column (lowest first)"});
   for (std::size_t i = 0; i < layers.size(); ++i) {
     const TileLayer& layer = layers[i];
     table.Row({std::to_string(i), FixedText(layer.altitude_mm / 1e3, 3),
                FixedText(layer.sigma_100um / 1e4, 3),
                FixedText(EvidenceProbability(layer.occupancy), 2),
                layer.is_traversable() ? "yes" : "no", std::to_string(layer.observations),
-               ColumnText(layer, profile)});
+               UtcText(layer.confirmed_s), ColumnText(layer, profile)});
   }
   table.Print(out);
 }

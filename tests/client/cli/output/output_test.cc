@@ -37,6 +37,7 @@ TEST(LayerJsonTest, HasTheContractsKeysAndUnits) {
   layer.occupancy = 64;
   layer.flags = TileLayer::kTraversable;
   layer.observations = 17;
+  layer.confirmed_s = 1'700'000'000;
   layer.column = 0x0F80;  // lowest first: no data, 8, 15, no data
   MapProfile profile;
   profile.column_segments = 4;
@@ -45,7 +46,10 @@ TEST(LayerJsonTest, HasTheContractsKeysAndUnits) {
   EXPECT_EQ(parsed.at("sigma_m").to_number<double>(), 0.0315);
   EXPECT_EQ(parsed.at("occupancy").to_number<double>(), 0.9);
   EXPECT_TRUE(parsed.at("traversable").as_bool());
+  EXPECT_FALSE(parsed.at("measured").as_bool());
   EXPECT_EQ(parsed.at("observations").to_number<int>(), 17);
+  EXPECT_EQ(parsed.at("confirmed").to_number<std::int64_t>(), 1'700'000'000);
+  EXPECT_EQ(UtcText(layer.confirmed_s), "2023-11-14 22:13:20");
   const auto& column = parsed.at("column");
   EXPECT_EQ(column.at("base_m").to_number<double>(), 5.0);  // 5.49 + 0.3 lies in [5, 6)
   EXPECT_EQ(column.at("segment_m").to_number<double>(), 1.0);
