@@ -9,7 +9,7 @@ namespace atlas {
 // As std::stable_sort.
 template <typename Iterator, typename Less>
 void SmallStableSort(Iterator begin, Iterator end, const Less& is_less) {
-  constexpr auto kSmall = 32;
+  constexpr auto kSmall = 64;
   if (end - begin > kSmall) {
     std::stable_sort(begin, end, is_less);
     return;

@@ -2,86 +2,72 @@
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 
 #include "core/base/integer_math.h"
+#include "core/base/small_sort.h"
 
 namespace atlas {
-namespace {
 
-struct Candidate {
-  std::int64_t band = 0;
-  std::uint32_t index = 0;
-};
+void BoundedChoice::KeepLatest(std::vector<SegmentView>& segments) {
+  const std::uint32_t limit =
+      std::min<std::uint32_t>(profile_.band_segments, profile_.band_vehicle_segments);
+  if (segments.size() <= limit) {
+    return;
+  }
+  candidates_.clear();
+  for (std::uint32_t i = 0; i < segments.size(); ++i) {
+    candidates_.push_back({FloorDiv(segments[i].segment->altitude_mm, profile_.band_mm), i});
+  }
+  if (!MayExceed(limit)) {
+    return;
+  }
+  SmallStableSort(candidates_.begin(), candidates_.end(),
+                  [&](const Candidate& a, const Candidate& b) {
+                    return a.band != b.band ? a.band < b.band
+                                            : WasSeenEarlier(segments[b.index], segments[a.index]);
+                  });
+  counts_.assign(segments.size(), false);
+  for (std::size_t begin = 0; begin < candidates_.size();) {
+    std::size_t end = begin;
+    while (end < candidates_.size() && candidates_[end].band == candidates_[begin].band) {
+      ++end;
+    }
+    ChooseOfBand(std::span(candidates_).subspan(begin, end - begin), segments);
+    begin = end;
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (counts_[i]) {
+      segments[kept++] = segments[i];
+    }
+  }
+  segments.resize(kept);
+}
 
 // Whether some band may hold more than `limit`: counted by its last bits, so that others may be
 // taken for it.
-bool MayExceed(const std::vector<Candidate>& candidates, std::uint32_t limit) {
+bool BoundedChoice::MayExceed(std::uint32_t limit) const {
   std::array<std::uint32_t, 64> counts{};
-  return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+  return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
     return ++counts[static_cast<std::size_t>(c.band) % counts.size()] > limit;
   });
 }
 
-// Those of one band, latest first: keeps those that count, and returns how many.
-std::size_t KeepOfBand(std::span<Candidate> band,
-                       const std::vector<SegmentView>& segments,
-                       const MapProfile& profile) {
-  std::size_t kept = 0;
+// `band` latest first; those that count come to stand at its front.
+void BoundedChoice::ChooseOfBand(std::span<Candidate> band,
+                                 const std::vector<SegmentView>& segments) {
+  std::size_t chosen = 0;
   for (const Candidate& candidate : band) {
-    const auto of_vehicle = static_cast<std::uint32_t>(
-        std::count_if(band.begin(), band.begin() + static_cast<std::ptrdiff_t>(kept),
-                      [&](const Candidate& other) {
-                        return segments[other.index].vehicle == segments[candidate.index].vehicle;
-                      }));
-    if (kept < profile.band_segments && of_vehicle < profile.band_vehicle_segments) {
-      band[kept++] = candidate;
+    const std::uint32_t vehicle = segments[candidate.index].vehicle;
+    std::uint32_t of_vehicle = 0;
+    for (const Candidate& other : band.first(chosen)) {
+      of_vehicle += segments[other.index].vehicle == vehicle ? 1u : 0u;
+    }
+    if (chosen < profile_.band_segments && of_vehicle < profile_.band_vehicle_segments) {
+      counts_[candidate.index] = true;
+      band[chosen++] = candidate;
     }
   }
-  return kept;
-}
-
-}  // namespace
-
-void KeepLatestSegments(const MapProfile& profile, std::vector<SegmentView>& segments) {
-  const std::uint32_t limit =
-      std::min<std::uint32_t>(profile.band_segments, profile.band_vehicle_segments);
-  if (segments.size() <= limit) {
-    return;
-  }
-  std::vector<Candidate> candidates;
-  candidates.reserve(segments.size());
-  for (std::uint32_t i = 0; i < segments.size(); ++i) {
-    candidates.push_back({FloorDiv(segments[i].segment->altitude_mm, profile.band_mm), i});
-  }
-  if (!MayExceed(candidates, limit)) {
-    return;
-  }
-  std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
-    return a.band != b.band ? a.band < b.band
-                            : WasSeenEarlier(segments[b.index], segments[a.index]);
-  });
-  std::vector<bool> counts(segments.size(), false);
-  for (std::size_t begin = 0; begin < candidates.size();) {
-    std::size_t end = begin;
-    while (end < candidates.size() && candidates[end].band == candidates[begin].band) {
-      ++end;
-    }
-    const auto band = std::span(candidates).subspan(begin, end - begin);
-    for (const Candidate& c : band.first(KeepOfBand(band, segments, profile))) {
-      counts[c.index] = true;
-    }
-    begin = end;
-  }
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (counts[i]) {
-      segments[next++] = segments[i];
-    }
-  }
-  segments.resize(next);
 }
 
 }  // namespace atlas

@@ -2,6 +2,9 @@
 // so that what a cell costs does not grow with the passes.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/fusion/segment_view.h"
@@ -9,8 +12,28 @@
 
 namespace atlas {
 
-// Removes what does not count: latest first, a segment counts while its band holds fewer than
-// `band_segments`, and fewer than `band_vehicle_segments` of its vehicle. The order is kept.
-void KeepLatestSegments(const MapProfile& profile, std::vector<SegmentView>& segments);
+// Reused from cell to cell.
+class BoundedChoice {
+ public:
+  // `profile` must outlive the choice.
+  explicit BoundedChoice(const MapProfile& profile) : profile_(profile) {}
+
+  // Removes what does not count: latest first, a segment counts while its band holds fewer than
+  // `band_segments`, and fewer than `band_vehicle_segments` of its vehicle. The order is kept.
+  void KeepLatest(std::vector<SegmentView>& segments);
+
+ private:
+  struct Candidate {
+    std::int64_t band = 0;
+    std::uint32_t index = 0;
+  };
+
+  bool MayExceed(std::uint32_t limit) const;
+  void ChooseOfBand(std::span<Candidate> band, const std::vector<SegmentView>& segments);
+
+  const MapProfile& profile_;
+  std::vector<Candidate> candidates_;
+  std::vector<bool> counts_;  // by segment
+};
 
 }  // namespace atlas

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/fusion/bounded_choice.h"
 #include "core/fusion/cell_layers.h"
 #include "core/fusion/evidence_folder.h"
 #include "core/fusion/segment_view.h"
@@ -17,7 +18,7 @@ class CellCombiner {
  public:
   // Both must outlive the combiner.
   CellCombiner(const SigmaTable& sigmas, const MapProfile& profile)
-      : profile_(profile), layer_builder_(sigmas, profile), folder_(profile) {}
+      : profile_(profile), choice_(profile), layer_builder_(sigmas, profile), folder_(profile) {}
 
   // Appends the layers of a cell to `out`. Segments in canonical order; those that do not count are
   // removed (preset bounded).
@@ -27,6 +28,7 @@ class CellCombiner {
 
  private:
   const MapProfile& profile_;
+  BoundedChoice choice_;
   CellLayerBuilder layer_builder_;
   EvidenceFolder folder_;
 };

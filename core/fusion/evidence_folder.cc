@@ -5,8 +5,7 @@
 #include <numeric>
 
 #include "core/base/integer_math.h"
-#include "core/fusion/column_evidence.h"
-#include "core/tile/column_lattice.h"
+#include "core/base/small_sort.h"
 
 namespace atlas {
 namespace {
@@ -30,56 +29,55 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
                           std::span<const std::uint32_t> labels,
                           std::span<const CellLayer> layers,
                           std::vector<TileLayer>& out) {
+  Begin(layers);
   SortByTime(segments);
-  for (std::uint32_t layer = 0; layer < layers.size(); ++layer) {
-    out.push_back(FoldLayer(segments, labels, layers, layer));
+  const FoldClamp clamp{static_cast<std::int8_t>(profile_.stretch_clamp),
+                        static_cast<std::int8_t>(profile_.carry_clamp),
+                        static_cast<std::int8_t>(profile_.evidence_clamp)};
+  for (const std::uint32_t i : order_) {
+    if (labels[i] == kNoLayer) {
+      continue;
+    }
+    const Segment& segment = *segments[i].segment;
+    Sum& sum = sums_[labels[i]];
+    sum.occupancy = FoldEvidence(sum.occupancy, segment.occupancy, clamp);
+    if (segment.column_seen != 0) {
+      sum.column.Fold(segment.column, segment.column_seen,
+                      std::int64_t{sum.span.base} - segment.column_base, clamp);
+    }
+  }
+  for (std::size_t layer = 0; layer < layers.size(); ++layer) {
+    out.push_back(Finish(layers[layer], sums_[layer]));
+  }
+}
+
+void EvidenceFolder::Begin(std::span<const CellLayer> layers) {
+  sums_.clear();
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const std::int32_t* above = i + 1 < layers.size() ? &layers[i + 1].altitude_mm : nullptr;
+    sums_.push_back({ColumnSpanOf(layers[i].altitude_mm, above, profile_), 0, {}});
   }
 }
 
 void EvidenceFolder::SortByTime(std::span<const SegmentView> segments) {
   order_.resize(segments.size());
   std::iota(order_.begin(), order_.end(), 0u);
-  const auto is_earlier = [&](std::uint32_t a, std::uint32_t b) {
+  SmallStableSort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return WasSeenEarlier(segments[a], segments[b]);
-  };
-  if (!std::is_sorted(order_.begin(), order_.end(), is_earlier)) {
-    std::sort(order_.begin(), order_.end(), is_earlier);
-  }
+  });
 }
 
-TileLayer EvidenceFolder::FoldLayer(std::span<const SegmentView> segments,
-                                    std::span<const std::uint32_t> labels,
-                                    std::span<const CellLayer> layers,
-                                    std::uint32_t layer) const {
-  const CellLayer& surface = layers[layer];
-  const std::int32_t* above = layer + 1 < layers.size() ? &layers[layer + 1].altitude_mm : nullptr;
-  const ColumnSpan span = ColumnSpanOf(surface.altitude_mm, above, profile_);
-  const FoldClamp clamp{static_cast<std::int8_t>(profile_.stretch_clamp),
-                        static_cast<std::int8_t>(profile_.carry_clamp),
-                        static_cast<std::int8_t>(profile_.evidence_clamp)};
-  int occupancy = 0;
-  ColumnSum sum;
-  for (const std::uint32_t i : order_) {
-    if (labels[i] != layer) {
-      continue;
-    }
-    occupancy = FoldEvidence(occupancy, segments[i].segment->occupancy, clamp);
-    const Segment& segment = *segments[i].segment;
-    if (segment.column_seen != 0) {
-      sum.Fold(segment.column, segment.column_seen, std::int64_t{span.base} - segment.column_base,
-               clamp);
-    }
-  }
+TileLayer EvidenceFolder::Finish(const CellLayer& surface, const Sum& sum) {
   constexpr std::uint32_t kMaxObservations = std::numeric_limits<std::uint16_t>::max();
   TileLayer result;
   result.altitude_mm = surface.altitude_mm;
   result.sigma_100um = surface.sigma_100um;
-  result.occupancy = static_cast<std::int8_t>(occupancy);
-  result.flags = FlagsOf(surface, occupancy);
+  result.occupancy = static_cast<std::int8_t>(sum.occupancy);
+  result.flags = FlagsOf(surface, sum.occupancy);
   result.observations =
       static_cast<std::uint16_t>(std::min(surface.observations, kMaxObservations));
   result.confirmed_s = SecondsOf(surface.last_time_ms);
-  result.column = sum.Nibbles(span.mask);
+  result.column = sum.column.Nibbles(sum.span.mask);
   return result;
 }
 

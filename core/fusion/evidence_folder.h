@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "core/fusion/cell_layers.h"
+#include "core/fusion/column_evidence.h"
 #include "core/fusion/segment_view.h"
+#include "core/tile/column_lattice.h"
 #include "core/tile/tile.h"
 
 namespace atlas {
@@ -27,13 +29,19 @@ class EvidenceFolder {
             std::vector<TileLayer>& out);
 
  private:
+  // Of one layer, so far.
+  struct Sum {
+    ColumnSpan span;
+    int occupancy = 0;
+    ColumnSum column;
+  };
+
+  void Begin(std::span<const CellLayer> layers);
   void SortByTime(std::span<const SegmentView> segments);
-  TileLayer FoldLayer(std::span<const SegmentView> segments,
-                      std::span<const std::uint32_t> labels,
-                      std::span<const CellLayer> layers,
-                      std::uint32_t layer) const;
+  static TileLayer Finish(const CellLayer& surface, const Sum& sum);
 
   const MapProfile& profile_;
+  std::vector<Sum> sums_;
   std::vector<std::uint32_t> order_;
 };
 

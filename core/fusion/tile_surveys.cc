@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/base/small_sort.h"
-#include "core/fusion/bounded_choice.h"
 
 namespace atlas {
 namespace {
@@ -191,6 +190,7 @@ void TileSurveys::Settle(const MapProfile& profile) {
   if (settling.empty()) {
     return;
   }
+  BoundedChoice choice(profile);
   SettledSegments merged;
   for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
     segments_.clear();
@@ -200,7 +200,7 @@ void TileSurveys::Settle(const MapProfile& profile) {
     }
     SortByStretch(segments_);
     if (profile.preset == FusionPreset::kBounded) {
-      Forget(profile);
+      Forget(choice);
     }
     for (const SegmentView& view : segments_) {
       merged.Append(*view.segment, view.stretch);
@@ -214,9 +214,9 @@ void TileSurveys::Settle(const MapProfile& profile) {
 }
 
 // Leaves those of segments_ that count while they all are there.
-void TileSurveys::Forget(const MapProfile& profile) {
+void TileSurveys::Forget(BoundedChoice& choice) {
   const std::vector<SegmentView> all = segments_;
-  KeepLatestSegments(profile, segments_);
+  choice.KeepLatest(segments_);
   if (segments_.size() == all.size()) {
     return;
   }

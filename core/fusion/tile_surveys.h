@@ -15,6 +15,7 @@
 #include <span>
 #include <vector>
 
+#include "core/fusion/bounded_choice.h"
 #include "core/fusion/cell_combiner.h"
 #include "core/fusion/cell_set.h"
 #include "core/fusion/fusion_context.h"
@@ -91,7 +92,7 @@ class TileSurveys {
                        const MapProfile& profile) const;
   bool IsToSettle(std::size_t i, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
-  void Forget(const MapProfile& profile);
+  void Forget(BoundedChoice& choice);
   void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);
   // Append a cell's segments to segments_.
   void CollectSettled(std::size_t cell);
