@@ -84,16 +84,22 @@ asio::awaitable<Status> RequestHandler::Refuse(const Envelope& request) {
                                                     static_cast<int>(request.body_case()), ")"));
 }
 
+// Hands a write to the service on the pool; its answer, once it is on disk or refused.
+template <typename Request, typename T>
+asio::awaitable<Result<T>> RequestHandler::Write(Request request, Writing<Request, T> write) {
+  const auto owned = std::make_shared<Request>(std::move(request));
+  Starting<T> start = [this, owned, write](auto done) {
+    (service_.*write)(std::move(*owned), std::move(done));
+  };
+  co_return co_await StartOnPool(pool_, std::move(start));
+}
+
 asio::awaitable<Status> RequestHandler::Upload(const Envelope& request, ReplyWriter& out) {
   Result<UploadRequest> upload = UploadFromWire(request.upload_keyframe());
   if (!upload) {
     co_return upload.error();
   }
-  const auto owned = std::make_shared<UploadRequest>(std::move(*upload));
-  Starting<PutKeyframeResult> start = [this, owned](auto done) {
-    service_.Upload(std::move(*owned), std::move(done));
-  };
-  const Result<PutKeyframeResult> result = co_await StartOnPool(pool_, std::move(start));
+  const auto result = co_await Write(*std::move(upload), &AtlasService::Upload);
   if (!result) {
     co_return result.error();
   }
@@ -108,11 +114,7 @@ asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, Rep
   if (!update) {
     co_return update.error();
   }
-  const auto owned = std::make_shared<PoseBatchRequest>(std::move(*update));
-  Starting<PoseBatchResult> start = [this, owned](auto done) {
-    service_.UpdatePoses(std::move(*owned), std::move(done));
-  };
-  const Result<PoseBatchResult> result = co_await StartOnPool(pool_, std::move(start));
+  const auto result = co_await Write(*std::move(update), &AtlasService::UpdatePoses);
   if (!result) {
     co_return result.error();
   }
@@ -127,11 +129,7 @@ asio::awaitable<Status> RequestHandler::ChangeSession(const Envelope& request, R
   if (!change) {
     co_return change.error();
   }
-  const auto owned = std::make_shared<SessionChange>(std::move(*change));
-  Starting<SessionChangeResult> start = [this, owned](auto done) {
-    service_.ChangeSession(std::move(*owned), std::move(done));
-  };
-  const Result<SessionChangeResult> result = co_await StartOnPool(pool_, std::move(start));
+  const auto result = co_await Write(*std::move(change), &AtlasService::ChangeSession);
   if (!result) {
     co_return result.error();
   }

@@ -33,9 +33,13 @@ class RequestHandler {
 
  private:
   using Envelope = wire::Envelope;
+  template <typename Request, typename T>
+  using Writing = void (AtlasService::*)(Request, AtlasStore::Done<T>);
 
   boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
+  template <typename Request, typename T>
+  boost::asio::awaitable<Result<T>> Write(Request request, Writing<Request, T> write);
   boost::asio::awaitable<Status> Upload(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> UpdatePoses(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ChangeSession(const Envelope& request, ReplyWriter& out);

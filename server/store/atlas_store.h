@@ -75,8 +75,6 @@ class AtlasStore {
 
   // nullopt: there is no such tile.
   virtual Result<std::optional<StoredTile>> ReadTile(const TileId& id) = 0;
-  // Tiles in one snapshot, in the order of `ids`.
-  virtual Result<std::vector<std::optional<StoredTile>>> ReadTiles(std::span<const TileId> ids) = 0;
   // Calls `visit` for every tile in the rectangle, in key order, without reading blobs.
   virtual Status ScanTiles(const TileRect& rect,
                            const std::function<void(const TileSummary&)>& visit) = 0;

@@ -109,7 +109,6 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<std::optional<StoredTile>>(
         [&id](Connection& connection) { return ReadTileRow(connection, id); });
   }
-  Result<std::vector<std::optional<StoredTile>>> ReadTiles(std::span<const TileId> ids) override;
   Status ScanTiles(const TileRect& rect,
                    const std::function<void(const TileSummary&)>& visit) override;
   Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key, std::uint32_t limit) override {
@@ -224,21 +223,6 @@ Result<std::vector<std::int64_t>> SqliteStore::ListKeyframeIds(std::int64_t afte
       ids.push_back(row.Int());
     }
     return ids;
-  });
-}
-
-Result<std::vector<std::optional<StoredTile>>> SqliteStore::ReadTiles(std::span<const TileId> ids) {
-  using Tiles = std::vector<std::optional<StoredTile>>;
-  return readers_.Run<Tiles>([ids](Connection& connection) -> Result<Tiles> {
-    Tiles tiles;
-    for (const TileId& id : ids) {
-      auto tile = ReadTileRow(connection, id);
-      if (!tile) {
-        return Error(tile.error());
-      }
-      tiles.push_back(std::move(*tile));
-    }
-    return tiles;
   });
 }
 

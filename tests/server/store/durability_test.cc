@@ -5,7 +5,6 @@
 #include <fstream>
 #include <future>
 
-#include <sqlite3.h>
 #include <sys/mount.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -19,15 +18,6 @@ const TileId kA{0, 0, 0};
 
 class DurabilityTest : public StoreTest {
  protected:
-  // Runs SQL on the closed database.
-  void Tamper(const std::string& sql) {
-    store_.reset();
-    sqlite3* db = nullptr;
-    ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-    sqlite3_close(db);
-  }
   void OpenWithOneTile() {
     Open();
     ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());

@@ -1,8 +1,6 @@
 // What was: sessions taken out and put back, and tiles' sources as of an earlier revision.
 #include <set>
 
-#include <sqlite3.h>
-
 #include "tests/server/store/store_fixture.h"
 
 namespace atlas {
@@ -46,13 +44,8 @@ class HistoryTest : public StoreTest {
     EXPECT_EQ(sources->revision, revision);
     return xs;
   }
-  void Tamper(const std::string& sql) {
-    store_.reset();
-    sqlite3* db = nullptr;
-    ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-    sqlite3_close(db);
+  void TamperAndOpen(const std::string& sql) {
+    Tamper(sql);
     Open();
   }
   std::vector<TileId> Footprints(std::uint8_t level) {
@@ -162,7 +155,7 @@ TEST_F(HistoryTest, RevisionsToComeAndForgottenOnesAreRefused) {
   EXPECT_EQ(store_->CheckRevision(2).code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(store_->CheckRevision(UINT64_MAX).code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(store_->GatherTileAt(kA, 2).error().code(), StatusCode::kInvalidArgument);
-  Tamper("UPDATE counters SET value = 1 WHERE name = 'history_horizon'");
+  TamperAndOpen("UPDATE counters SET value = 1 WHERE name = 'history_horizon'");
   EXPECT_TRUE(store_->CheckRevision(1).ok());
   const Status forgotten = store_->CheckRevision(0);
   EXPECT_EQ(forgotten.code(), StatusCode::kNotFound);
@@ -198,16 +191,16 @@ TEST_F(HistoryTest, DamagedHistoryIsToldAndOnlyWhereItCounts) {
   ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
   ASSERT_TRUE(Update({Moved(1, 5, {kA})}).has_value());
   EXPECT_TRUE(store_->ReadKeyframe(1).has_value());
-  Tamper("UPDATE pose_history SET x_um = 1 WHERE revision = 1");
+  TamperAndOpen("UPDATE pose_history SET x_um = 1 WHERE revision = 1");
   EXPECT_EQ(store_->GatherTileAt(kA, 1).error().code(), StatusCode::kInvalidData);
   EXPECT_EQ(XsAt(kA, 2), Xs{5});
   EXPECT_EQ(store_->ReadKeyframe(1).error().code(), StatusCode::kInvalidData);
   EXPECT_TRUE(store_->GatherTile(kA).has_value());
   EXPECT_TRUE(store_->CheckSession({"bus", "day"}).ok());
-  Tamper("UPDATE session_states SET state = 3");
+  TamperAndOpen("UPDATE session_states SET state = 3");
   EXPECT_EQ(store_->GatherTileAt(kA, 2).error().code(), StatusCode::kInvalidData);
   EXPECT_EQ(store_->CheckSession({"bus", "day"}).code(), StatusCode::kInvalidData);
-  Tamper("DELETE FROM session_states; DELETE FROM pose_history WHERE revision = 2");
+  TamperAndOpen("DELETE FROM session_states; DELETE FROM pose_history WHERE revision = 2");
   EXPECT_EQ(store_->CheckSession({"bus", "day"}).code(), StatusCode::kInvalidData);
   EXPECT_EQ(store_->ReadKeyframe(1).error().code(), StatusCode::kInvalidData);
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include "server/store/atlas_store.h"
 #include "server/store/await.h"
@@ -88,6 +89,15 @@ class StoreTest : public testing::Test {
   }
   DirtyState Dirty() { return store_->ReadDirtyState().value(); }
   std::filesystem::path Database() const { return options_.directory / "atlas.db"; }
+  // Closes the store and runs SQL on its database.
+  void Tamper(const std::string& sql) {
+    store_.reset();
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(db);
+  }
 
   std::filesystem::path directory_;
   SqliteStoreOptions options_;
