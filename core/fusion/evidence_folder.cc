@@ -1,6 +1,7 @@
 #include "core/fusion/evidence_folder.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -40,7 +41,9 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
     }
     const Segment& segment = *segments[i].segment;
     Sum& sum = sums_[labels[i]];
-    sum.occupancy = FoldEvidence(sum.occupancy, segment.occupancy, clamp);
+    if (SpeaksOfOccupancy(segment, layers[labels[i]])) {
+      sum.occupancy = FoldEvidence(sum.occupancy, segment.occupancy, clamp);
+    }
     if (segment.column_seen != 0) {
       sum.column.Fold(segment.column, segment.column_seen,
                       std::int64_t{sum.span.base} - segment.column_base, clamp);
@@ -65,6 +68,11 @@ void EvidenceFolder::SortByTime(std::span<const SegmentView> segments) {
   SmallStableSort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return WasSeenEarlier(segments[a], segments[b]);
   });
+}
+
+bool EvidenceFolder::SpeaksOfOccupancy(const Segment& segment, const CellLayer& layer) const {
+  return segment.is_strong || !layer.is_measured || profile_.preset == FusionPreset::kPaper ||
+         std::abs(std::int64_t{segment.altitude_mm} - layer.altitude_mm) <= profile_.same_layer_mm;
 }
 
 TileLayer EvidenceFolder::Finish(const CellLayer& surface, const Sum& sum) {

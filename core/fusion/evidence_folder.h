@@ -38,6 +38,9 @@ class EvidenceFolder {
 
   void Begin(std::span<const CellLayer> layers);
   void SortByTime(std::span<const SegmentView> segments);
+  // Whether what the segment says of occupancy is about this layer: it measured it, or guessed it
+  // right.
+  bool SpeaksOfOccupancy(const Segment& segment, const CellLayer& layer) const;
   static TileLayer Finish(const CellLayer& surface, const Sum& sum);
 
   const MapProfile& profile_;

@@ -82,8 +82,8 @@ void StretchSurvey::Add(const FrameOnMap& frame,
 
 // An observation belongs to the segment that was seen last of those as close as one layer always
 // may be, else to the nearest in altitude (the paper's eq. 2), if the two would be one layer. What
-// was guessed says nothing of the altitude where ground was measured, but lends its occupancy and
-// column to the ground.
+// was guessed says nothing of the altitude where ground was measured, but lends it its column, and
+// its occupancy if the guess was right: what stands in the way 1 m higher does not here.
 void StretchSurvey::Join(std::size_t cell,
                          const Observation& observation,
                          const SigmaTable& sigmas) {
@@ -92,7 +92,9 @@ void StretchSurvey::Join(std::size_t cell,
     const Match ground = Find(cell, observation.altitude_mm, true);
     if (ground.distance_mm < profile_.other_layer_mm) {
       MoveToFront(cell, ground);
-      AddEvidence(observation, 0, frame, ground.segment);
+      const bool is_right = ground.distance_mm <= profile_.same_layer_mm;
+      AddEvidence(observation, is_right ? observation.occupancy : Occupancy::kUnknown, 0, frame,
+                  ground.segment);
       return;
     }
   }
@@ -180,6 +182,7 @@ std::uint32_t StretchSurvey::AddSegment(std::size_t cell, const Segment& segment
 }
 
 void StretchSurvey::AddEvidence(const Observation& observation,
+                                Occupancy occupancy,
                                 std::int64_t weight,
                                 std::uint32_t frame,
                                 std::uint32_t index) {
@@ -192,8 +195,7 @@ void StretchSurvey::AddEvidence(const Observation& observation,
   segment.last_frame = frame;
   segment.is_strong |= observation.is_strong();
   segment.occupancy = AddSaturating(
-      segment.occupancy, occupancy_units_[static_cast<std::size_t>(observation.occupancy)],
-      clamp_.usual);
+      segment.occupancy, occupancy_units_[static_cast<std::size_t>(occupancy)], clamp_.usual);
   if (observation.column != 0) {
     AddNibbles(observation.column, std::int64_t{observation.column_base} - segment.column_base,
                clamp_, segment.column, segment.column_seen);

@@ -48,7 +48,9 @@ class StretchSurvey {
   void AddEvidence(const Observation& observation,
                    std::int64_t weight,
                    std::uint32_t frame,
-                   std::uint32_t segment);
+                   std::uint32_t segment) {
+    AddEvidence(observation, observation.occupancy, weight, frame, segment);
+  }
 
   const TileBand& band() const { return band_; }
   std::span<const StretchFrame> frames() const { return frames_; }
@@ -79,6 +81,11 @@ class StretchSurvey {
   };
 
   void Join(std::size_t cell, const Observation& observation, const SigmaTable& sigmas);
+  void AddEvidence(const Observation& observation,
+                   Occupancy occupancy,
+                   std::int64_t weight,
+                   std::uint32_t frame,
+                   std::uint32_t segment);
   bool IsOneLayer(const Observation& observation,
                   const Match& match,
                   const SigmaTable& sigmas) const;

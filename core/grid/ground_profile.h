@@ -36,9 +36,6 @@ struct ProfileOptions {
   // this near to the line that the ground followed until the first, and no ray passed this far
   // below the chord. A step within the gap is off the chord by no more than that.
   float max_chord_error_m = 0.25F;
-  // What stands this far behind the last ground of its ray stands on ground that is only guessed:
-  // near a ramp it may be of another deck, and says nothing.
-  float max_guess_m = 4.0F;
 };
 
 // Whether a return lies so much above the ground below it that no vehicle gets up there, and not so

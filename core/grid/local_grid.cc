@@ -75,10 +75,8 @@ void AddReturns(const LeveledScan& scan,
     const bool is_behind = range_m >= profile.end.range_m;  // the nearest that stands is there
     const float ground_m = is_behind ? profile.GroundAt(range_m) : 0.0F;
     if (is_behind && Stands(scan.z[i] - ground_m, options)) {
-      if (range_m <= profile.ground.back().range_m + options.max_guess_m) {
-        cells[cell].occupancy = Occupancy::kObstacle;
-        altitudes.Add(static_cast<std::uint32_t>(cell), ground_m, AltitudeSource::kExtrapolated);
-      }
+      cells[cell].occupancy = Occupancy::kObstacle;
+      altitudes.Add(static_cast<std::uint32_t>(cell), ground_m, AltitudeSource::kExtrapolated);
     } else if (scan.is_ground[i] != 0) {
       altitudes.Add(static_cast<std::uint32_t>(cell), scan.z[i], AltitudeSource::kMeasured);
     }

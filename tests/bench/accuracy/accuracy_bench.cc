@@ -72,6 +72,14 @@ void ListCells(const DriveMap& map,
         return std::abs(layer.altitude_mm * 1e-3 - surface.altitude_m) < 0.1;
       });
       if (surface.is_counted && is_far) list("altitude", cell, surface.altitude_m);
+      const bool is_blocked =
+          std::any_of(layers.begin(), layers.end(), [&](const TileLayer& layer) {
+            return std::abs(layer.altitude_mm * 1e-3 - surface.altitude_m) < 0.3 &&
+                   layer.occupancy > 0;
+          });
+      if (surface.is_counted && surface.is_free && is_blocked) {
+        list("blocked", cell, surface.altitude_m);
+      }
       if (is_wrong)
         list(AreLayersReal(layers, cell_truth) ? "real" : "count", cell, surface.altitude_m);
     }

@@ -1,6 +1,9 @@
-// A short drive through the whole of front end and fusion against the truth: the bench, reduced.
+// Short drives through the whole of front end and fusion against the truth: the bench, reduced. And
+// what a map is for: a way back along the drive that made it.
 #include <gtest/gtest.h>
 
+#include "core/planning/plan_route.h"
+#include "core/planning/tile_source.h"
 #include "tests/bench/accuracy/accuracy_score.h"
 #include "tests/bench/accuracy/bench_drive.h"
 
@@ -30,6 +33,38 @@ TEST(AccuracyTest, BothRoadsOfAnOverpassAreMapped) {
   const AccuracyScore score = Score("overpass", 48, 73);
   EXPECT_GT(score.layers_right.value(), 0.95);
   EXPECT_LT(score.altitude_rmse_m(), 0.05);
+}
+
+class TilesOfDrive : public TileSource {
+ public:
+  explicit TilesOfDrive(const DriveMap& map) : map_(map) {}
+  Result<const Tile*> Get(const TileId& id) override { return map_.Find(id); }
+
+ private:
+  const DriveMap& map_;
+};
+
+TEST(AccuracyTest, AGaragesRampsAreOpen) {
+  const SimulatedDrive drive = MakeBenchDrive("garage", {}).value();
+  const MapProfile profile;
+  const DriveMap map(BuildKeyframes(drive, 0, drive.scans(), profile, 20.0).value(), profile);
+  TilesOfDrive tiles(map);
+  const auto place = [&](std::size_t scan) {
+    return drive.sensor_pose(scan).translation().eval();
+  };
+  PlanRequest request{place(0), place(drive.scans() - 1), {}};
+  const auto up = PlanRoute(tiles, profile, request);
+  ASSERT_TRUE(up.has_value()) << up.error().message();
+  ASSERT_TRUE(up->found);
+  double driven_m = 0.0;
+  for (std::size_t i = 1; i < drive.scans(); ++i) {
+    driven_m += (place(i) - place(i - 1)).norm();
+  }
+  EXPECT_LT(up->length_m, 1.05 * driven_m);
+  request.options.max_slope_deg = 5.0;
+  const auto flat = PlanRoute(tiles, profile, request);
+  ASSERT_TRUE(flat.has_value()) << flat.error().message();
+  EXPECT_FALSE(flat->found);
 }
 
 }  // namespace

@@ -100,18 +100,23 @@ DriveMap::DriveMap(const std::vector<PlacedKeyframe>& keyframes, const MapProfil
   }
 }
 
+const Tile* DriveMap::Find(const TileId& id) const {
+  const auto found = tiles_.find(id.Key());
+  return found == tiles_.end() ? nullptr : &found->second;
+}
+
 std::span<const TileLayer> DriveMap::Layers(const MapCell& cell) const {
   const std::int64_t side = profile_.tile_cells;
   TileId id;
   id.x = static_cast<std::int32_t>(FloorDiv(std::int64_t{cell.x}, side));
   id.y = static_cast<std::int32_t>(FloorDiv(std::int64_t{cell.y}, side));
-  const auto found = tiles_.find(id.Key());
-  if (found == tiles_.end() || found->second.is_empty()) {
+  const Tile* const tile = Find(id);
+  if (tile == nullptr || tile->is_empty()) {
     return {};
   }
   const std::int64_t x = cell.x - id.x * side;
   const std::int64_t y = cell.y - id.y * side;
-  return found->second.Layers(static_cast<std::size_t>(y * side + x));
+  return tile->Layers(static_cast<std::size_t>(y * side + x));
 }
 
 }  // namespace atlas::testing

@@ -27,6 +27,8 @@ class DriveMap {
  public:
   DriveMap(const std::vector<PlacedKeyframe>& keyframes, const MapProfile& profile);
 
+  // Of the finest level; null where nobody was.
+  const Tile* Find(const TileId& id) const;
   std::span<const TileLayer> Layers(const MapCell& cell) const;
   const MapProfile& profile() const { return profile_; }
 

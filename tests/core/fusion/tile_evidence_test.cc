@@ -9,6 +9,7 @@
 namespace atlas {
 namespace {
 
+using testing::Deck;
 using testing::Middle;
 using testing::See;
 
@@ -69,6 +70,27 @@ TEST(TileEvidenceTest, AStretchFoldsInTheOrderOfItsSequence) {
   };
   EXPECT_EQ(occupancy_with_miss_at(9), 64 - 12);
   EXPECT_EQ(occupancy_with_miss_at(0), 64);
+}
+
+TEST(TileEvidenceTest, WhatStandsOnAWrongGuessDoesNotStandHere) {
+  // A ramp's underside, in the way of who would drive on a deck that is not there: the ramp below
+  // was measured, and is passed below it.
+  const auto occupancy = [](double guess_m, const char* session) {
+    const PlacedKeyframe ground = See({.z_m = 2.3}, {"car", "a", 1});
+    const Deck guess{.z_m = guess_m,
+                     .occupancy = Occupancy::kObstacle,
+                     .source = AltitudeSource::kExtrapolated,
+                     .column = 0xFFFF};
+    const auto layers = Middle({ground, See(guess, {"car", session, 2})});
+    EXPECT_EQ(layers.size(), 1u);
+    EXPECT_NE(layers[0].column, 0u);  // what was seen at a height is there, whoever guessed what
+    return layers[0].occupancy;
+  };
+  for (const char* session : {"a", "b"}) {  // of the same stretch, of another
+    EXPECT_EQ(occupancy(2.3 + 0.9, session), -12) << session;
+    EXPECT_EQ(occupancy(2.3 - 0.9, session), -12) << session;
+    EXPECT_GT(occupancy(2.3 + 0.4, session), 0) << session;
+  }
 }
 
 TEST(TileEvidenceTest, ALayerKnowsWhenItWasConfirmed) {

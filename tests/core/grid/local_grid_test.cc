@@ -221,7 +221,7 @@ TEST_F(LocalGridTest, AHitStaysAHitWhereOtherRaysPass) {
 
 TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
   // Any scan: a cell is an obstacle if a ray ends in it at one or something is seen to stand in it
-  // behind, not far from the last ground, else free if a ray passed it, else unknown.
+  // behind, else free if a ray passed it, else unknown.
   std::mt19937 random(81);
   std::uniform_real_distribution<float> coordinate(-21.0F, 21.0F);
   for (int round = 0; round < 5; ++round) {
@@ -255,8 +255,7 @@ TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
       const RayProfile profile = profiles.Ray(rays_.Ray(scan.azimuth_rad[i]));
       const float height_m = scan.z[i] - profile.GroundAt(scan.range_m[i]);
       if (scan.range_m[i] < rays_.radius_m() && scan.range_m[i] >= profile.end.range_m &&
-          scan.range_m[i] <= profile.ground.back().range_m + 4.0F && height_m > 0.25F &&
-          height_m <= 2.5F) {
+          height_m > 0.25F && height_m <= 2.5F) {
         hits.insert(static_cast<std::uint32_t>(Index(scan.x[i], scan.y[i])));
       }
     }

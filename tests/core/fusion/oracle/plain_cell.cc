@@ -72,7 +72,12 @@ void PlainCell::FindSegments(std::span<const PlainObservation> observations) {
     const Nearest ground = FindNearest(observation.altitude_mm, true, stretch_begin);
     if (!observation.is_strong() && ground.segment != nullptr &&
         ground.distance_mm < profile_.other_layer_mm) {
-      AddTo(observation, 0, *ground.segment);  // its occupancy and column, not its altitude
+      PlainObservation lent = observation;  // its column, not its altitude
+      const std::int64_t error_mm =
+          std::abs(ground.segment->representative->altitude_mm - observation.altitude_mm);
+      lent.occupancy =
+          error_mm <= profile_.same_layer_mm ? observation.occupancy : Occupancy::kUnknown;
+      AddTo(lent, 0, *ground.segment);
       continue;
     }
     Segment& segment = SegmentFor(observation, stretch_begin);
@@ -324,7 +329,12 @@ TileLayer PlainCell::Publish(std::size_t index) const {
   const Layer& layer = layers_[index];
   int occupancy = 0;
   for (const Segment* segment : in_order) {
-    occupancy = Folded(occupancy, segment->occupancy, profile_);
+    const bool is_wrong_guess =
+        layer.is_measured && !segment->representative->is_strong() &&
+        std::abs(segment->representative->altitude_mm - layer.altitude_mm) > profile_.same_layer_mm;
+    if (!is_wrong_guess) {
+      occupancy = Folded(occupancy, segment->occupancy, profile_);
+    }
   }
   TileLayer out;
   out.altitude_mm = static_cast<std::int32_t>(layer.altitude_mm);
