@@ -22,10 +22,6 @@ std::vector<std::size_t> TouchingInOrder(const TileId& id,
   return order;
 }
 
-std::uint32_t NumberOf(const KeyframeKey& key, const MapProfile& profile) {
-  return profile.preset == FusionPreset::kPaper ? 0 : key.sequence / profile.stretch_keyframes;
-}
-
 FusionStretch Following(const FusionStretch* last, const SessionKey& key, std::uint32_t number) {
   FusionStretch stretch{&key, 0, 0, number, {}};
   if (last != nullptr) {
@@ -37,13 +33,17 @@ FusionStretch Following(const FusionStretch* last, const SessionKey& key, std::u
 
 }  // namespace
 
+std::uint32_t StretchNumber(const KeyframeKey& key, const MapProfile& profile) {
+  return profile.preset == FusionPreset::kPaper ? 0 : key.sequence / profile.stretch_keyframes;
+}
+
 std::vector<FusionStretch> CutStretches(const TileId& id,
                                         std::span<const FrameOnMap> frames,
                                         const MapProfile& profile) {
   std::vector<FusionStretch> stretches;
   for (const std::size_t i : TouchingInOrder(id, frames, profile)) {
     const KeyframeKey& key = frames[i].key;
-    const std::uint32_t number = NumberOf(key, profile);
+    const std::uint32_t number = StretchNumber(key, profile);
     const FusionStretch* last = stretches.empty() ? nullptr : &stretches.back();
     if (last == nullptr || *last->key != key.session || last->number != number) {
       stretches.push_back(Following(last, key.session, number));

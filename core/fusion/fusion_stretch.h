@@ -21,6 +21,8 @@ struct FusionStretch {
   std::vector<std::size_t> frames;  // indices of the frames given, by sequence
 };
 
+std::uint32_t StretchNumber(const KeyframeKey& key, const MapProfile& profile);
+
 // The stretches of the frames that touch the tile. `frames` must outlive the result.
 std::vector<FusionStretch> CutStretches(const TileId& id,
                                         std::span<const FrameOnMap> frames,

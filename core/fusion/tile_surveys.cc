@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "core/base/small_sort.h"
+#include "core/fusion/disc.h"
+#include "core/fusion/fusion_stretch.h"
 
 namespace atlas {
 namespace {
@@ -32,44 +34,37 @@ TileSurveys::Surveyed TileSurveys::Describe(const FrameOnMap& frame) {
           frame.placement};
 }
 
-Result<std::size_t> TileSurveys::Update(std::span<const FrameOnMap> frames,
-                                        const KeyframeSource& source,
-                                        const FusionContext& context) {
-  const std::vector<std::size_t> expected = Expect(frames, context);
-  for (const std::size_t i : expected) {
-    const auto keyframe = source(i);
-    if (!keyframe) {
-      return Error(keyframe.error());
-    }
-    Add(frames[i], **keyframe, context);
-  }
-  return expected.size();
-}
-
-std::vector<std::size_t> TileSurveys::Expect(std::span<const FrameOnMap> frames,
-                                             const FusionContext& context) {
-  assert(context.profile.preset != FusionPreset::kPaper);
+std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
+                                            const FusionContext& context) {
+  const MapProfile& profile = context.profile;
+  assert(profile.preset != FusionPreset::kPaper);
   ++expected_count_;
   if (tile_.cell_begin.empty()) {
-    tile_ = EmptyTile(id_, context.profile);
+    tile_ = EmptyTile(id_, profile);
     touched_ = CellSet(tile_.cell_begin.size() - 1);
     touched_.Fill();
   }
-  const std::vector<FusionStretch> cut = CutStretches(id_, frames, context.profile);
-  std::vector<Wanted> wanted;
-  for (const FusionStretch& stretch : cut) {
-    wanted.push_back(Find(stretch, frames));
-  }
+  std::vector<Wanted> wanted = Plan(change, profile);
   SurveyForgottenAgain(wanted);
-  TakeStretches(wanted, context.profile);
-  Settle(context.profile);
+  TakeStretches(wanted, profile);
+  Settle(profile);
 
-  std::vector<std::size_t> expected;
+  std::vector<FrameOnMap> expected;
+  open_.clear();
   awaited_.clear();
-  for (std::uint32_t i = 0; i < wanted.size(); ++i) {
-    const std::span rest = std::span(wanted[i].stretch->frames).subspan(wanted[i].kept);
-    expected.insert(expected.end(), rest.begin(), rest.end());
-    awaited_.insert(awaited_.end(), rest.size(), i);
+  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+    const Stretch& stretch = stretches_[i];
+    if (stretch.open) {
+      open_.push_back(i);
+    }
+    for (const Surveyed& frame : std::span(stretch.frames).subspan(wanted[i].kept)) {
+      expected.push_back({{stretch.key, frame.sequence},
+                          frame.time_ms,
+                          frame.placement,
+                          {profile.cell_size_um, frame.radius_cells},
+                          frame.content});
+      awaited_.push_back(i);
+    }
   }
   std::reverse(awaited_.begin(), awaited_.end());
   return expected;
@@ -82,24 +77,82 @@ void TileSurveys::Add(const FrameOnMap& frame,
   awaited_.pop_back();
 }
 
-// What is there of a stretch already: what was surveyed of it, if that is how its frames begin.
-TileSurveys::Wanted TileSurveys::Find(const FusionStretch& stretch,
-                                      std::span<const FrameOnMap> frames) const {
-  Wanted wanted{&stretch, {}, kNone, 0};
-  for (const std::size_t i : stretch.frames) {
-    wanted.frames.push_back(Describe(frames[i]));
+// What the tile is to be made of, in canonical order, and what there is of it already: of a stretch
+// that grows at its end, all of its survey; of one that changes otherwise, nothing.
+std::vector<TileSurveys::Wanted> TileSurveys::Plan(const TileChange& change,
+                                                   const MapProfile& profile) {
+  std::vector<Wanted> wanted;
+  wanted.reserve(stretches_.size() + 1);
+  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+    Stretch& stretch = stretches_[i];
+    const std::size_t surveyed = stretch.frames.size();
+    wanted.push_back({stretch.key, stretch.number, std::move(stretch.frames), i, surveyed});
   }
-  const auto found = std::lower_bound(
-      stretches_.begin(), stretches_.end(), stretch, [](const Stretch& a, const FusionStretch& b) {
-        return std::tie(a.key, a.number) < std::tie(*b.key, b.number);
-      });
-  if (found != stretches_.end() && found->key == *stretch.key && found->number == stretch.number &&
-      found->frames.size() <= wanted.frames.size() &&
-      std::equal(found->frames.begin(), found->frames.end(), wanted.frames.begin())) {
-    wanted.old = static_cast<std::uint32_t>(found - stretches_.begin());
-    wanted.kept = found->frames.size();
+  const Square tile = TileSquare(id_, profile);
+  std::vector<std::uint64_t> absent = change.absent;
+  std::vector<const FrameOnMap*> present;
+  for (const FrameOnMap& frame : change.present) {
+    if (Touches(FootprintDisc(frame.placement, frame.grid), tile)) {
+      present.push_back(&frame);
+    } else {
+      absent.push_back(frame.content);
+    }
   }
+  std::sort(absent.begin(), absent.end());
+  std::sort(present.begin(), present.end(),
+            [](const FrameOnMap* a, const FrameOnMap* b) { return a->key < b->key; });
+  Remove(absent, wanted);
+  for (const FrameOnMap* frame : present) {
+    Place(*frame, profile, wanted);
+  }
+  std::erase_if(wanted, [](const Wanted& w) { return w.frames.empty(); });
   return wanted;
+}
+
+// `contents` sorted.
+void TileSurveys::Remove(std::span<const std::uint64_t> contents,
+                         std::vector<Wanted>& wanted) const {
+  if (contents.empty()) {
+    return;
+  }
+  const auto is_gone = [&](const Surveyed& frame) {
+    return std::binary_search(contents.begin(), contents.end(), frame.content);
+  };
+  for (Wanted& w : wanted) {
+    if (std::erase_if(w.frames, is_gone) > 0) {
+      w.old = kNone;
+      w.kept = 0;
+    }
+  }
+}
+
+void TileSurveys::Place(const FrameOnMap& frame,
+                        const MapProfile& profile,
+                        std::vector<Wanted>& wanted) const {
+  const std::uint32_t number = StretchNumber(frame.key, profile);
+  const auto is_before = [&](const Wanted& w, const FrameOnMap& f) {
+    return std::tie(w.key, w.number) < std::tie(f.key.session, number);
+  };
+  auto w = std::lower_bound(wanted.begin(), wanted.end(), frame, is_before);
+  if (w == wanted.end() || w->key != frame.key.session || w->number != number) {
+    w = wanted.insert(w, {frame.key.session, number, {}, kNone, 0});
+  }
+  const Surveyed placed = Describe(frame);
+  const auto at = std::lower_bound(
+      w->frames.begin(), w->frames.end(), placed,
+      [](const Surveyed& a, const Surveyed& b) { return a.sequence < b.sequence; });
+  if (at != w->frames.end() && *at == placed) {
+    return;
+  }
+  if (static_cast<std::size_t>(at - w->frames.begin()) < w->kept) {
+    w->old = kNone;
+    w->kept = 0;
+  }
+  if (at != w->frames.end() && at->sequence == placed.sequence) {
+    *at = placed;
+  } else {
+    w->frames.insert(at, placed);
+  }
 }
 
 // What was forgotten did not count beside the settled segments as they were: where those change,
@@ -129,18 +182,22 @@ void TileSurveys::TakeStretches(std::span<Wanted> wanted, const MapProfile& prof
   for (std::uint32_t i = 0; i < wanted.size(); ++i) {
     Wanted& w = wanted[i];
     const bool grows = w.kept < w.frames.size();
-    Stretch stretch{*w.stretch->key, w.stretch->number, 0, {}, {}, false, 0, 0};
+    Stretch stretch{std::move(w.key), w.number, 0, {}, {}, false, 0, 0};
     if (w.old == kNone) {
       stretch.open.emplace(whole, profile);
     } else {
       stretch = std::move(stretches_[w.old]);
       stretches_[w.old].open.reset();
       if (!stretch.open && grows) {
-        stretch.open = Reopen(stretch, w.old, profile);
+        stretch.open = Reopen(w.old, std::span(w.frames).first(w.kept), profile);
       }
       settled_numbers[w.old] = stretch.open ? SettledSegments::kGone : i;
     }
-    stretch.vehicle = w.stretch->vehicle;
+    stretch.vehicle = 0;
+    if (!next.empty()) {
+      const bool is_same = next.back().key.vehicle == stretch.key.vehicle;
+      stretch.vehicle = next.back().vehicle + (is_same ? 0u : 1u);
+    }
     stretch.frames = std::move(w.frames);
     stretch.grown_at = grows ? expected_count_ : stretch.grown_at;
     next.push_back(std::move(stretch));
@@ -154,11 +211,11 @@ void TileSurveys::TakeStretches(std::span<Wanted> wanted, const MapProfile& prof
   stretches_ = std::move(next);
 }
 
-StretchSurvey TileSurveys::Reopen(const Stretch& stretch,
-                                  std::uint32_t number,
+StretchSurvey TileSurveys::Reopen(std::uint32_t number,
+                                  std::span<const Surveyed> frames,
                                   const MapProfile& profile) const {
   StretchSurvey survey({id_, 0, profile.tile_cells}, profile);
-  for (const Surveyed& frame : stretch.frames) {
+  for (const Surveyed& frame : frames) {
     survey.AddFrame({frame.sequence, frame.time_ms});
   }
   settled_.CopyTo(number, survey);
@@ -233,11 +290,10 @@ void TileSurveys::Forget(BoundedChoice& choice) {
 
 const Tile& TileSurveys::Combine(const FusionContext& context) {
   assert(awaited_.empty());
-  for (Stretch& stretch : stretches_) {
-    if (stretch.open) {
-      touched_.InsertAll(stretch.open->touched());
-      stretch.open->ClearTouched();
-    }
+  for (const std::uint32_t i : open_) {
+    StretchSurvey& survey = *stretches_[i].open;
+    touched_.InsertAll(survey.touched());
+    survey.ClearTouched();
   }
   CellCombiner combiner(context.sigmas, context.profile);
   Tile tile = EmptyTile(id_, context.profile);
@@ -267,7 +323,7 @@ void TileSurveys::CombineCell(std::size_t cell,
                               std::vector<TileLayer>& out) {
   segments_.clear();
   CollectSettled(cell);
-  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+  for (const std::uint32_t i : open_) {
     CollectOpen(cell, i);
   }
   if (segments_.empty()) {
@@ -298,11 +354,9 @@ void TileSurveys::CollectSettled(std::size_t cell) {
 }
 
 void TileSurveys::CollectOpen(std::size_t cell, std::uint32_t stretch) {
-  std::optional<StretchSurvey>& open = stretches_[stretch].open;
-  if (open) {
-    for (std::uint32_t i = open->First(cell); i != Segment::kNone; i = open->At(i).next) {
-      segments_.push_back(View(open->At(i), stretch));
-    }
+  StretchSurvey& open = *stretches_[stretch].open;
+  for (std::uint32_t i = open.First(cell); i != Segment::kNone; i = open.At(i).next) {
+    segments_.push_back(View(open.At(i), stretch));
   }
 }
 

@@ -19,29 +19,29 @@
 #include "core/fusion/cell_combiner.h"
 #include "core/fusion/cell_set.h"
 #include "core/fusion/fusion_context.h"
-#include "core/fusion/fusion_stretch.h"
 #include "core/fusion/settled_segments.h"
 #include "core/fusion/stretch_survey.h"
 #include "core/fusion/tile_fusion.h"
 
 namespace atlas {
 
+// How the keyframes that touch a tile differ from those that it was made of last. Each is known by
+// its `content`, which is its own.
+struct TileChange {
+  std::vector<FrameOnMap> present;    // new ones, and those that lie otherwise than before
+  std::vector<std::uint64_t> absent;  // contents of those that are gone, or were never there
+};
+
 class TileSurveys {
  public:
   explicit TileSurveys(const TileId& id) : id_(id) {}
 
-  // Prepares for the tile to be made of `frames`, and returns which of them must be added first, in
-  // this order.
-  std::vector<std::size_t> Expect(std::span<const FrameOnMap> frames, const FusionContext& context);
+  // Prepares for the tile to be made of other frames than before, and returns those that must be
+  // added first, in this order. What it costs besides grows with the stretches that change.
+  std::vector<FrameOnMap> Expect(const TileChange& change, const FusionContext& context);
   void Add(const FrameOnMap& frame, const Keyframe& keyframe, const FusionContext& context);
   // When all were added. Valid until the next call.
   const Tile& Combine(const FusionContext& context);
-
-  // Expect() and Add(), with keyframes from `source`; returns how many were added. After an error,
-  // the source's, the surveys are worth nothing.
-  Result<std::size_t> Update(std::span<const FrameOnMap> frames,
-                             const KeyframeSource& source,
-                             const FusionContext& context);
 
   const TileId& id() const { return id_; }
   std::size_t bytes() const;
@@ -66,7 +66,7 @@ class TileSurveys {
   struct Stretch {
     SessionKey key;
     std::uint32_t number = 0;
-    std::uint32_t vehicle = 0;  // FusionStretch's
+    std::uint32_t vehicle = 0;  // equal for equal vehicle names, rising
     std::vector<Surveyed> frames;
     std::optional<StretchSurvey> open;  // else settled
     bool has_forgotten = false;         // some of its segments, when it settled
@@ -77,18 +77,21 @@ class TileSurveys {
 
   // A stretch that the tile is to be made of.
   struct Wanted {
-    const FusionStretch* stretch = nullptr;
+    SessionKey key;
+    std::uint32_t number = 0;
     std::vector<Surveyed> frames;
     std::uint32_t old = kNone;  // its number in stretches_, if its survey can go on from there
     std::size_t kept = 0;       // frames that were surveyed
   };
 
   static Surveyed Describe(const FrameOnMap& frame);
-  Wanted Find(const FusionStretch& stretch, std::span<const FrameOnMap> frames) const;
+  std::vector<Wanted> Plan(const TileChange& change, const MapProfile& profile);
+  void Remove(std::span<const std::uint64_t> contents, std::vector<Wanted>& wanted) const;
+  void Place(const FrameOnMap& frame, const MapProfile& profile, std::vector<Wanted>& wanted) const;
   void SurveyForgottenAgain(std::span<Wanted> wanted) const;
   void TakeStretches(std::span<Wanted> wanted, const MapProfile& profile);
-  StretchSurvey Reopen(const Stretch& stretch,
-                       std::uint32_t number,
+  StretchSurvey Reopen(std::uint32_t number,
+                       std::span<const Surveyed> frames,
                        const MapProfile& profile) const;
   bool IsToSettle(std::size_t i, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
@@ -104,6 +107,7 @@ class TileSurveys {
   std::uint32_t expected_count_ = 0;  // calls of Expect()
   std::vector<Stretch> stretches_;    // in canonical order
   SettledSegments settled_;
+  std::vector<std::uint32_t> open_;     // stretches that are
   std::vector<std::uint32_t> awaited_;  // stretches of the frames that must be added, last first
   Tile tile_;                           // without cells: there is none
   bool is_packed_ = false;

@@ -4,56 +4,56 @@
 
 namespace atlas {
 
-std::optional<TileSurveys> SurveyCache::Shelf::Take(std::uint64_t key) {
+std::optional<KeptSurveys> SurveyCache::Shelf::Take(std::uint64_t key) {
   const auto found = by_key.find(key);
   if (found == by_key.end()) {
     return std::nullopt;
   }
   const auto entry = found->second;
   bytes -= entry->bytes;
-  TileSurveys surveys = std::move(entry->surveys);
+  KeptSurveys kept = std::move(entry->kept);
   by_key.erase(found);
   by_age.erase(entry);
-  return surveys;
+  return kept;
 }
 
-void SurveyCache::Shelf::Put(TileSurveys surveys) {
-  const std::uint64_t key = surveys.id().Key();
+void SurveyCache::Shelf::Put(KeptSurveys kept) {
+  const std::uint64_t key = kept.surveys.id().Key();
   Take(key);  // another worker's, whose lease ran out
-  const std::size_t size = surveys.bytes();
-  by_age.push_front({std::move(surveys), size});
+  const std::size_t size = kept.surveys.bytes();
+  by_age.push_front({std::move(kept), size});
   by_key[key] = by_age.begin();
   bytes += size;
 }
 
-std::optional<TileSurveys> SurveyCache::Shelf::TakeOldestAbove(std::size_t limit) {
+std::optional<KeptSurveys> SurveyCache::Shelf::TakeOldestAbove(std::size_t limit) {
   if (bytes <= limit || by_age.empty()) {
     return std::nullopt;
   }
-  return Take(by_age.back().surveys.id().Key());
+  return Take(by_age.back().kept.surveys.id().Key());
 }
 
-std::optional<TileSurveys> SurveyCache::Take(const TileId& id) {
-  std::optional<TileSurveys> surveys;
+std::optional<KeptSurveys> SurveyCache::Take(const TileId& id) {
+  std::optional<KeptSurveys> kept;
   {
     const std::lock_guard lock(mutex_);
-    surveys = plain_.Take(id.Key());
-    if (!surveys) {
-      surveys = packed_.Take(id.Key());
+    kept = plain_.Take(id.Key());
+    if (!kept) {
+      kept = packed_.Take(id.Key());
     }
   }
-  if (surveys) {
-    surveys->Unpack();
+  if (kept) {
+    kept->surveys.Unpack();
   }
-  return surveys;
+  return kept;
 }
 
-void SurveyCache::Put(TileSurveys surveys) {
+void SurveyCache::Put(KeptSurveys kept) {
   std::unique_lock lock(mutex_);
-  plain_.Put(std::move(surveys));
+  plain_.Put(std::move(kept));
   while (auto oldest = plain_.TakeOldestAbove(limits_.plain_bytes)) {
     lock.unlock();
-    oldest->Pack();  // takes milliseconds
+    oldest->surveys.Pack();  // takes milliseconds
     lock.lock();
     packed_.Put(*std::move(oldest));
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <list>
 #include <mutex>
 #include <optional>
@@ -12,6 +13,11 @@
 #include "core/fusion/tile_surveys.h"
 
 namespace atlas {
+
+struct KeptSurveys {
+  TileSurveys surveys;
+  std::uint64_t revision = 0;  // of the atlas that the tile was last made from
+};
 
 struct SurveyCacheLimits {
   std::size_t plain_bytes = std::size_t{1} << 30;
@@ -23,24 +29,24 @@ class SurveyCache {
   explicit SurveyCache(const SurveyCacheLimits& limits) : limits_(limits) {}
 
   // Takes a tile's surveys out, ready to be used; none if they are not there.
-  std::optional<TileSurveys> Take(const TileId& id);
-  void Put(TileSurveys surveys);
+  std::optional<KeptSurveys> Take(const TileId& id);
+  void Put(KeptSurveys kept);
   std::size_t bytes() const;
 
  private:
   // One of the two: tiles by age, the last used first.
   struct Shelf {
     struct Entry {
-      TileSurveys surveys;
+      KeptSurveys kept;
       std::size_t bytes = 0;
     };
     std::list<Entry> by_age;
     std::unordered_map<std::uint64_t, std::list<Entry>::iterator> by_key;
     std::size_t bytes = 0;
 
-    std::optional<TileSurveys> Take(std::uint64_t key);
-    void Put(TileSurveys surveys);
-    std::optional<TileSurveys> TakeOldestAbove(std::size_t limit);
+    std::optional<KeptSurveys> Take(std::uint64_t key);
+    void Put(KeptSurveys kept);
+    std::optional<KeptSurveys> TakeOldestAbove(std::size_t limit);
   };
 
   SurveyCacheLimits limits_;

@@ -48,7 +48,7 @@ Result<BuiltTile> TileBuilder::Build(const TileId& id) {
 }
 
 Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
-  const auto sources = store_.GatherTile(id);
+  const auto sources = store_.GatherTile(id, 0);
   if (!sources) {
     return Error(sources.error());
   }

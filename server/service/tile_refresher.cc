@@ -50,7 +50,9 @@ void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) 
 // With the surveys of the last time, where they are still there. They are taken out meanwhile: what
 // fails is lost, and two workers never share.
 Result<TileRefresher::Job> TileRefresher::Prepare(const TileId& id) {
-  const auto sources = store_.GatherTile(id);
+  std::optional<KeptSurveys> kept = surveys_.Take(id);
+  Job job{kept ? std::move(kept->surveys) : TileSurveys(id), kept ? kept->revision : 0, {}, {}};
+  const auto sources = store_.GatherTile(id, job.revision);
   if (!sources) {
     return Error(sources.error());
   }
@@ -58,9 +60,12 @@ Result<TileRefresher::Job> TileRefresher::Prepare(const TileId& id) {
   if (!frames) {
     return Error(frames.error());
   }
-  std::optional<TileSurveys> kept = surveys_.Take(id);
-  Job job{kept ? *std::move(kept) : TileSurveys(id), sources->revision, *std::move(frames), {}, {}};
-  job.expected = job.surveys.Expect(job.frames, context());
+  TileChange change{*std::move(frames), {}};
+  for (const std::int64_t keyframe : sources->gone) {
+    change.absent.push_back(static_cast<std::uint64_t>(keyframe));
+  }
+  job.revision = sources->revision;
+  job.expected = job.surveys.Expect(change, context());
   return job;
 }
 
@@ -77,7 +82,7 @@ void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
     if (content) {
       tiles_.Insert(content->payload_hash, std::make_shared<const Tile>(tile));
     }
-    surveys_.Put(std::move(job.surveys));
+    surveys_.Put({std::move(job.surveys), job.revision});
     on_built(id, BuiltTile{job.revision, std::move(content)});
   }
 }
@@ -90,8 +95,8 @@ void TileRefresher::AddKeyframes(std::vector<Job>& jobs) {
   };
   std::vector<Use> uses;
   for (Job& job : jobs) {
-    for (const std::size_t i : job.expected) {
-      uses.push_back({&job.frames[i], &job});
+    for (const FrameOnMap& frame : job.expected) {
+      uses.push_back({&frame, &job});
     }
   }
   std::stable_sort(uses.begin(), uses.end(),

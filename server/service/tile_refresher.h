@@ -38,8 +38,7 @@ class TileRefresher {
   struct Job {
     TileSurveys surveys;
     std::uint64_t revision = 0;
-    std::vector<FrameOnMap> frames;
-    std::vector<std::size_t> expected;  // frames to be added
+    std::vector<FrameOnMap> expected;  // frames to be added
     Status status;
   };
 

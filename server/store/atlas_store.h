@@ -58,8 +58,9 @@ class AtlasStore {
 
   // In the order of `keys`; kNotFound names the first unknown one.
   virtual Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
-  // The keyframes of live sessions whose footprints touch a level-0 tile.
-  virtual Result<TileSources> GatherTile(const TileId& id) = 0;
+  // The keyframes of live sessions whose footprints touch a level-0 tile: those that were not there
+  // at revision `since`, or not as they are now. `since` 0: all of them.
+  virtual Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) = 0;
   // The same as of an earlier revision: the keyframes that were there, in sessions that were live,
   // each with the pose it had. Some may not touch the tile. Errors as CheckRevision.
   virtual Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) = 0;

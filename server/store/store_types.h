@@ -82,6 +82,7 @@ struct KeyframeRecord {
 struct TileSources {
   std::uint64_t revision = 0;  // of the atlas, or the earlier one asked for
   std::vector<KeyframeRecord> keyframes;
+  std::vector<std::int64_t> gone;  // ids that do not belong to it, and may have before
 };
 
 struct TileContent {

@@ -21,22 +21,11 @@ std::vector<TileId> ReadKeys(Query& row) {
   return tiles;
 }
 
-std::vector<std::int64_t> ReadIds(Query& row) {
-  std::vector<std::int64_t> ids;
-  while (row.Step()) {
-    row.Rewind();
-    ids.push_back(row.Int());
-  }
-  return ids;
-}
-
 // The first level-0 tile above `after_key` that a footprint touches or touched.
 Result<std::optional<TileId>> NextTile(Connection& connection, std::int64_t after_key) {
   Query row = connection.Prepare(
-      "SELECT coalesce(min(key), -1) FROM ("
-      "SELECT min(tile_key) AS key FROM keyframe_tiles WHERE tile_key > ? UNION ALL "
-      "SELECT min(tile_key) FROM footprint_history WHERE tile_key > ?)");
-  row.Bind(after_key).Bind(after_key);
+      "SELECT coalesce(min(tile_key), -1) FROM keyframe_tiles WHERE tile_key > ?");
+  row.Bind(after_key);
   const std::int64_t key = row.Step() ? row.Int() : -1;
   if (key < 0) {
     return std::nullopt;
@@ -52,37 +41,32 @@ Result<std::optional<TileId>> NextTile(Connection& connection, std::int64_t afte
 
 std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id) {
   Query row = connection.Prepare(
-      "SELECT tile_key FROM keyframe_tiles WHERE keyframe_id = ? ORDER BY tile_key");
+      "SELECT tile_key FROM keyframe_tiles WHERE keyframe_id = ? AND is_current "
+      "ORDER BY tile_key");
   row.Bind(keyframe_id);
   return ReadKeys(row);
 }
 
 void WriteFootprint(Connection& connection,
                     std::int64_t keyframe_id,
-                    std::span<const TileId> footprint) {
+                    std::span<const TileId> footprint,
+                    std::uint64_t revision) {
   connection
       .Prepare(
-          "INSERT OR IGNORE INTO footprint_history (tile_key, keyframe_id) "
-          "SELECT tile_key, keyframe_id FROM keyframe_tiles WHERE keyframe_id = ?")
+          "UPDATE keyframe_tiles SET is_current = 0, revision = ? "
+          "WHERE keyframe_id = ? AND is_current")
+      .Bind(revision)
       .Bind(keyframe_id)
       .Run();
-  connection.Prepare("DELETE FROM keyframe_tiles WHERE keyframe_id = ?").Bind(keyframe_id).Run();
-  for (const TileId& tile : footprint) {
-    connection.Prepare("INSERT INTO keyframe_tiles (tile_key, keyframe_id) VALUES (?,?)")
-        .Bind(tile.Key())
-        .Bind(keyframe_id)
-        .Run();
-  }
-}
-
-void AddFormerFootprint(Connection& connection,
-                        std::int64_t keyframe_id,
-                        std::span<const TileId> footprint) {
   for (const TileId& tile : footprint) {
     connection
-        .Prepare("INSERT OR IGNORE INTO footprint_history (tile_key, keyframe_id) VALUES (?,?)")
+        .Prepare(
+            "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
+            "VALUES (?,?,?,1) ON CONFLICT DO UPDATE SET revision = excluded.revision, "
+            "is_current = 1")
         .Bind(tile.Key())
         .Bind(keyframe_id)
+        .Bind(revision)
         .Run();
   }
 }
@@ -90,25 +74,36 @@ void AddFormerFootprint(Connection& connection,
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id) {
   Query row = connection.Prepare(
       "SELECT DISTINCT t.tile_key FROM keyframes k JOIN keyframe_tiles t ON t.keyframe_id = k.id "
-      "WHERE k.session_id = ? ORDER BY t.tile_key");
+      "WHERE k.session_id = ? AND t.is_current ORDER BY t.tile_key");
   row.Bind(session_id);
   return ReadKeys(row);
 }
 
-std::vector<std::int64_t> KeyframesTouching(Connection& connection, const TileId& tile) {
-  Query row = connection.Prepare(
-      "SELECT keyframe_id FROM keyframe_tiles WHERE tile_key = ? "
-      "ORDER BY keyframe_id");
-  row.Bind(tile.Key());
-  return ReadIds(row);
+void TouchSessionFootprint(Connection& connection,
+                           std::int64_t session_id,
+                           std::uint64_t revision) {
+  connection
+      .Prepare(
+          "UPDATE keyframe_tiles SET revision = ? WHERE is_current AND keyframe_id IN "
+          "(SELECT id FROM keyframes WHERE session_id = ?)")
+      .Bind(revision)
+      .Bind(session_id)
+      .Run();
 }
 
-std::vector<std::int64_t> KeyframesEverTouching(Connection& connection, const TileId& tile) {
+std::vector<FootprintRow> FootprintsSince(Connection& connection,
+                                          const TileId& tile,
+                                          std::uint64_t revision) {
   Query row = connection.Prepare(
-      "SELECT keyframe_id FROM keyframe_tiles WHERE tile_key = ? UNION "
-      "SELECT keyframe_id FROM footprint_history WHERE tile_key = ? ORDER BY keyframe_id");
-  row.Bind(tile.Key()).Bind(tile.Key());
-  return ReadIds(row);
+      "SELECT keyframe_id, is_current FROM keyframe_tiles WHERE tile_key = ? AND revision > ? "
+      "ORDER BY keyframe_id");
+  row.Bind(tile.Key()).Bind(revision);
+  std::vector<FootprintRow> rows;
+  while (row.Step()) {
+    row.Rewind();
+    rows.push_back({row.Int(), row.Int() != 0});
+  }
+  return rows;
 }
 
 Result<std::vector<TileId>> ListFootprintRows(Connection& connection,

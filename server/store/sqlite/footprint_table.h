@@ -1,5 +1,5 @@
-// Tables keyframe_tiles and footprint_history: the level-0 tiles that each keyframe touches at its
-// current pose, and those that it touched at earlier ones.
+// Table keyframe_tiles: the level-0 tiles that each keyframe touches at its current pose, those
+// that it touched at earlier ones, and since when.
 #pragma once
 
 #include <functional>
@@ -13,19 +13,24 @@
 namespace atlas {
 
 std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id);
-// Makes `footprint` the current one; the one before goes into the history.
+// Makes `footprint` the current one from `revision` on; the one before becomes a former one.
 void WriteFootprint(Connection& connection,
                     std::int64_t keyframe_id,
-                    std::span<const TileId> footprint);
-void AddFormerFootprint(Connection& connection,
-                        std::int64_t keyframe_id,
-                        std::span<const TileId> footprint);
+                    std::span<const TileId> footprint,
+                    std::uint64_t revision);
 // The union of the current footprints of a session's keyframes, in key order.
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id);
+// The session's keyframes entered or left the map at `revision`.
+void TouchSessionFootprint(Connection& connection, std::int64_t session_id, std::uint64_t revision);
 
-// By id.
-std::vector<std::int64_t> KeyframesTouching(Connection& connection, const TileId& tile);
-std::vector<std::int64_t> KeyframesEverTouching(Connection& connection, const TileId& tile);
+struct FootprintRow {
+  std::int64_t keyframe_id = 0;
+  bool is_current = false;  // else the keyframe left the tile
+};
+// What changed in a tile after a revision, in the order of keyframe ids; after 0: everything.
+std::vector<FootprintRow> FootprintsSince(Connection& connection,
+                                          const TileId& tile,
+                                          std::uint64_t revision);
 
 // Tiles of any level over footprints, current or former: AtlasStore::ListFootprintTiles and
 // ScanFootprintTiles. One look into each index a tile, however many keyframes touch it.

@@ -31,8 +31,8 @@ Result<TileSources> GatherTileSourcesAt(Connection& connection,
   }
   TileSources sources;
   sources.revision = revision;
-  for (const std::int64_t keyframe : KeyframesEverTouching(connection, id)) {
-    auto record = ReadKeyframeRecordAt(connection, keyframe, revision);
+  for (const FootprintRow& row : FootprintsSince(connection, id, 0)) {  // former ones, too
+    auto record = ReadKeyframeRecordAt(connection, row.keyframe_id, revision);
     if (!record) {
       return Error(record.error());
     }

@@ -9,7 +9,7 @@ namespace atlas {
 namespace {
 
 // Blobs stand last in their rows: the other columns are read without touching overflow pages. The
-// checksums of counters, keyframe_tiles, footprint_history and dirty_tiles are reserved and null.
+// checksums of counters, keyframe_tiles and dirty_tiles are reserved and null.
 constexpr const char* kTables = R"sql(
 CREATE TABLE meta (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -77,9 +77,11 @@ CREATE INDEX tile_summaries ON tiles (key, revision, payload_hash, blob_bytes);
 
 CREATE TABLE keyframe_tiles (
   tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,
+  revision INTEGER NOT NULL, is_current INTEGER NOT NULL,
   checksum INTEGER,
   PRIMARY KEY (tile_key, keyframe_id)) WITHOUT ROWID;
 CREATE INDEX tiles_of_keyframe ON keyframe_tiles (keyframe_id);
+CREATE INDEX changes_of_tile ON keyframe_tiles (tile_key, revision, keyframe_id, is_current);
 
 CREATE TABLE dirty_tiles (
   key INTEGER PRIMARY KEY,
@@ -97,11 +99,6 @@ CREATE TABLE session_states (
   author TEXT NOT NULL, reason TEXT NOT NULL,
   checksum INTEGER NOT NULL,
   UNIQUE (session_id, revision));
-
-CREATE TABLE footprint_history (
-  tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,
-  checksum INTEGER,
-  PRIMARY KEY (tile_key, keyframe_id)) WITHOUT ROWID;
 
 INSERT INTO counters (id, name, value) VALUES
   (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),

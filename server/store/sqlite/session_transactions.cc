@@ -26,6 +26,7 @@ std::uint32_t MarkSession(Connection& connection, std::int64_t session_id, std::
   for (const TileId& tile : tiles) {
     MarkTile(connection, tile, revision, revision);
   }
+  TouchSessionFootprint(connection, session_id, revision);
   return static_cast<std::uint32_t>(tiles.size());
 }
 

@@ -85,7 +85,7 @@ class SqliteStore final : public AtlasStore {
   void Flush() override { writes_.Flush(); }
 
   Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) override;
-  Result<TileSources> GatherTile(const TileId& id) override;
+  Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override;
   Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) override {
     return readers_.Run<TileSources>([&id, revision](Connection& connection) {
       return GatherTileSourcesAt(connection, id, revision);
@@ -194,17 +194,23 @@ Result<std::vector<KeyframeRecord>> SqliteStore::FindKeyframes(std::span<const K
   });
 }
 
-Result<TileSources> SqliteStore::GatherTile(const TileId& id) {
-  return readers_.Run<TileSources>([&id](Connection& connection) -> Result<TileSources> {
+Result<TileSources> SqliteStore::GatherTile(const TileId& id, std::uint64_t since) {
+  return readers_.Run<TileSources>([&](Connection& connection) -> Result<TileSources> {
     TileSources sources;
     sources.revision = ReadCounter(connection, Counter::kRevision);
-    for (const std::int64_t keyframe : KeyframesTouching(connection, id)) {
-      auto record = ReadKeyframeRecord(connection, keyframe);
+    for (const FootprintRow& row : FootprintsSince(connection, id, since)) {
+      if (!row.is_current) {
+        sources.gone.push_back(row.keyframe_id);
+        continue;
+      }
+      auto record = ReadKeyframeRecord(connection, row.keyframe_id);
       if (!record) {
         return Error(record.error());
       }
       if (IsInMap(record->session_state)) {
         sources.keyframes.push_back(std::move(*record));
+      } else {
+        sources.gone.push_back(row.keyframe_id);
       }
     }
     return sources;

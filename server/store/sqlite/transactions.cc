@@ -38,7 +38,7 @@ PutKeyframeResult AddKeyframe(Connection& connection,
   InsertKeyframe(connection, keyframe, id, session.id, revision);
   const std::string& author = keyframe.key.session.vehicle;
   WritePose(connection, {id, keyframe.pose, revision, 0, author});
-  WriteFootprint(connection, id, keyframe.footprint);
+  WriteFootprint(connection, id, keyframe.footprint, revision);
   if (session.record.keyframes == 0) {
     WriteSessionState(connection, {session.id, revision, session.record.state, author, ""});
   }
@@ -76,7 +76,7 @@ Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const P
     move.tiles = ReadFootprint(connection, stored->id);
     move.tiles.insert(move.tiles.end(), update.footprint.begin(), update.footprint.end());
   }
-  WriteFootprint(connection, stored->id, update.footprint);
+  WriteFootprint(connection, stored->id, update.footprint, change.revision);
   return move;
 }
 

@@ -42,7 +42,7 @@ TEST_F(DurabilityTest, AnAcknowledgedGroupIsThereAfterReopening) {
   Open();
   EXPECT_EQ(store_->ReadCounts()->keyframes, 300u);
   EXPECT_EQ(store_->ReadCounts()->revision, 300u);
-  EXPECT_EQ(store_->GatherTile(kA)->keyframes.size(), 300u);
+  EXPECT_EQ(store_->GatherTile(kA, 0)->keyframes.size(), 300u);
 }
 
 TEST_F(DurabilityTest, AnAcknowledgedWriteSurvivesAKilledProcess) {
@@ -101,7 +101,7 @@ TEST_F(DurabilityTest, ADirectoryOfOtherFilesIsLeftAlone) {
 
 TEST_F(DurabilityTest, ANewerSchemaIsRefused) {
   Open();
-  Tamper("PRAGMA user_version = 3");
+  Tamper("PRAGMA user_version = 99");
   EXPECT_EQ(OpenCode(), StatusCode::kUnsupported);
 }
 
@@ -133,7 +133,7 @@ TEST_F(DurabilityTest, DamagedRowsAreDetectedAndTheOthersServed) {
     OpenWithOneTile();
     Tamper(damage);
     Open();
-    const auto sources = store_->GatherTile(kA);
+    const auto sources = store_->GatherTile(kA, 0);
     ASSERT_FALSE(sources.has_value());
     EXPECT_EQ(sources.error().code(), StatusCode::kInvalidData);
     EXPECT_TRUE(store_->ReadTile(kA)->has_value());
@@ -211,7 +211,7 @@ TEST_F(DiskTest, AFullDiskRefusesWritesKeepsReadsAndRecovers) {
   EXPECT_EQ(refusal.code(), StatusCode::kResourceExhausted) << refusal.message();
   EXPECT_GT(accepted, 0u);
   EXPECT_EQ(store_->ReadCounts()->keyframes, accepted);
-  EXPECT_EQ(store_->GatherTile(kA)->keyframes.size(), accepted);
+  EXPECT_EQ(store_->GatherTile(kA, 0)->keyframes.size(), accepted);
   ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=16m"), 0);
   const auto after = Put(Big(1000));
   ASSERT_TRUE(after.has_value()) << after.error().message();

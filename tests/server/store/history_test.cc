@@ -1,4 +1,8 @@
 // What was: sessions taken out and put back, and tiles' sources as of an earlier revision.
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <random>
 #include <set>
 
 #include "tests/server/store/store_fixture.h"
@@ -68,7 +72,7 @@ TEST_F(HistoryTest, RetractingTakesASessionOutAndRestoringPutsItBack) {
   EXPECT_EQ(retracted->tiles_marked, 2u);
   EXPECT_EQ(retracted->revision, 4u);
   EXPECT_EQ(Marked(), (std::set<TileId>{kA, kB}));
-  EXPECT_TRUE(store_->GatherTile(kB)->keyframes.empty());
+  EXPECT_TRUE(store_->GatherTile(kB, 0)->keyframes.empty());
   EXPECT_EQ(store_->ListSessions()->at(0).state, SessionState::kRetracted);
   EXPECT_EQ(store_->ListSessions()->at(1).state, SessionState::kLive);
   Open();
@@ -77,7 +81,71 @@ TEST_F(HistoryTest, RetractingTakesASessionOutAndRestoringPutsItBack) {
   EXPECT_EQ(restored->state, SessionState::kLive);
   EXPECT_EQ(restored->revision, 5u);
   EXPECT_EQ(Marked(), (std::set<TileId>{kA, kB}));
-  EXPECT_EQ(store_->GatherTile(kB)->keyframes.size(), 2u);
+  EXPECT_EQ(store_->GatherTile(kB, 0)->keyframes.size(), 2u);
+}
+
+// What someone knows of a tile who asks for what changed, now and then.
+class Follower {
+ public:
+  explicit Follower(const TileId& tile) : tile_(tile) {}
+
+  void CatchUp(AtlasStore& store) {
+    const TileSources changed = store.GatherTile(tile_, revision_).value();
+    for (const std::int64_t id : changed.gone) {
+      xs_.erase(id);
+    }
+    for (const KeyframeRecord& record : changed.keyframes) {
+      xs_[record.id] = record.pose.x_um;
+    }
+    revision_ = changed.revision;
+    const TileSources all = store.GatherTile(tile_, 0).value();
+    std::map<std::int64_t, std::int64_t> expected;
+    for (const KeyframeRecord& record : all.keyframes) {
+      expected[record.id] = record.pose.x_um;
+    }
+    EXPECT_EQ(xs_, expected);
+    EXPECT_EQ(store.GatherTile(tile_, revision_)->keyframes.size(), 0u);
+  }
+
+ private:
+  TileId tile_;
+  std::uint64_t revision_ = 0;
+  std::map<std::int64_t, std::int64_t> xs_;  // by id
+};
+
+TEST_F(HistoryTest, WhoFollowsTheChangesOfATileKnowsAllOfIt) {
+  Open();
+  const std::vector<TileId> tiles{kA, kB, kC};
+  std::vector<Follower> followers;
+  for (int i = 0; i < 6; ++i) {
+    followers.emplace_back(tiles[static_cast<std::size_t>(i) % 3]);
+  }
+  std::mt19937 random(7);
+  const auto footprint = [&] {
+    std::vector<TileId> some;
+    std::copy_if(tiles.begin(), tiles.end(), std::back_inserter(some),
+                 [&](const TileId&) { return random() % 2 == 0; });
+    return some;
+  };
+  std::uint32_t keyframes = 0;
+  for (int step = 0; step < 200; ++step) {
+    const std::uint32_t kind = random() % 4;
+    if (kind == 0 || keyframes == 0) {
+      NewKeyframe keyframe = MakeKeyframe(keyframes++, footprint());
+      ASSERT_TRUE(Put(std::move(keyframe)).has_value());
+    } else if (kind <= 2) {
+      const auto x_um = static_cast<std::int64_t>(random() % 3);
+      ASSERT_TRUE(Update({Moved(random() % keyframes, x_um, footprint())}).has_value());
+    } else {
+      ASSERT_TRUE(Change(random() % 2 == 0 ? SessionAction::kRetract : SessionAction::kRestore)
+                      .has_value());
+    }
+    for (Follower& follower : followers) {
+      if (random() % 3 == 0) {
+        follower.CatchUp(*store_);
+      }
+    }
+  }
 }
 
 TEST_F(HistoryTest, ASecondTimeChangesNothing) {
@@ -195,7 +263,7 @@ TEST_F(HistoryTest, DamagedHistoryIsToldAndOnlyWhereItCounts) {
   EXPECT_EQ(store_->GatherTileAt(kA, 1).error().code(), StatusCode::kInvalidData);
   EXPECT_EQ(XsAt(kA, 2), Xs{5});
   EXPECT_EQ(store_->ReadKeyframe(1).error().code(), StatusCode::kInvalidData);
-  EXPECT_TRUE(store_->GatherTile(kA).has_value());
+  EXPECT_TRUE(store_->GatherTile(kA, 0).has_value());
   EXPECT_TRUE(store_->CheckSession({"bus", "day"}).ok());
   TamperAndOpen("UPDATE session_states SET state = 3");
   EXPECT_EQ(store_->GatherTileAt(kA, 2).error().code(), StatusCode::kInvalidData);

@@ -84,8 +84,8 @@ TEST_F(KeyframeStoreTest, PoseUpdateMarksOldAndNewFootprints) {
   EXPECT_EQ(moved->tiles_marked, 3u);
   EXPECT_EQ(moved->batch, 1u);
   EXPECT_EQ(Ids(Claim()), (std::set<TileId>{kA, kB, kC}));
-  EXPECT_TRUE(store_->GatherTile(kA)->keyframes.empty());
-  const auto sources = store_->GatherTile(kC).value();
+  EXPECT_TRUE(store_->GatherTile(kA, 0)->keyframes.empty());
+  const auto sources = store_->GatherTile(kC, 0).value();
   ASSERT_EQ(sources.keyframes.size(), 1u);
   EXPECT_EQ(sources.keyframes[0].pose, PoseAt(5));
   EXPECT_EQ(sources.revision, 2u);
@@ -107,7 +107,7 @@ TEST_F(KeyframeStoreTest, PoseBatchIsAllOrNothing) {
   const auto refused = Update({Moved(1, 5, {kB}), Moved(99, 5, {kB})});
   EXPECT_EQ(refused.error().code(), StatusCode::kNotFound);
   EXPECT_NE(refused.error().message().find("bus/day/99"), std::string::npos);
-  EXPECT_EQ(store_->GatherTile(kA)->keyframes[0].pose, PoseAt(0));
+  EXPECT_EQ(store_->GatherTile(kA, 0)->keyframes[0].pose, PoseAt(0));
   EXPECT_EQ(Ids(Claim()), std::set<TileId>{kA});
   EXPECT_EQ(store_->ReadCounts()->revision, 1u);
 }
