@@ -129,13 +129,15 @@ TEST_F(HistoryTest, WhoFollowsTheChangesOfATileKnowsAllOfIt) {
   };
   std::uint32_t keyframes = 0;
   for (int step = 0; step < 200; ++step) {
-    const std::uint32_t kind = random() % 4;
+    const auto kind = random() % 4;
     if (kind == 0 || keyframes == 0) {
       NewKeyframe keyframe = MakeKeyframe(keyframes++, footprint());
       ASSERT_TRUE(Put(std::move(keyframe)).has_value());
     } else if (kind <= 2) {
       const auto x_um = static_cast<std::int64_t>(random() % 3);
-      ASSERT_TRUE(Update({Moved(random() % keyframes, x_um, footprint())}).has_value());
+      ASSERT_TRUE(
+          Update({Moved(static_cast<std::uint32_t>(random() % keyframes), x_um, footprint())})
+              .has_value());
     } else {
       ASSERT_TRUE(Change(random() % 2 == 0 ? SessionAction::kRetract : SessionAction::kRestore)
                       .has_value());
