@@ -24,7 +24,7 @@ void BoundedChoice::KeepLatest(std::vector<SegmentView>& segments) {
   SmallStableSort(candidates_.begin(), candidates_.end(),
                   [&](const Candidate& a, const Candidate& b) {
                     return a.band != b.band ? a.band < b.band
-                                            : WasSeenEarlier(segments[b.index], segments[a.index]);
+                                            : IsPreferred(segments[a.index], segments[b.index]);
                   });
   counts_.assign(segments.size(), false);
   for (std::size_t begin = 0; begin < candidates_.size();) {
@@ -44,6 +44,10 @@ void BoundedChoice::KeepLatest(std::vector<SegmentView>& segments) {
   segments.resize(kept);
 }
 
+bool BoundedChoice::IsPreferred(const SegmentView& a, const SegmentView& b) {
+  return a.segment->is_strong != b.segment->is_strong ? a.segment->is_strong : WasSeenEarlier(b, a);
+}
+
 // Whether some band may hold more than `limit`: counted by its last bits, so that others may be
 // taken for it.
 bool BoundedChoice::MayExceed(std::uint32_t limit) const {
@@ -53,7 +57,7 @@ bool BoundedChoice::MayExceed(std::uint32_t limit) const {
   });
 }
 
-// `band` latest first; those that count come to stand at its front.
+// `band` in order of preference; those that count come to stand at its front.
 void BoundedChoice::ChooseOfBand(std::span<Candidate> band,
                                  const std::vector<SegmentView>& segments) {
   std::size_t chosen = 0;

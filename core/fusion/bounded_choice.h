@@ -1,5 +1,6 @@
 // Preset bounded: of each band of altitude in a cell, only the segments that were seen last count,
-// so that what a cell costs does not grow with the passes.
+// so that what a cell costs does not grow with the passes. Guesses never push out what was
+// measured.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +19,9 @@ class BoundedChoice {
   // `profile` must outlive the choice.
   explicit BoundedChoice(const MapProfile& profile) : profile_(profile) {}
 
-  // Removes what does not count: latest first, a segment counts while its band holds fewer than
-  // `band_segments`, and fewer than `band_vehicle_segments` of its vehicle. The order is kept.
+  // Removes what does not count: strong ones first and of each kind the latest, a segment counts
+  // while its band holds fewer than `band_segments`, and fewer than `band_vehicle_segments` of its
+  // vehicle. The order is kept.
   void KeepLatest(std::vector<SegmentView>& segments);
 
  private:
@@ -29,6 +31,7 @@ class BoundedChoice {
   };
 
   bool MayExceed(std::uint32_t limit) const;
+  static bool IsPreferred(const SegmentView& a, const SegmentView& b);
   void ChooseOfBand(std::span<Candidate> band, const std::vector<SegmentView>& segments);
 
   const MapProfile& profile_;

@@ -170,24 +170,26 @@ void PlainCell::AddColumn(const PlainObservation& observation, Segment& segment)
   }
 }
 
-// Preset bounded: in each band of altitude the stretches that saw it last, so many of a vehicle.
+// Preset bounded: in each band of altitude the stretches that saw it last, so many of a vehicle;
+// where they measured it before those that guessed.
 void PlainCell::KeepLatest() {
-  std::vector<Segment*> latest_first;
+  std::vector<Segment*> preferred_first;
   for (Segment& segment : segments_) {
     segment.is_kept = false;
-    latest_first.push_back(&segment);
+    preferred_first.push_back(&segment);
   }
   std::stable_sort(
-      latest_first.begin(), latest_first.end(), [](const Segment* a, const Segment* b) {
-        return std::tie(a->last->time_ms, a->last->key) > std::tie(b->last->time_ms, b->last->key);
+      preferred_first.begin(), preferred_first.end(), [](const Segment* a, const Segment* b) {
+        return std::tuple(a->representative->is_strong(), a->last->time_ms, a->last->key) >
+               std::tuple(b->representative->is_strong(), b->last->time_ms, b->last->key);
       });
   const auto band = [&](const Segment& s) {
     return FloorDiv(s.representative->altitude_mm, profile_.band_mm);
   };
-  for (Segment* segment : latest_first) {
+  for (Segment* segment : preferred_first) {
     int of_all = 0;
     int of_vehicle = 0;
-    for (const Segment* other : latest_first) {
+    for (const Segment* other : preferred_first) {
       if (other->is_kept && band(*other) == band(*segment)) {
         ++of_all;
         of_vehicle += other->first->key.session.vehicle == segment->first->key.session.vehicle;
