@@ -229,7 +229,7 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
   if (!counts) {
     return Error(counts.error());
   }
-  return ServiceStatus{*counts, fusion_.damage().size(), ResidentBytes()};
+  return ServiceStatus{*counts, fusion_.damage().size(), fusion_.tiles_built(), ResidentBytes()};
 }
 
 Result<std::uint64_t> AtlasService::ReadRevision() {

@@ -45,6 +45,7 @@ struct WaitOutcome {
 struct ServiceStatus {
   StoreCounts counts;
   std::uint64_t damaged_tiles = 0;  // dirty, and damage keeps them from being fused
+  std::uint64_t tiles_built = 0;    // of any level, since the service began
   std::uint64_t rss_bytes = 0;
 };
 

@@ -34,11 +34,13 @@ void ForSomeScans(std::size_t begin, std::size_t end, std::size_t wanted, const 
   }
 }
 
-Result<KeyframeBuilder> BuilderFor(const SimulatedDrive& drive,
-                                   std::size_t begin,
-                                   std::size_t end,
-                                   const MapProfile& profile,
-                                   double range_m) {
+}  // namespace
+
+Result<KeyframeBuilder> FindBuilder(const SimulatedDrive& drive,
+                                    std::size_t begin,
+                                    std::size_t end,
+                                    const MapProfile& profile,
+                                    double range_m) {
   SensorLayoutEstimator estimator;
   ForSomeScans(begin, end, kLayoutScans,
                [&](std::size_t i) { estimator.Add(CloudOf(drive.Scan(i))); });
@@ -58,7 +60,9 @@ Result<KeyframeBuilder> BuilderFor(const SimulatedDrive& drive,
   return KeyframeBuilder(profile, *layout, options);
 }
 
-}  // namespace
+Keyframe BuildKeyframe(const KeyframeBuilder& builder, const SimulatedDrive& drive, std::size_t i) {
+  return builder.Build(CloudOf(drive.Scan(i)), LevelOf(drive.sensor_pose(i)));
+}
 
 Result<std::vector<PlacedKeyframe>> BuildKeyframes(const SimulatedDrive& drive,
                                                    std::size_t begin,
@@ -66,7 +70,7 @@ Result<std::vector<PlacedKeyframe>> BuildKeyframes(const SimulatedDrive& drive,
                                                    const MapProfile& profile,
                                                    double range_m) {
   end = std::min(end, drive.scans());
-  const Result<KeyframeBuilder> builder = BuilderFor(drive, begin, end, profile, range_m);
+  const Result<KeyframeBuilder> builder = FindBuilder(drive, begin, end, profile, range_m);
   if (!builder) return Error(builder.error());
   std::vector<PlacedKeyframe> placed;
   int session = 1;
@@ -76,8 +80,7 @@ Result<std::vector<PlacedKeyframe>> BuildKeyframes(const SimulatedDrive& drive,
         (pose.translation() - drive.sensor_pose(i - 1).translation()).norm() > kSessionJump_m) {
       ++session;
     }
-    auto keyframe =
-        std::make_shared<const Keyframe>(builder->Build(CloudOf(drive.Scan(i)), LevelOf(pose)));
+    auto keyframe = std::make_shared<const Keyframe>(BuildKeyframe(*builder, drive, i));
     const auto placement = PlaceKeyframe(QuantizedPose::FromPose(pose), keyframe->level_quaternion);
     if (!placement) return Error(placement.error());
     const KeyframeKey key{{"car", StrCat("drive.", session)}, static_cast<std::uint32_t>(i)};

@@ -9,14 +9,23 @@
 #include "core/base/status.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/geometry/map_profile.h"
+#include "core/keyframe/keyframe_builder.h"
 #include "core/simulation/simulated_drive.h"
 #include "core/tile/tile.h"
 #include "tests/bench/accuracy/map_cell.h"
 
 namespace atlas::testing {
 
-// Scans [begin, end) as keyframes: rings, layout and sensor height are found as when a recorded
-// drive is ingested. A jump begins another session.
+// Rings, layout and sensor height are found in scans [begin, end) as when a recorded drive is
+// ingested.
+Result<KeyframeBuilder> FindBuilder(const SimulatedDrive& drive,
+                                    std::size_t begin,
+                                    std::size_t end,
+                                    const MapProfile& profile,
+                                    double range_m);
+Keyframe BuildKeyframe(const KeyframeBuilder& builder, const SimulatedDrive& drive, std::size_t i);
+
+// Scans [begin, end) as keyframes. A jump begins another session.
 Result<std::vector<PlacedKeyframe>> BuildKeyframes(const SimulatedDrive& drive,
                                                    std::size_t begin,
                                                    std::size_t end,

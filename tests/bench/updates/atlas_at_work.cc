@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <ctime>
+#include <future>
 #include <stdexcept>
 #include <utility>
 
@@ -36,7 +37,8 @@ std::filesystem::path NewDirectory() {
 
 }  // namespace
 
-AtlasAtWork::AtlasAtWork(const MapProfile& profile, unsigned workers) : directory_(NewDirectory()) {
+AtlasAtWork::AtlasAtWork(const MapProfile& profile, const FusionOptions& fusion)
+    : directory_(NewDirectory()), fusion_(fusion) {
   SqliteStoreOptions options;
   options.directory = directory_;
   options.new_profile = profile;
@@ -45,8 +47,12 @@ AtlasAtWork::AtlasAtWork(const MapProfile& profile, unsigned workers) : director
     throw std::runtime_error(store.error().message());
   }
   store_ = *std::move(store);
+  Start();
+}
+
+void AtlasAtWork::Start() {
   ServiceOptions service;
-  service.fusion.workers = workers;
+  service.fusion = fusion_;
   service_ = std::make_unique<AtlasService>(
       *store_, NowMs, [](LogLevel, const std::string&) {}, service);
 }
@@ -58,10 +64,25 @@ AtlasAtWork::~AtlasAtWork() {
   std::filesystem::remove_all(directory_, ignored);
 }
 
+class Meter {
+ public:
+  explicit Meter(std::uint64_t built) : built_(built) {}
+
+  UpdateCost Read(std::uint64_t tiles, std::uint64_t built) const {
+    const std::chrono::duration<double, std::milli> wall_ms =
+        std::chrono::steady_clock::now() - wall_;
+    return {CpuMs() - cpu_ms_, wall_ms.count(), tiles, built - built_};
+  }
+
+ private:
+  std::uint64_t built_;
+  double cpu_ms_ = CpuMs();
+  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+};
+
 template <typename T, typename Begin>
 Result<UpdateCost> AtlasAtWork::Measure(const Begin& begin) {
-  const double cpu_ms = CpuMs();
-  const auto wall = std::chrono::steady_clock::now();
+  const Meter meter(service_->ReadStatus()->tiles_built);
   const Result<T> accepted = Await<T>(begin);
   if (!accepted) {
     return Error(accepted.error());
@@ -70,8 +91,45 @@ Result<UpdateCost> AtlasAtWork::Measure(const Begin& begin) {
       !status.ok()) {
     return Error(std::move(status));
   }
-  const std::chrono::duration<double, std::milli> wall_ms = std::chrono::steady_clock::now() - wall;
-  return UpdateCost{CpuMs() - cpu_ms, wall_ms.count(), accepted->tiles_marked};
+  return meter.Read(accepted->tiles_marked, service_->ReadStatus()->tiles_built);
+}
+
+Result<UpdateCost> AtlasAtWork::UploadAll(std::vector<UploadRequest> requests) {
+  const Meter meter(service_->ReadStatus()->tiles_built);
+  std::vector<std::future<Result<PutKeyframeResult>>> accepted;
+  for (UploadRequest& request : requests) {
+    accepted.push_back(Begin<PutKeyframeResult>(
+        [&](auto done) { service_->Upload(std::move(request), std::move(done)); }));
+  }
+  std::uint64_t tiles = 0;
+  for (auto& upload : accepted) {
+    const auto result = upload.get();
+    if (!result) {
+      return Error(result.error());
+    }
+    tiles += result->tiles_marked;
+  }
+  const auto clean = service_->WaitUntilClean({kPatience, {}});
+  if (!clean) {
+    return Error(clean.error());
+  }
+  return meter.Read(tiles, service_->ReadStatus()->tiles_built);
+}
+
+Result<UpdateCost> AtlasAtWork::BuildCold(const std::vector<TileId>& tiles) {
+  service_.reset();
+  const auto marked =
+      Await<std::uint32_t>([&](auto done) { store_->MarkDirty(tiles, std::move(done)); });
+  if (!marked) {
+    return Error(marked.error());
+  }
+  const Meter meter(0);
+  Start();
+  const auto clean = service_->WaitUntilClean({kPatience, {}});
+  if (!clean) {
+    return Error(clean.error());
+  }
+  return meter.Read(tiles.size(), service_->ReadStatus()->tiles_built);
 }
 
 Result<UpdateCost> AtlasAtWork::Upload(UploadRequest request) {

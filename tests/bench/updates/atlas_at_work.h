@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "core/base/status.h"
 #include "server/service/atlas_service.h"
@@ -12,15 +13,16 @@
 namespace atlas::testing {
 
 struct UpdateCost {
-  double cpu_ms = 0;   // of the whole process
-  double wall_ms = 0;  // from the request to the fused tiles
-  std::uint64_t tiles = 0;
+  double cpu_ms = 0;        // of the whole process
+  double wall_ms = 0;       // from the request to the fused tiles
+  std::uint64_t tiles = 0;  // of level 0 that were marked
+  std::uint64_t built = 0;  // tiles of any level
 };
 
 class AtlasAtWork {
  public:
   // Throws where the machine cannot do it.
-  AtlasAtWork(const MapProfile& profile, unsigned workers);
+  AtlasAtWork(const MapProfile& profile, const FusionOptions& fusion);
   AtlasAtWork(const AtlasAtWork&) = delete;
   AtlasAtWork& operator=(const AtlasAtWork&) = delete;
   ~AtlasAtWork();
@@ -28,14 +30,21 @@ class AtlasAtWork {
   // Until it is in the tiles.
   Result<UpdateCost> Upload(UploadRequest request);
   Result<UpdateCost> UpdatePoses(PoseBatchRequest request);
+  // All at once.
+  Result<UpdateCost> UploadAll(std::vector<UploadRequest> requests);
+  // Builds tiles again after a restart: nothing is kept, what they are made of is not cached.
+  Result<UpdateCost> BuildCold(const std::vector<TileId>& tiles);
 
+  AtlasStore& store() { return *store_; }
   AtlasService& service() { return *service_; }
 
  private:
   template <typename T, typename Begin>
   Result<UpdateCost> Measure(const Begin& begin);
+  void Start();
 
   std::filesystem::path directory_;
+  FusionOptions fusion_;
   std::unique_ptr<AtlasStore> store_;
   std::unique_ptr<AtlasService> service_;
 };

@@ -1,6 +1,6 @@
 // What a new keyframe costs in the first, second, ... pass over the same place, from the upload to
 // the fused tiles, one at a time with one worker: one JSON line a pass.
-// Usage: passes_bench WORLD PRESET PASSES
+// Usage: passes_bench WORLD PRESET PASSES [VEHICLES]; with several they take turns
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -9,16 +9,13 @@
 #include <vector>
 
 #include "core/base/str_cat.h"
-#include "core/keyframe/keyframe_codec.h"
-#include "server/service/process_memory.h"
-#include "tests/bench/accuracy/bench_drive.h"
-#include "tests/bench/accuracy/drive_map.h"
+#include "core/simulation/worlds/simulated_world.h"
 #include "tests/bench/updates/atlas_at_work.h"
+#include "tests/bench/updates/drive_uploads.h"
 
 namespace atlas::testing {
 namespace {
 
-constexpr double kRange_m = 20.0;
 constexpr std::int64_t kPass_ms = 3'600'000;
 
 double Quantile(std::vector<double> values, double q) {
@@ -27,29 +24,26 @@ double Quantile(std::vector<double> values, double q) {
 }
 
 // Every pass with its own noise and lane.
-Result<std::vector<UploadRequest>> DrivePass(WorldKind world, int pass, const MapProfile& profile) {
+Result<std::vector<UploadRequest>> DrivePass(WorldKind world,
+                                             int pass,
+                                             int vehicles,
+                                             const MapProfile& profile) {
   Result<SimulatedWorld> made = MakeWorld(world);
   if (!made) return Error(made.error());
   DriveOptions options;
   options.seed = 2 * static_cast<std::uint64_t>(pass);  // even: all in one direction
   const auto drive = SimulatedDrive::Create(*std::move(made), options);
   if (!drive) return Error(drive.error());
-  const auto keyframes = BuildKeyframes(*drive, 0, drive->scans(), profile, kRange_m);
-  if (!keyframes) return Error(keyframes.error());
-  std::vector<UploadRequest> requests;
-  for (const PlacedKeyframe& k : *keyframes) {
-    UploadRequest request;
-    request.key = {{"car", StrCat("pass.", pass, ".", k.key.session.session)}, k.key.sequence};
-    request.time_ms = pass * kPass_ms + k.time_ms;
-    request.pose = QuantizedPose::FromPose(drive->sensor_pose(k.key.sequence));
-    request.blob = EncodeKeyframe(*k.keyframe);
-    requests.push_back(std::move(request));
-  }
-  return requests;
+  UploadOptions upload;
+  upload.vehicle = vehicles == 1 ? "car" : StrCat("car.", pass % vehicles);
+  upload.session = StrCat("pass.", pass);
+  upload.start_ms = pass * kPass_ms;
+  return MakeUploads(*drive, profile, upload);
 }
 
-Status RunPass(AtlasAtWork& atlas, WorldKind world, int pass, const MapProfile& profile) {
-  auto requests = DrivePass(world, pass, profile);
+Status RunPass(
+    AtlasAtWork& atlas, WorldKind world, int pass, int vehicles, const MapProfile& profile) {
+  auto requests = DrivePass(world, pass, vehicles, profile);
   if (!requests) return requests.error();
   std::vector<double> cpu_ms;
   std::vector<double> wall_ms;
@@ -79,18 +73,19 @@ Status RunPass(AtlasAtWork& atlas, WorldKind world, int pass, const MapProfile& 
   return {};
 }
 
-int Run(const std::string& world_name, const std::string& preset_name, int passes) {
+int Run(const std::string& world_name, const std::string& preset_name, int passes, int vehicles) {
   const auto world = WorldKindByName(world_name);
   const auto preset = FusionPresetByName(preset_name);
-  if (!world || !preset || passes < 1) {
-    std::cerr << "usage: passes_bench street|overpass|garage strict|bounded|paper PASSES\n";
+  if (!world || !preset || passes < 1 || vehicles < 1) {
+    std::cerr << "usage: passes_bench street|overpass|garage strict|bounded|paper PASSES "
+                 "[VEHICLES]\n";
     return 2;
   }
   MapProfile profile;
   profile.preset = *preset;
-  AtlasAtWork atlas(profile, 1);
+  AtlasAtWork atlas(profile, {});
   for (int pass = 1; pass <= passes; ++pass) {
-    if (const Status status = RunPass(atlas, *world, pass, profile); !status.ok()) {
+    if (const Status status = RunPass(atlas, *world, pass, vehicles, profile); !status.ok()) {
       std::cerr << "pass " << pass << ": " << status.message() << "\n";
       return 1;
     }
@@ -103,8 +98,9 @@ int Run(const std::string& world_name, const std::string& preset_name, int passe
 
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() != 3) {
-    return atlas::testing::Run("", "", 0);
+  if (arguments.size() < 3) {
+    return atlas::testing::Run("", "", 0, 0);
   }
-  return atlas::testing::Run(arguments[0], arguments[1], std::atoi(arguments[2].c_str()));
+  const int vehicles = arguments.size() > 3 ? std::atoi(arguments[3].c_str()) : 1;
+  return atlas::testing::Run(arguments[0], arguments[1], std::atoi(arguments[2].c_str()), vehicles);
 }
