@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Runs the benchmarks named (all, if none) and prints one JSON line a figure:
 # {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion] [accuracy] [curbs]
-# All but fusion and accuracy need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the meshes there too.
-# curbs prints a line a threshold instead, and draws docs/images/curbs.png.
+#   [speed] [closure] [online] [passes] [scaling]
+# All but fusion, accuracy, online, passes and scaling need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the
+# meshes there too. curbs prints a line a threshold instead. curbs, online and passes draw docs/images/*.png.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"

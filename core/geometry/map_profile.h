@@ -65,7 +65,7 @@ struct MapProfile {
   // Preset bounded: of each cell and band of altitude, the segments that were seen last.
   std::uint16_t band_mm = 2'000;
   std::uint8_t band_segments = 8;
-  std::uint8_t band_vehicle_segments = 2;  // of one vehicle
+  std::uint8_t band_vehicle_segments = 3;  // of one vehicle
 
   // Evidence in units of ln(9)/64, so that +-64 is the probability 0.9 / 0.1 that a nibble ends at.
   std::int16_t hit_units = 25;       // p = 0.7

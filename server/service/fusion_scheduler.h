@@ -7,6 +7,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -48,6 +49,7 @@ class FusionScheduler {
   // Finishes the tiles at hand, gives the other leases back and joins the threads.
   void Stop();
   std::uint64_t tiles_built() const { return tiles_built_; }
+  std::size_t kept_bytes() const { return refresher_.kept_bytes(); }
   // Tiles that damage keeps from being fused.
   const DamageList& damage() const { return damage_; }
 

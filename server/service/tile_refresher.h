@@ -33,6 +33,9 @@ class TileRefresher {
   // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's.
   void Build(std::span<const TileId> ids, const OnBuilt& on_built);
 
+  // What is kept from one time to the next.
+  std::size_t kept_bytes() const { return surveys_.bytes(); }
+
  private:
   // A level-0 tile under way.
   struct Job {

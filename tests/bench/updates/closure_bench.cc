@@ -1,14 +1,13 @@
 // What a loop closure costs: 500 keyframes corrected by 0.1 to 1 m in one batch, against building
 // the tiles that it touches from nothing; one JSON line a case.
-//   all moved: a drive of 500 keyframes, every one of them corrected
-//   one pass of four: the same way driven four times, the last pass corrected
+//   all_moved: a drive of 500 keyframes, every one of them corrected
+//   one_pass_of_four: the same way driven four times, the last pass corrected
 //   drive: in the middle of the whole drive, while a vehicle uploads and others ask for the map
-// Usage: closure_bench TRAJECTORY [--passes-only]
+// Usage: closure_bench TRAJECTORY [CASE ...]
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <iostream>
 #include <set>
 #include <string>
@@ -157,7 +156,11 @@ class Traffic {
       RegionRequest request;
       request.disc = RegionDisc{pose.x_um, pose.y_um, 20'000'000};
       const auto begin = Clock::now();
-      auto query = service_.Query(request, {});
+      RegionQuery::Options options;
+      options.tile_cost = [](const StoredTile& tile) {
+        return tile.blob.size();
+      };
+      auto query = service_.Query(request, std::move(options));
       bool is_good = query.has_value();
       while (is_good) {
         const auto tile = service_.NextTile(*query);
@@ -209,7 +212,10 @@ Status MeasureDrive(std::vector<UploadRequest> uploads,
   return {};
 }
 
-Status Run(const std::string& path, bool passes_only) {
+Status Run(const std::string& path, const std::set<std::string>& cases) {
+  const auto is_asked = [&](const char* name) {
+    return cases.empty() || cases.contains(name);
+  };
   const auto poses = ReadPoses(path);
   if (!poses) return poses.error();
   const auto trajectory = PlanTrajectory(*poses, {.every_m = 1.0});
@@ -230,19 +236,22 @@ Status Run(const std::string& path, bool passes_only) {
   for (int pass = 0; pass < 4; ++pass) {
     auto uploads = drive_uploads(pass, kCorrected);
     if (!uploads) return uploads.error();
-    if (pass == 0) {
-      ATLAS_RETURN_IF_ERROR(MeasureCase("all moved", *uploads, profile));
-    }
     std::move(uploads->begin(), uploads->end(), std::back_inserter(four));
   }
-  std::vector<UploadRequest> others(four.end() - kCorrected, four.end());
-  ATLAS_RETURN_IF_ERROR(MeasureCase("one pass of four", std::move(four), profile));
-  if (passes_only) {
+  const std::vector<UploadRequest> first(four.begin(), four.begin() + kCorrected);
+  const std::vector<UploadRequest> last(four.end() - kCorrected, four.end());
+  if (is_asked("all_moved")) {
+    ATLAS_RETURN_IF_ERROR(MeasureCase("all_moved", first, profile));
+  }
+  if (is_asked("one_pass_of_four")) {
+    ATLAS_RETURN_IF_ERROR(MeasureCase("one_pass_of_four", std::move(four), profile));
+  }
+  if (!is_asked("drive")) {
     return {};
   }
   auto uploads = drive_uploads(0, SIZE_MAX);
   if (!uploads) return uploads.error();
-  return MeasureDrive(*std::move(uploads), std::move(others), profile);
+  return MeasureDrive(*std::move(uploads), last, profile);
 }
 
 }  // namespace
@@ -250,11 +259,11 @@ Status Run(const std::string& path, bool passes_only) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: closure_bench TRAJECTORY [--passes-only]\n";
+    std::cerr << "usage: closure_bench TRAJECTORY [all_moved] [one_pass_of_four] [drive]\n";
     return 2;
   }
-  const bool passes_only = argc > 2 && std::strcmp(argv[2], "--passes-only") == 0;
-  if (const atlas::Status status = atlas::testing::Run(argv[1], passes_only); !status.ok()) {
+  const std::set<std::string> cases(argv + 2, argv + argc);
+  if (const atlas::Status status = atlas::testing::Run(argv[1], cases); !status.ok()) {
     std::cerr << "closure_bench: " << status.message() << "\n";
     return 1;
   }

@@ -69,6 +69,7 @@ Status RunPass(
             << ", \"keyframe_bytes\": " << status->counts.keyframe_bytes
             << ", \"tile_bytes\": " << status->counts.tile_bytes
             << ", \"store_bytes\": " << status->counts.store_bytes
+            << ", \"kept_bytes\": " << status->kept_bytes
             << ", \"rss_bytes\": " << status->rss_bytes << "}" << std::endl;
   return {};
 }

@@ -1,0 +1,135 @@
+"""The benchmarks of deploy/bench.sh on what a change costs: fusion against its oracle, loop closures,
+online updates, passes over the same place, growth with the map. Docs/results.md, "Updates"."""
+
+import json
+import pathlib
+import subprocess
+import sys
+
+IMAGES = pathlib.Path(__file__).parent.parent / "docs/images"
+WORLDS = ("street", "overpass", "garage")
+
+
+def rows_of(*command):
+    """Each JSON line as it comes."""
+    process = subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, text=True)
+    for line in process.stdout:
+        yield json.loads(line)
+    if process.wait():
+        sys.exit(process.returncode)
+
+
+def bench_speed(bin_dir, emit, drive):
+    """Cell-observations a second on one core: from nothing and from what is kept, against the oracle."""
+    for row in rows_of(bin_dir / "speed_bench", *WORLDS, drive("kitti_0005")):
+        name = f"speed.{row['drive']}"
+        plain = row["plain_M_per_s"]
+        emit(name + ".oracle", plain, "M cell-observations/s", "goal", 15.0)
+        emit(name + ".cold", row["cold_M_per_s"], "M cell-observations/s", "the oracle, asked 1.4", plain)
+        emit(name + ".kept", row["kept_M_per_s"], "M cell-observations/s", "the oracle, asked 2.5", plain)
+        emit(name + ".kept_bytes", row["surveys_bytes"] / 2**20, "MiB, largest tile", "none", None)
+
+
+def bench_closure(bin_dir, emit, drive):
+    """500 keyframes corrected in one batch, against building the tiles that they touch from nothing."""
+    asked = {"all_moved": 1.1, "one_pass_of_four": 0.5, "drive": None}
+    for row in rows_of(bin_dir / "closure_bench", drive("kitti_trajectories") / "00.txt"):
+        name = "closure." + row["case"]
+        goal = asked[row["case"]]
+        emit(name + ".cpu", row["cpu_s"], "s",
+             "building these tiles anew" + (f", asked {goal}" if goal else ""), row["cold_cpu_s"])
+        emit(name + ".tiles_marked", row["tiles_marked"], "tiles", "footprints", row["tiles_expected"])
+        emit(name + ".built", row["built"], "tiles", "footprints and ancestors", row["with_ancestors"])
+        if "queries" in row:
+            emit(name + ".query_p99", row["query_ms_p99"], f"ms, of {row['queries']} meanwhile", "none", None)
+            emit(name + ".acknowledged_max", row["acknowledged_ms_max"],
+                 f"ms, of {row['uploads']} uploads meanwhile", "none", None)
+            emit(name + ".failed", row["failed"], "requests", "none", None)
+
+
+def bench_online(bin_dir, emit, _):
+    """Four vehicles, a keyframe a second each; draws docs/images/update_time.png."""
+    curves = {}
+    for world in WORLDS:
+        for range_m in (20, 30):
+            *arrivals, total = rows_of(bin_dir / "online_bench", world, range_m, 60)
+            name = f"online.{world}.{range_m}m"
+            emit(name + ".served_p50", total["served_ms_p50"], "ms", "none", None)
+            emit(name + ".served_p99", total["served_ms_p99"], "ms", "goal", 1000.0)
+            emit(name + ".acknowledged_p99", total["acknowledged_ms_p99"], "ms", "none", None)
+            curves[world, range_m] = sorted((a["at_s"], a["served_ms"]) for a in arrivals)
+    draw_online(curves, IMAGES / "update_time.png")
+
+
+def bench_passes(bin_dir, emit, _):
+    """The garage again and again; draws docs/images/passes.png."""
+    curves = {}
+    for name, preset, vehicles in (("bounded", "bounded", 1), ("bounded_fleet", "bounded", 10),
+                                   ("strict", "strict", 1)):
+        curves[name] = list(rows_of(bin_dir / "passes_bench", "garage", preset, 10, vehicles))
+        second, tenth = curves[name][1], curves[name][-1]
+        goal = ", asked 1.3" if name == "bounded" else ""
+        emit(f"passes.{name}.tenth", tenth["cpu_ms"], "ms CPU a keyframe", "the second pass" + goal,
+             second["cpu_ms"])
+        for what in ("kept", "store", "tile"):
+            emit(f"passes.{name}.{what}_bytes", tenth[what + "_bytes"] / 2**20, "MiB", "the second pass",
+                 second[what + "_bytes"] / 2**20)
+    draw_passes(curves, IMAGES / "passes.png")
+
+
+def bench_scaling(bin_dir, emit, _):
+    """Ten keyframes corrected, in maps of 100, 1,000 and 10,000."""
+    first = None
+    for keyframes in (100, 1000, 10000):
+        row, = rows_of(bin_dir / "scaling_bench", keyframes)
+        first = first or row
+        for what, unit in (("cpu_ms_p50", "ms CPU an update"), ("tiles_per_update", "tiles"),
+                           ("peak_mb", "MiB"), ("store_mb", "MiB")):
+            emit(f"scaling.{keyframes}.{what}", row[what], unit, "100 keyframes", first[what])
+
+
+def new_plot(columns):
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    return pyplot.subplots(1, columns, figsize=(12, 3.8))
+
+
+def draw_online(curves, path):
+    figure, axes = new_plot(len(WORLDS))
+    for axis, world in zip(axes, WORLDS):
+        for range_m, color in ((20, "tab:blue"), (30, "tab:orange")):
+            points = curves[world, range_m]
+            axis.plot([at_s for at_s, _ in points], [ms for _, ms in points], ".", markersize=3, color=color,
+                      label=f"{range_m} m")
+        axis.axhline(1000, color="tab:red", linewidth=0.8, linestyle="--")
+        axis.set_yscale("log")
+        axis.set_ylim(10, 3000)
+        axis.set_title(world, fontsize=10)
+        axis.set_xlabel("time, s")
+        axis.grid(alpha=0.3, which="both")
+    axes[0].set_ylabel("acknowledged to served, ms")
+    axes[0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def draw_passes(curves, path):
+    figure, axes = new_plot(3)
+    figures = (("cpu_ms", 1.0, "CPU ms a keyframe"), ("kept_bytes", 2**-20, "kept surveys, MiB"),
+               ("store_bytes", 2**-20, "store, MiB"))
+    for axis, (key, scale, title) in zip(axes, figures):
+        for name, rows in curves.items():
+            axis.plot([row["pass"] for row in rows], [scale * row[key] for row in rows], "-o", markersize=3,
+                      label=name.replace("_", ", "))
+        axis.set_ylim(bottom=0)
+        axis.set_title(title, fontsize=10)
+        axis.set_xlabel("pass through the garage")
+        axis.grid(alpha=0.3)
+    axes[0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+BENCHMARKS = {"speed": bench_speed, "closure": bench_closure, "online": bench_online,
+              "passes": bench_passes, "scaling": bench_scaling}

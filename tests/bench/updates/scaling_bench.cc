@@ -1,0 +1,114 @@
+// How the cost of a pose update and the memory grow with the map: keyframes one a metre along a
+// winding way that comes back to where it was after 500 m, and batches of ten corrected ones. One
+// JSON line.
+// Usage: scaling_bench KEYFRAMES
+// The worlds of the keyframes are drawn (tests/core/support/keyframe_worlds.h), not simulated: what
+// they hold does not matter here, and ten thousand of them would take a while.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <sys/resource.h>
+
+#include "core/base/str_cat.h"
+#include "core/keyframe/keyframe_codec.h"
+#include "tests/bench/updates/atlas_at_work.h"
+#include "tests/core/support/keyframe_worlds.h"
+
+namespace atlas::testing {
+namespace {
+
+constexpr std::int32_t kRadiusCells = 200;
+constexpr std::uint32_t kWorlds = 50;  // that differ
+constexpr std::uint32_t kCorrected = 10;
+constexpr std::uint32_t kUpdates = 20;
+constexpr double kRow_m = 500.0;  // of a way to and fro, 3 m beside the last one each time
+
+// Rows of 500 keyframes, two passes of each row, then on to another place 100 m away.
+QuantizedPose PoseOf(std::uint32_t i, double shift_m) {
+  const double along_m = i % static_cast<std::uint32_t>(kRow_m);
+  const std::uint32_t row = i / static_cast<std::uint32_t>(kRow_m);
+  const double x_m = row % 2 == 0 ? along_m : kRow_m - along_m;
+  const double y_m = 100.0 * (row / 2) + 3.0 * (row % 2);
+  Pose T_world_sensor = Pose::Identity();
+  T_world_sensor.translation() = Eigen::Vector3d(x_m, y_m + shift_m, 1.8);
+  return QuantizedPose::FromPose(T_world_sensor);
+}
+
+KeyframeKey KeyOf(std::uint32_t i) {
+  return {{"car", StrCat("row.", i / static_cast<std::uint32_t>(kRow_m))}, i};
+}
+
+double PeakMegabytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+Status Fill(AtlasAtWork& atlas, const MapProfile& profile, std::uint32_t keyframes) {
+  std::vector<Bytes> blobs;
+  for (std::uint32_t i = 0; i < kWorlds; ++i) {
+    blobs.push_back(EncodeKeyframe(StreetKeyframe(profile, kRadiusCells, i)));
+  }
+  for (std::uint32_t begin = 0; begin < keyframes; begin += 100) {
+    std::vector<UploadRequest> uploads;
+    for (std::uint32_t i = begin; i < std::min(begin + 100, keyframes); ++i) {
+      uploads.push_back({KeyOf(i), 1000 * std::int64_t{i}, PoseOf(i, 0.0), {}, blobs[i % kWorlds]});
+    }
+    const auto done = atlas.UploadAll(std::move(uploads));
+    if (!done) return done.error();
+  }
+  return {};
+}
+
+Status Run(std::uint32_t keyframes) {
+  const MapProfile profile;
+  AtlasAtWork atlas(profile, {});
+  ATLAS_RETURN_IF_ERROR(Fill(atlas, profile, keyframes));
+  const double filled_mb = PeakMegabytes();
+  std::vector<double> cpu_ms;
+  double tiles = 0;
+  for (std::uint32_t update = 0; update < kUpdates; ++update) {
+    PoseBatchRequest batch;
+    batch.author = "scaling_bench";
+    const std::uint32_t first = (keyframes - kCorrected) * update / kUpdates;  // all over the map
+    for (std::uint32_t i = first; i < first + kCorrected; ++i) {
+      batch.updates.push_back({KeyOf(i), PoseOf(i, 0.3)});
+    }
+    const auto cost = atlas.UpdatePoses(std::move(batch));
+    if (!cost) return cost.error();
+    cpu_ms.push_back(cost->cpu_ms);
+    tiles += static_cast<double>(cost->tiles);
+  }
+  std::sort(cpu_ms.begin(), cpu_ms.end());
+  const auto status = atlas.service().ReadStatus();
+  if (!status) return status.error();
+  std::cout << "{\"keyframes\": " << keyframes << ", \"tiles\": " << status->counts.tiles
+            << ", \"tiles_per_update\": " << tiles / kUpdates
+            << ", \"cpu_ms_p50\": " << cpu_ms[cpu_ms.size() / 2]
+            << ", \"cpu_ms_max\": " << cpu_ms.back() << ", \"peak_mb_filled\": " << filled_mb
+            << ", \"peak_mb\": " << PeakMegabytes()
+            << ", \"store_mb\": " << static_cast<double>(status->counts.store_bytes) / 1048576.0
+            << "}" << std::endl;
+  return {};
+}
+
+}  // namespace
+}  // namespace atlas::testing
+
+int main(int argc, char** argv) {
+  const int keyframes = argc == 2 ? std::atoi(argv[1]) : 0;
+  if (keyframes < 20) {
+    std::cerr << "usage: scaling_bench KEYFRAMES (20 or more)\n";
+    return 2;
+  }
+  const auto status = atlas::testing::Run(static_cast<std::uint32_t>(keyframes));
+  if (!status.ok()) {
+    std::cerr << "scaling_bench: " << status.message() << "\n";
+    return 1;
+  }
+  return 0;
+}
