@@ -14,11 +14,8 @@ void BoundedChoice::KeepLatest(std::vector<SegmentView>& segments) {
   if (segments.size() <= limit) {
     return;
   }
-  candidates_.clear();
-  for (std::uint32_t i = 0; i < segments.size(); ++i) {
-    candidates_.push_back({FloorDiv(segments[i].segment->altitude_mm, profile_.band_mm), i});
-  }
-  if (!MayExceed(limit)) {
+  FindCandidates(segments, limit);
+  if (candidates_.empty()) {
     return;
   }
   SmallStableSort(candidates_.begin(), candidates_.end(),
@@ -26,7 +23,10 @@ void BoundedChoice::KeepLatest(std::vector<SegmentView>& segments) {
                     return a.band != b.band ? a.band < b.band
                                             : IsPreferred(segments[a.index], segments[b.index]);
                   });
-  counts_.assign(segments.size(), false);
+  counts_.assign(segments.size(), true);
+  for (const Candidate& candidate : candidates_) {
+    counts_[candidate.index] = false;
+  }
   for (std::size_t begin = 0; begin < candidates_.size();) {
     std::size_t end = begin;
     while (end < candidates_.size() && candidates_[end].band == candidates_[begin].band) {
@@ -48,12 +48,17 @@ bool BoundedChoice::IsPreferred(const SegmentView& a, const SegmentView& b) {
   return a.segment->is_strong != b.segment->is_strong ? a.segment->is_strong : WasSeenEarlier(b, a);
 }
 
-// Whether some band may hold more than `limit`: counted by its last bits, so that others may be
-// taken for it.
-bool BoundedChoice::MayExceed(std::uint32_t limit) const {
+// The segments of bands that may hold more than `limit`: counted by their last bits, so that others
+// may be taken for them.
+void BoundedChoice::FindCandidates(const std::vector<SegmentView>& segments, std::uint32_t limit) {
   std::array<std::uint32_t, 64> counts{};
-  return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
-    return ++counts[static_cast<std::size_t>(c.band) % counts.size()] > limit;
+  candidates_.clear();
+  for (std::uint32_t i = 0; i < segments.size(); ++i) {
+    candidates_.push_back({FloorDiv(segments[i].segment->altitude_mm, profile_.band_mm), i});
+    ++counts[static_cast<std::size_t>(candidates_.back().band) % counts.size()];
+  }
+  std::erase_if(candidates_, [&](const Candidate& c) {
+    return counts[static_cast<std::size_t>(c.band) % counts.size()] <= limit;
   });
 }
 

@@ -30,7 +30,7 @@ class BoundedChoice {
     std::uint32_t index = 0;
   };
 
-  bool MayExceed(std::uint32_t limit) const;
+  void FindCandidates(const std::vector<SegmentView>& segments, std::uint32_t limit);
   static bool IsPreferred(const SegmentView& a, const SegmentView& b);
   void ChooseOfBand(std::span<Candidate> band, const std::vector<SegmentView>& segments);
 
