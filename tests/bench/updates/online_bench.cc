@@ -16,6 +16,7 @@
 #include "server/store/await.h"
 #include "tests/bench/updates/atlas_at_work.h"
 #include "tests/bench/updates/drive_uploads.h"
+#include "tests/bench/updates/quantile.h"
 
 namespace atlas::testing {
 namespace {
@@ -107,11 +108,6 @@ class Fleet {
   std::vector<Arrival> arrivals_;
   Status status_;
 };
-
-double Quantile(std::vector<double> values, double q) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-}
 
 void Print(const std::string& world, double range_m, const std::vector<Arrival>& arrivals) {
   std::vector<double> served_ms;

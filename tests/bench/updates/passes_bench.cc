@@ -12,16 +12,12 @@
 #include "core/simulation/worlds/simulated_world.h"
 #include "tests/bench/updates/atlas_at_work.h"
 #include "tests/bench/updates/drive_uploads.h"
+#include "tests/bench/updates/quantile.h"
 
 namespace atlas::testing {
 namespace {
 
 constexpr std::int64_t kPass_ms = 3'600'000;
-
-double Quantile(std::vector<double> values, double q) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-}
 
 // Every pass with its own noise and lane.
 Result<std::vector<UploadRequest>> DrivePass(WorldKind world,

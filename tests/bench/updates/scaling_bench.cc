@@ -16,6 +16,7 @@
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_codec.h"
 #include "tests/bench/updates/atlas_at_work.h"
+#include "tests/bench/updates/quantile.h"
 #include "tests/core/support/keyframe_worlds.h"
 
 namespace atlas::testing {
@@ -83,14 +84,13 @@ Status Run(std::uint32_t keyframes) {
     cpu_ms.push_back(cost->cpu_ms);
     tiles += static_cast<double>(cost->tiles);
   }
-  std::sort(cpu_ms.begin(), cpu_ms.end());
   const auto status = atlas.service().ReadStatus();
   if (!status) return status.error();
   std::cout << "{\"keyframes\": " << keyframes << ", \"tiles\": " << status->counts.tiles
             << ", \"tiles_per_update\": " << tiles / kUpdates
-            << ", \"cpu_ms_p50\": " << cpu_ms[cpu_ms.size() / 2]
-            << ", \"cpu_ms_max\": " << cpu_ms.back() << ", \"peak_mb_filled\": " << filled_mb
-            << ", \"peak_mb\": " << PeakMegabytes()
+            << ", \"cpu_ms_p50\": " << Quantile(cpu_ms, 0.5)
+            << ", \"cpu_ms_max\": " << Quantile(cpu_ms, 1.0)
+            << ", \"peak_mb_filled\": " << filled_mb << ", \"peak_mb\": " << PeakMegabytes()
             << ", \"store_mb\": " << static_cast<double>(status->counts.store_bytes) / 1048576.0
             << "}" << std::endl;
   return {};

@@ -15,6 +15,7 @@
 #include "core/fusion/tile_surveys.h"
 #include "tests/bench/accuracy/bench_drive.h"
 #include "tests/bench/accuracy/drive_map.h"
+#include "tests/bench/updates/quantile.h"
 #include "tests/bench/updates/recorded_keyframes.h"
 #include "tests/core/fusion/oracle/plain_fusion.h"
 
@@ -34,11 +35,6 @@ double Measure(const Work& work) {
   const double begin_s = CpuSeconds();
   work();
   return CpuSeconds() - begin_s;
-}
-
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
 }
 
 // A tile's keyframes, and what is kept of it.
@@ -151,10 +147,10 @@ Status Run(const std::string& name) {
   std::cout << "{\"drive\": \"" << std::filesystem::path(name).filename().string()
             << "\", \"keyframes\": " << keyframes->size() << ", \"tiles\": " << bench.tiles()
             << ", \"observations\": " << bench.observations()
-            << ", \"plain_M_per_s\": " << millions / Median(plain_s)
-            << ", \"batch_M_per_s\": " << millions / Median(batch_s)
-            << ", \"cold_M_per_s\": " << millions / Median(cold_s)
-            << ", \"kept_M_per_s\": " << millions / Median(kept_s)
+            << ", \"plain_M_per_s\": " << millions / Quantile(plain_s, 0.5)
+            << ", \"batch_M_per_s\": " << millions / Quantile(batch_s, 0.5)
+            << ", \"cold_M_per_s\": " << millions / Quantile(cold_s, 0.5)
+            << ", \"kept_M_per_s\": " << millions / Quantile(kept_s, 0.5)
             << ", \"surveys_bytes\": " << bench.surveys_bytes() << "}" << std::endl;
   return {};
 }
