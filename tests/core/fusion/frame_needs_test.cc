@@ -39,8 +39,8 @@ MapProfile Bounded() {
 
 class Needs {
  public:
-  Needs(std::vector<PlacedKeyframe> keyframes, MapProfile profile)
-      : keyframes_(std::move(keyframes)), profile_(std::move(profile)) {}
+  Needs(std::vector<PlacedKeyframe> keyframes, const MapProfile& profile)
+      : keyframes_(std::move(keyframes)), profile_(profile) {}
 
   Indices Of(const std::function<bool(std::size_t)>& is_asked, std::size_t max_bytes = kMuch) {
     std::vector<FrameOnMap> frames;
