@@ -98,6 +98,7 @@ AtlasStatus StatusFromWire(const wire::StatusReply& reply) {
   status.cells = reply.cells();
   status.multilayer_cells = reply.multilayer_cells();
   status.rss_bytes = reply.rss_bytes();
+  status.compacted = reply.compacted();
   return status;
 }
 
@@ -110,6 +111,7 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   session.first_time_ms = info.first_time_ms();
   session.last_time_ms = info.last_time_ms();
   session.last_sequence = info.last_sequence();
+  session.compacted = info.compacted();
   return session;
 }
 
@@ -249,6 +251,21 @@ Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,
   const wire::DigestReply& done = reply->digest_reply();
   const ByteSpan sha256 = BytesFromWire(done.sha256());
   return DigestSummary{Bytes(sha256.begin(), sha256.end()), done.tiles(), done.revision()};
+}
+
+Result<CompactionSummary> AtlasClient::Compact(std::int64_t before_ms,
+                                               const std::string& author,
+                                               milliseconds timeout) {
+  wire::Envelope request;
+  wire::CompactRequest& compact = *request.mutable_compact_request();
+  compact.set_before_ms(before_ms);
+  compact.set_author(author);
+  compact.set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel_->Call(request, Body::kCompactReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::CompactReply& done = reply->compact_reply();
+  return CompactionSummary{done.dropped(), done.bytes(), done.tiles_checked(), done.horizon(),
+                           done.revision()};
 }
 
 Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout) {

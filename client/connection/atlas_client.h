@@ -63,6 +63,11 @@ class AtlasClient {
   // which is fused again meanwhile; kUnsupported when the daemon is too old for that.
   Result<DigestSummary> Digest(std::chrono::milliseconds timeout,
                                std::optional<std::uint64_t> at_revision = std::nullopt);
+  // Drops keyframes taken before `before_ms` (since 1970) that matter nowhere any more. kTimeout:
+  // nothing was dropped within `timeout`. kUnsupported when the daemon is too old for that.
+  Result<CompactionSummary> Compact(std::int64_t before_ms,
+                                    const std::string& author,
+                                    std::chrono::milliseconds timeout);
   Result<VerifySummary> Verify(bool is_rebuild, std::chrono::milliseconds timeout);
 
   std::uint64_t bytes_sent() const;

@@ -86,6 +86,7 @@ struct AtlasStatus {
   std::uint64_t cells = 0;
   std::uint64_t multilayer_cells = 0;
   std::uint64_t rss_bytes = 0;
+  std::uint64_t compacted = 0;  // keyframes that compactions dropped
 };
 
 struct WaitSummary {
@@ -101,6 +102,7 @@ struct SessionSummary {
   std::int64_t first_time_ms = 0;
   std::int64_t last_time_ms = 0;
   std::uint32_t last_sequence = 0;
+  std::uint64_t compacted = 0;  // keyframes that compactions dropped
 };
 
 enum class SessionAction : std::uint8_t { kRetract, kRestore };
@@ -115,6 +117,14 @@ struct SessionChangeSummary {
 struct DigestSummary {
   Bytes sha256;
   std::uint64_t tiles = 0;
+  std::uint64_t revision = 0;
+};
+
+struct CompactionSummary {
+  std::uint64_t dropped = 0;        // keyframes
+  std::uint64_t bytes = 0;          // of them
+  std::uint64_t tiles_checked = 0;  // fused again without them
+  std::uint64_t horizon = 0;        // the oldest revision that can still be read
   std::uint64_t revision = 0;
 };
 

@@ -4,39 +4,12 @@
 #include <cassert>
 #include <utility>
 
+#include "core/fusion/band_surveys.h"
 #include "core/fusion/cell_combiner.h"
 #include "core/fusion/fusion_stretch.h"
-#include "core/fusion/survey_frames.h"
 
 namespace atlas {
 namespace {
-
-std::int32_t MaxRadiusCells(std::span<const FrameOnMap> frames) {
-  std::int32_t radius = 1;
-  for (const FrameOnMap& frame : frames) {
-    radius = std::max(radius, frame.grid.radius_cells);
-  }
-  return radius;
-}
-
-// How many rows can be surveyed at once: where most cells have a segment or two of each stretch;
-// in preset paper all observations are kept for a while.
-std::int32_t RowsWithin(std::size_t max_bytes,
-                        std::span<const FusionStretch> stretches,
-                        const MapProfile& profile) {
-  constexpr std::size_t kCellBytes = 128;        // of a stretch
-  constexpr std::size_t kObservationBytes = 48;  // preset paper
-  constexpr std::size_t kMinRows = 16;           // fewer would ask for the keyframes too often
-  std::size_t longest = 0;
-  for (const FusionStretch& stretch : stretches) {
-    longest = std::max(longest, stretch.frames.size());
-  }
-  const std::size_t cell_bytes =
-      stretches.size() * kCellBytes +
-      (profile.preset == FusionPreset::kPaper ? longest * kObservationBytes : 0);
-  return static_cast<std::int32_t>(std::clamp<std::size_t>(
-      max_bytes / (cell_bytes * profile.tile_cells), kMinRows, profile.tile_cells));
-}
 
 class TileFuser {
  public:
@@ -63,35 +36,20 @@ class TileFuser {
 
  private:
   Status FuseBand(const TileBand& band, std::span<const FusionStretch> stretches, Tile& tile) {
-    std::vector<StretchSurvey> surveys;
-    surveys.reserve(stretches.size());
-    for (const FusionStretch& stretch : stretches) {
-      StretchSurvey& survey = surveys.emplace_back(band, profile_);
-      ATLAS_RETURN_IF_ERROR(
-          SurveyFrames(stretch.frames, frames_, source_, {profile_, sigmas_}, survey));
+    auto surveys = BandSurveys::Survey(band, stretches, frames_, source_, {profile_, sigmas_});
+    if (!surveys) {
+      return surveys.error();
     }
-    const std::size_t side = profile_.tile_cells;
-    const std::size_t first = static_cast<std::size_t>(band.first_row) * side;
-    for (std::size_t cell = 0; cell < static_cast<std::size_t>(band.rows) * side; ++cell) {
-      CombineCell(stretches, surveys, cell, tile.layers);
+    const std::size_t first = static_cast<std::size_t>(band.first_row) * profile_.tile_cells;
+    for (std::size_t cell = 0; cell < surveys->cells(); ++cell) {
+      surveys->Collect(cell, segments_);
+      CombineCell(stretches, tile.layers);
       tile.cell_begin[first + cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
     }
     return {};
   }
 
-  void CombineCell(std::span<const FusionStretch> stretches,
-                   std::span<StretchSurvey> surveys,
-                   std::size_t cell,
-                   std::vector<TileLayer>& out) {
-    segments_.clear();
-    for (std::uint32_t i = 0; i < surveys.size(); ++i) {
-      for (std::uint32_t k = surveys[i].First(cell); k != Segment::kNone;
-           k = surveys[i].At(k).next) {
-        Segment& segment = surveys[i].At(k);
-        segments_.push_back(
-            {&segment, surveys[i].frames()[segment.last_frame].time_ms, i, stretches[i].vehicle});
-      }
-    }
+  void CombineCell(std::span<const FusionStretch> stretches, std::vector<TileLayer>& out) {
     if (segments_.empty()) {
       return;
     }

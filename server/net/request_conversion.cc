@@ -113,6 +113,10 @@ Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message) 
   }
 }
 
+CompactionRequest CompactionFromWire(const wire::CompactRequest& message) {
+  return {message.before_ms(), message.author()};
+}
+
 void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out) {
   out.set_duplicate(result.is_duplicate);
   out.set_revision(result.revision);
@@ -147,6 +151,7 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
   out.set_multilayer_cells(counts.multilayer_cells);
   out.set_rss_bytes(status.rss_bytes);
   out.set_damaged_tiles(status.damaged_tiles);
+  out.set_compacted(counts.compacted);
 }
 
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {
@@ -164,12 +169,21 @@ void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
   out.set_first_time_ms(record.first_time_ms);
   out.set_last_time_ms(record.last_time_ms);
   out.set_last_sequence(record.last_sequence);
+  out.set_compacted(record.compacted);
 }
 
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out) {
   out.set_sha256(BytesToWire(digest.sha256));
   out.set_tiles(digest.tiles);
   out.set_revision(digest.revision);
+}
+
+void CompactionToWire(const CompactionReport& report, wire::CompactReply& out) {
+  out.set_dropped(report.stored.dropped);
+  out.set_bytes(report.stored.bytes);
+  out.set_tiles_checked(report.tiles_checked);
+  out.set_horizon(report.stored.horizon);
+  out.set_revision(report.stored.revision);
 }
 
 void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out) {

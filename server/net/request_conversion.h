@@ -19,6 +19,8 @@ Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message);
 // kInvalidArgument on an action that this version does not know.
 Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message);
 
+CompactionRequest CompactionFromWire(const wire::CompactRequest& message);
+
 void UploadToWire(const PutKeyframeResult& result, wire::UploadReply& out);
 void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out);
 void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out);
@@ -26,6 +28,7 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out);
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out);
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out);
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out);
+void CompactionToWire(const CompactionReport& report, wire::CompactReply& out);
 void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out);
 
 }  // namespace atlas

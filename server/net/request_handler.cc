@@ -73,6 +73,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyW
                                                         : Digest(request, out);
     case Envelope::kVerifyRequest:
       return Verify(request, out);
+    case Envelope::kCompactRequest:
+      return Compact(request, out);
     default:
       return Refuse(request);
   }
@@ -290,6 +292,35 @@ asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWri
   }
   Envelope reply = ReplyTo(request);
   VerifyToWire(*result, *reply.mutable_verify_reply());
+  co_await out.Send(std::move(reply));
+  co_return Status();
+}
+
+// The wait for the workers takes no thread; what is refused is refused before it.
+asio::awaitable<Status> RequestHandler::Compact(const Envelope& request, ReplyWriter& out) {
+  const CompactionRequest compaction = CompactionFromWire(request.compact_request());
+  Status status = CheckCompaction(compaction, service_.identity().profile);
+  if (!status.ok()) {
+    co_return status;
+  }
+  const Result<WaitPlaces::Place> place = places_.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const Patience patience{TimeoutFromWire(request.compact_request().timeout_ms()), out.peer_left()};
+  const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
+  if (!settled) {
+    co_return settled.error();
+  }
+  const Blocking<CompactionReport> compact = [this, compaction, patience] {
+    return service_.Compact(compaction, patience);
+  };
+  const Result<CompactionReport> report = co_await OnPool(reading_pool_, compact);
+  if (!report) {
+    co_return report.error();
+  }
+  Envelope reply = ReplyTo(request);
+  CompactionToWire(*report, *reply.mutable_compact_reply());
   co_await out.Send(std::move(reply));
   co_return Status();
 }

@@ -50,6 +50,7 @@ class RequestHandler {
   boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> DigestThePast(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Compact(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
 
   AtlasService& service_;

@@ -14,6 +14,9 @@ std::chrono::steady_clock::time_point DeadlineOf(const Patience& patience) {
   return std::chrono::steady_clock::now() + patience.timeout;
 }
 
+// What is found between two uploads is looked for again so often.
+constexpr int kCompactionAttempts = 3;
+
 bool IsClean(const DirtyState& state) {
   return state.dirty_tiles == 0;
 }
@@ -93,7 +96,10 @@ Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
   PoseBatch batch{{}, std::move(request.author), request.if_revision};
   batch.poses.reserve(keys.size());
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    auto pose = CheckPose((*keyframes)[i], request.updates[i].pose, identity().profile);
+    const QuantizedPose& update = request.updates[i].pose;
+    const auto& keyframe = (*keyframes)[i];
+    auto pose = keyframe ? CheckPose(*keyframe, update, identity().profile)
+                         : CheckDroppedPose(keys[i], update);
     if (!pose) {
       return Error(pose.error());
     }
@@ -288,12 +294,16 @@ Result<AtlasDigest> AtlasService::DigestAt(std::uint64_t revision, const Patienc
 Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience) {
   const TimePoint deadline = DeadlineOf(patience);
   while (true) {
-    DirtyState before;
+    DirtyState clean;
     if (rebuild) {
-      const auto end = WaitForWorkers(deadline, patience.stop, before);
+      const auto end = WaitForWorkers(deadline, patience.stop, clean);
       if (!end) {
         return Error(end.error());
       }
+    }
+    const auto before = store_.ReadCounts();
+    if (!before) {
+      return Error(before.error());
     }
     AtlasVerifier::Options options;
     options.rebuild = rebuild;
@@ -304,19 +314,54 @@ Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience
     if (!report) {
       return Error(report.error());
     }
-    const auto after = ReadRevision();
+    const auto after = store_.ReadCounts();
     if (!after) {
       return Error(after.error());
     }
-    report->revision = *after;
-    // A tile that changed between being read and being rebuilt is no mismatch: look again.
-    if (!rebuild || report->mismatched == 0 || *after == before.revision) {
+    report->revision = after->revision;
+    // A tile that changed between being read and being rebuilt is no mismatch, and a keyframe that
+    // was dropped since it was listed no damage: look again.
+    const bool is_in_doubt =
+        (rebuild && report->mismatched > 0 && after->revision != clean.revision) ||
+        (report->damaged > 0 && after->compacted != before->compacted);
+    if (!is_in_doubt) {
       return report;
     }
     if (std::chrono::steady_clock::now() >= deadline) {
       return Error(StatusCode::kTimeout, "the atlas changes while it is verified");
     }
   }
+}
+
+Result<CompactionReport> AtlasService::Compact(const CompactionRequest& request,
+                                               const Patience& patience) {
+  if (Status status = CheckCompaction(request, identity().profile); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const TimePoint deadline = DeadlineOf(patience);
+  const auto check_stop = [&] {
+    ATLAS_RETURN_IF_ERROR(CheckRunning(patience.stop));
+    return std::chrono::steady_clock::now() < deadline
+               ? Status()
+               : Status(StatusCode::kTimeout, "the atlas was not compacted in time");
+  };
+  for (int attempt = 0; attempt < kCompactionAttempts; ++attempt) {
+    DirtyState clean;
+    const auto end = WaitForWorkers(deadline, patience.stop, clean);
+    if (!end) {
+      return Error(end.error());
+    }
+    if (*end == WaitEnd::kDamaged) {
+      return Error(fusion_.damage().Summary());
+    }
+    auto report = CompactAt(store_, clean.revision, request, check_stop);
+    if (report || report.error().code() != StatusCode::kConflict) {
+      changes_.Notify();
+      return report;
+    }
+  }
+  return Error(StatusCode::kUnavailable,
+               "the atlas keeps changing: try again while nothing is uploaded");
 }
 
 }  // namespace atlas

@@ -15,6 +15,7 @@
 #include "server/service/atlas_digest.h"
 #include "server/service/atlas_verify.h"
 #include "server/service/change_signal.h"
+#include "server/service/compaction/compact_atlas.h"
 #include "server/service/fusion_scheduler.h"
 #include "server/service/history/past_atlas.h"
 #include "server/service/log_sink.h"
@@ -102,6 +103,12 @@ class AtlasService {
   Result<AtlasDigest> DigestAt(std::uint64_t revision, const Patience& patience);
   // `rebuild` waits like WaitUntilClean and reports what is damaged; a plain check does not wait.
   Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
+
+  // Drops the keyframes that matter nowhere any more (preset bounded), once no tile is dirty; the
+  // tiles stay as they are. `patience` bounds all of it: kTimeout. kUnavailable when uploads do not
+  // let it finish, kInvalidData names what is damaged; errors of the request as CheckCompaction.
+  // Without success everything is as it was.
+  Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience);
 
   // Ends every wait, verification and digest, now and from now on, with kUnavailable. The workers
   // go on, and uploads are still taken.

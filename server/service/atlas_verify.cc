@@ -37,8 +37,9 @@ AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
       builder_(store, keyframes_, tiles_, options_.tile_bytes) {}
 
 Result<VerifyReport> AtlasVerifier::Run() {
-  for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyKeyframes,
-                          &AtlasVerifier::VerifyTiles, &AtlasVerifier::VerifyMissingTiles}) {
+  for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyCompactions,
+                          &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
+                          &AtlasVerifier::VerifyMissingTiles}) {
     if (Status status = (this->*step)(); !status.ok()) {
       return Error(std::move(status));
     }
@@ -75,6 +76,10 @@ Status AtlasVerifier::VerifySessions() {
     ATLAS_RETURN_IF_ERROR(Note(store_.CheckSession(session.key)));
   }
   return {};
+}
+
+Status AtlasVerifier::VerifyCompactions() {
+  return Note(store_.CheckCompactions());
 }
 
 // Uploads go on meanwhile: there may be more rows than the sessions knew of, never fewer.

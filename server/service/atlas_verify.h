@@ -39,6 +39,7 @@ class AtlasVerifier {
 
  private:
   Status VerifySessions();
+  Status VerifyCompactions();
   Status VerifyKeyframes();
   Status VerifyTiles();
   Status VerifyMissingTiles();

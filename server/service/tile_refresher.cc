@@ -56,6 +56,9 @@ Result<TileRefresher::Job> TileRefresher::Prepare(const TileId& id) {
   if (!sources) {
     return Error(sources.error());
   }
+  if (sources->is_whole && job.revision != 0) {
+    job.surveys = TileSurveys(id);
+  }
   auto frames = PlaceKeyframes(sources->keyframes);
   if (!frames) {
     return Error(frames.error());

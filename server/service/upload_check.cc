@@ -108,4 +108,11 @@ Result<NewPose> CheckPose(const KeyframeRecord& keyframe,
   return NewPose{keyframe.key, pose, std::move(*footprint)};
 }
 
+Result<NewPose> CheckDroppedPose(const KeyframeKey& key, const QuantizedPose& pose) {
+  if (Status status = pose.Validate(); !status.ok()) {
+    return Error(status.WithContext(StrCat("keyframe ", key)));
+  }
+  return NewPose{key, pose, {}};
+}
+
 }  // namespace atlas

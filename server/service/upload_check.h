@@ -38,4 +38,7 @@ Result<NewPose> CheckPose(const KeyframeRecord& keyframe,
                           const QuantizedPose& pose,
                           const MapProfile& profile);
 
+// The same of a keyframe that a compaction dropped: nothing is left to place it with.
+Result<NewPose> CheckDroppedPose(const KeyframeKey& key, const QuantizedPose& pose);
+
 }  // namespace atlas

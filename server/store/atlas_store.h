@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/status.h"
+#include "server/store/compaction_types.h"
 #include "server/store/store_types.h"
 
 namespace atlas {
@@ -30,16 +31,24 @@ class AtlasStore {
   virtual const AtlasIdentity& identity() const = 0;
 
   // Same key, blob hash and time as a stored one: a duplicate, nothing changes, even if its pose
-  // was corrected since. Other content under the key: kConflict. Marks the footprint dirty.
+  // was corrected since. Other content under the key: kConflict. Marks the footprint dirty. All the
+  // same where a compaction dropped the stored one.
   virtual void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) = 0;
   // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
   // and marks nothing. Marks the union of the old and the new footprints. Neither uploads nor poses
-  // of a session that is not in the map mark anything.
+  // of a session that is not in the map mark anything. Of a keyframe that a compaction dropped
+  // nothing changes.
   virtual void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) = 0;
 
   // One transaction: the state, its line in the history, a mark on every tile that a keyframe of
   // the session touches. A session that is so already: nothing changes. kNotFound: unknown.
   virtual void ChangeSession(SessionChange change, Done<SessionChangeResult> done) = 0;
+
+  // One transaction: the keyframes go with their poses and footprints, tombstones stay, and no
+  // revision before this one can be read any more. Marks nothing: whoever asks knows that the tiles
+  // stay as they are. Without any keyframe nothing is written. kConflict: the atlas is at another
+  // revision than the one that this was found out at. kInvalidData: one is not there, or damaged.
+  virtual void Compact(Compaction compaction, Done<CompactionResult> done) = 0;
 
   // Leases up to `max_tiles` dirty tiles of the lowest level in the wave: a level starts when the
   // one below is done, so that each parent is built once.
@@ -57,9 +66,10 @@ class AtlasStore {
   virtual void Flush() = 0;
 
   // In the order of `keys`; kNotFound names the first unknown one.
-  virtual Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
+  virtual Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
   // The keyframes of live sessions whose footprints touch a level-0 tile: those that were not there
-  // at revision `since`, or not as they are now. `since` 0: all of them.
+  // at revision `since`, or not as they are now. All of them, and `is_whole`, where `since` is 0 or
+  // before the last compaction: nothing tells any more what it dropped.
   virtual Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) = 0;
   // The same as of an earlier revision: the keyframes that were there, in sessions that were live,
   // each with the pose it had. Some may not touch the tile. Errors as CheckRevision.
@@ -94,8 +104,11 @@ class AtlasStore {
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
   virtual Result<std::vector<SessionRecord>> ListSessions() = 0;
-  // Verifies every checksum of a session's history.
+  // Verifies every checksum of a session's history and of what is left of its dropped keyframes.
   virtual Status CheckSession(const SessionKey& key) = 0;
+  // Verifies every compaction's checksum, and that it left as many tombstones as it dropped
+  // keyframes.
+  virtual Status CheckCompactions() = 0;
 };
 
 }  // namespace atlas

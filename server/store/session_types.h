@@ -17,15 +17,22 @@ inline bool IsInMap(SessionState state) {
   return state == SessionState::kLive;
 }
 
+// The times and the last sequence are those of all keyframes that were ever uploaded.
 struct SessionRecord {
   SessionKey key;
   SessionState state = SessionState::kLive;
-  std::uint64_t keyframes = 0;
+  std::uint64_t keyframes = 0;  // that are stored
   std::uint64_t bytes = 0;
   std::int64_t first_time_ms = 0;
   std::int64_t last_time_ms = 0;
   std::uint32_t last_sequence = 0;
+  std::uint64_t compacted = 0;  // keyframes that compactions dropped
 };
+
+// No keyframe was uploaded yet.
+inline bool HasNoneYet(const SessionRecord& session) {
+  return session.keyframes + session.compacted == 0;
+}
 
 // kRetract takes a session out of the map, kRestore makes a retracted one what it was before.
 enum class SessionAction : std::uint8_t { kRetract, kRestore };

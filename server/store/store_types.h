@@ -78,11 +78,15 @@ struct KeyframeRecord {
   SessionState session_state = SessionState::kLive;
 };
 
+// Of each key asked for; nullopt: a compaction dropped it.
+using FoundKeyframes = std::vector<std::optional<KeyframeRecord>>;
+
 // What a level-0 tile is fused from, read in one snapshot.
 struct TileSources {
   std::uint64_t revision = 0;  // of the atlas, or the earlier one asked for
   std::vector<KeyframeRecord> keyframes;
   std::vector<std::int64_t> gone;  // ids that do not belong to it, and may have before
+  bool is_whole = false;           // all of it, not only what changed
 };
 
 struct TileContent {
@@ -150,6 +154,7 @@ struct StoreCounts {
   std::uint64_t revision = 0;
   std::uint64_t keyframes = 0;
   std::uint64_t keyframe_bytes = 0;
+  std::uint64_t compacted = 0;  // keyframes that compactions dropped
   std::uint64_t sessions = 0;
   std::uint64_t tiles = 0;
   std::uint64_t tile_bytes = 0;

@@ -17,6 +17,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeSessionsCommand());
   commands.push_back(MakeSessionRetractCommand());
   commands.push_back(MakeSessionRestoreCommand());
+  commands.push_back(MakeCompactCommand());
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
   commands.push_back(MakeSegmentCommand());

@@ -59,7 +59,14 @@ Result<Tile> PastTiles::BuildFromKeyframes(const TileId& id) {
     }
     return ReadKeyframe((*frames)[i], store_, *options_.keyframes);
   };
-  return FuseTile(id, *frames, source, profile_);
+  auto tile = FuseTile(id, *frames, source, profile_);
+  if (!tile && tile.error().code() == StatusCode::kInvalidData) {
+    // A keyframe that a compaction dropped since it was gathered is no damage.
+    if (Status status = store_.CheckRevision(options_.revision); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return tile;
 }
 
 Result<Tile> PastTiles::BuildFromChildren(const TileId& id, const OnTile& on_tile) {

@@ -20,6 +20,8 @@ enum class Counter : std::uint8_t {
   kMultilayerCells = 9,
   kSessions = 10,
   kHistoryHorizon = 11,  // the oldest revision that can still be read
+  kCompactions = 12,
+  kCompacted = 13,  // keyframes that they dropped
 };
 
 std::uint64_t ReadCounter(Connection& connection, Counter counter);

@@ -71,6 +71,10 @@ void WriteFootprint(Connection& connection,
   }
 }
 
+void DeleteFootprint(Connection& connection, std::int64_t keyframe_id) {
+  connection.Prepare("DELETE FROM keyframe_tiles WHERE keyframe_id = ?").Bind(keyframe_id).Run();
+}
+
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id) {
   Query row = connection.Prepare(
       "SELECT DISTINCT t.tile_key FROM keyframes k JOIN keyframe_tiles t ON t.keyframe_id = k.id "

@@ -18,6 +18,8 @@ void WriteFootprint(Connection& connection,
                     std::int64_t keyframe_id,
                     std::span<const TileId> footprint,
                     std::uint64_t revision);
+// The current one and all former ones.
+void DeleteFootprint(Connection& connection, std::int64_t keyframe_id);
 // The union of the current footprints of a session's keyframes, in key order.
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id);
 // The session's keyframes entered or left the map at `revision`.

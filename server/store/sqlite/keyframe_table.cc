@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/compaction_table.h"
 #include "server/store/sqlite/pose_table.h"
 #include "server/store/sqlite/row_hash.h"
 #include "server/store/sqlite/session_state_table.h"
@@ -45,18 +46,6 @@ Result<KeyframeRow> ReadRow(Query& row) {
   return result;
 }
 
-Result<KeyframeRow> ReadRowById(Connection& connection, std::int64_t id) {
-  Query row = connection.Prepare(
-      "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
-      "level_qy, level_qz, blob_bytes, blob_hash, checksum FROM keyframes WHERE id = ?");
-  row.Bind(id);
-  if (!row.Step()) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("store: the row of keyframe ", id, " is missing"));
-  }
-  return ReadRow(row);
-}
-
 void BindPrior(Query& query, const std::optional<PositionPrior>& prior) {
   if (prior) {
     query.Bind(prior->x_um).Bind(prior->y_um).Bind(prior->z_um).Bind(prior->radius_mm);
@@ -85,8 +74,20 @@ Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
   return std::move(*result);
 }
 
+Result<KeyframeRow> ReadKeyframeRow(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
+      "level_qy, level_qz, blob_bytes, blob_hash, checksum FROM keyframes WHERE id = ?");
+  row.Bind(id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of keyframe ", id, " is missing"));
+  }
+  return ReadRow(row);
+}
+
 Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t id) {
-  auto row = ReadRowById(connection, id);
+  auto row = ReadKeyframeRow(connection, id);
   if (!row) {
     return Error(row.error());
   }
@@ -124,7 +125,7 @@ Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connectio
   if (!*pose) {
     return std::nullopt;
   }
-  auto row = ReadRowById(connection, id);
+  auto row = ReadKeyframeRow(connection, id);
   if (!row) {
     return Error(row.error());
   }
@@ -142,27 +143,32 @@ Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connectio
   return std::move(row->record);
 }
 
-Result<KeyframeRecord> FindKeyframeRecord(Connection& connection, const KeyframeKey& key) {
+Result<std::optional<KeyframeRecord>> FindKeyframeRecord(Connection& connection,
+                                                         const KeyframeKey& key) {
   const auto session = FindSession(connection, key.session);
   if (!session) {
     return Error(session.error());
   }
-  std::optional<KeyframeRow> found;
-  if (*session) {
-    auto row = FindKeyframeRow(connection, (*session)->id, key.sequence);
-    if (!row) {
-      return Error(row.error());
-    }
-    found = std::move(*row);
+  const Status unknown(StatusCode::kNotFound, StrCat("keyframe ", key, " is not in the atlas"));
+  if (!*session) {
+    return Error(unknown);
   }
-  if (!found) {
-    return Error(StatusCode::kNotFound, StrCat("keyframe ", key, " is not in the atlas"));
+  const auto row = FindKeyframeRow(connection, (*session)->id, key.sequence);
+  if (!row) {
+    return Error(row.error());
   }
-  return ReadKeyframeRecord(connection, found->record.id);
+  if (*row) {
+    return ReadKeyframeRecord(connection, (*row)->record.id);
+  }
+  const auto tombstone = FindTombstone(connection, (*session)->id, key.sequence);
+  if (!tombstone) {
+    return Error(tombstone.error());
+  }
+  return *tombstone ? Result<std::optional<KeyframeRecord>>(std::nullopt) : Error(unknown);
 }
 
 Result<Bytes> ReadBlob(Connection& connection, std::int64_t id) {
-  const auto row = ReadRowById(connection, id);
+  const auto row = ReadKeyframeRow(connection, id);
   if (!row) {
     return Error(row.error());
   }
@@ -201,6 +207,10 @@ void InsertKeyframe(Connection& connection,
   BindPrior(query, keyframe.prior);
   query.Bind(row.blob_bytes).Bind(row.blob_hash).Bind(HashOf(row)).Bind(ByteSpan(keyframe.blob));
   query.Run();
+}
+
+void DeleteKeyframe(Connection& connection, std::int64_t id) {
+  connection.Prepare("DELETE FROM keyframes WHERE id = ?").Bind(id).Run();
 }
 
 }  // namespace atlas

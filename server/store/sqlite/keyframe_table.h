@@ -20,6 +20,8 @@ struct KeyframeRow {
 Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
                                                    std::int64_t session_id,
                                                    std::uint32_t sequence);
+// kInvalidData when there is none, or it is damaged.
+Result<KeyframeRow> ReadKeyframeRow(Connection& connection, std::int64_t id);
 // Row, session and pose. kNotFound, or kInvalidData when any of them is damaged.
 Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t id);
 // The same, and kInvalidData when a line of its poses' history is damaged.
@@ -28,7 +30,9 @@ Result<KeyframeRecord> VerifyKeyframeRecord(Connection& connection, std::int64_t
 Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connection,
                                                            std::int64_t id,
                                                            std::uint64_t revision);
-Result<KeyframeRecord> FindKeyframeRecord(Connection& connection, const KeyframeKey& key);
+// nullopt: it was there and a compaction dropped it. kNotFound: it never was.
+Result<std::optional<KeyframeRecord>> FindKeyframeRecord(Connection& connection,
+                                                         const KeyframeKey& key);
 // The blob, its hash verified.
 Result<Bytes> ReadBlob(Connection& connection, std::int64_t id);
 
@@ -37,5 +41,7 @@ void InsertKeyframe(Connection& connection,
                     std::int64_t id,
                     std::int64_t session_id,
                     std::uint64_t revision);
+// The row and its blob.
+void DeleteKeyframe(Connection& connection, std::int64_t id);
 
 }  // namespace atlas

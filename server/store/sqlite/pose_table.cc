@@ -144,6 +144,11 @@ void WritePose(Connection& connection, const PoseChange& change) {
   BindPose(history, change.pose).Bind(HistoryHash(change)).Run();
 }
 
+void DeletePoses(Connection& connection, std::int64_t keyframe_id) {
+  connection.Prepare("DELETE FROM poses WHERE keyframe_id = ?").Bind(keyframe_id).Run();
+  connection.Prepare("DELETE FROM pose_history WHERE keyframe_id = ?").Bind(keyframe_id).Run();
+}
+
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result) {
   RowHash hash(RowKind::kPoseBatch);
   hash.Unsigned(result.batch).Unsigned(result.revision).Text(batch.author);

@@ -36,6 +36,9 @@ Status CheckPoseHistory(Connection& connection,
 // The current pose and its line in the history.
 void WritePose(Connection& connection, const PoseChange& change);
 
+// The current pose and the whole history.
+void DeletePoses(Connection& connection, std::int64_t keyframe_id);
+
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
 
 }  // namespace atlas

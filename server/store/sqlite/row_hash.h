@@ -19,6 +19,8 @@ enum class RowKind : std::uint8_t {
   kPoseBatch = 6,
   kTile = 7,
   kSessionState = 8,
+  kCompaction = 9,
+  kTombstone = 10,
 };
 
 // Integers as 8 bytes little-endian, text and bytes with their length before them.

@@ -25,6 +25,7 @@ CREATE TABLE sessions (
   state INTEGER NOT NULL, state_reason TEXT,
   keyframes INTEGER NOT NULL, bytes INTEGER NOT NULL,
   first_time_ms INTEGER NOT NULL, last_time_ms INTEGER NOT NULL, last_sequence INTEGER NOT NULL,
+  compacted INTEGER NOT NULL,
   checksum INTEGER NOT NULL,
   UNIQUE (vehicle, session));
 
@@ -100,11 +101,26 @@ CREATE TABLE session_states (
   checksum INTEGER NOT NULL,
   UNIQUE (session_id, revision));
 
+CREATE TABLE compactions (
+  id INTEGER PRIMARY KEY,
+  revision INTEGER NOT NULL, before_ms INTEGER NOT NULL, author TEXT NOT NULL,
+  dropped INTEGER NOT NULL, bytes INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE tombstones (
+  session_id INTEGER NOT NULL, sequence INTEGER NOT NULL,
+  time_ms INTEGER NOT NULL,
+  blob_bytes INTEGER NOT NULL, blob_hash INTEGER NOT NULL,
+  compaction_id INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  PRIMARY KEY (session_id, sequence)) WITHOUT ROWID;
+CREATE INDEX tombstones_of_compaction ON tombstones (compaction_id);
+
 INSERT INTO counters (id, name, value) VALUES
   (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),
   (5, 'keyframe_bytes', 0), (6, 'tiles', 0), (7, 'tile_bytes', 0), (8, 'cells', 0),
   (9, 'multilayer_cells', 0), (10, 'sessions', 0),
-  (11, 'history_horizon', 0);
+  (11, 'history_horizon', 0), (12, 'compactions', 0), (13, 'compacted', 0);
 )sql";
 
 std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/compaction_table.h"
 #include "server/store/sqlite/counters.h"
 #include "server/store/sqlite/row_hash.h"
 #include "server/store/sqlite/session_state_table.h"
@@ -23,11 +24,12 @@ std::int64_t HashOf(const SessionRow& row) {
       .Int(r.first_time_ms)
       .Int(r.last_time_ms)
       .Int(r.last_sequence)
+      .Unsigned(r.compacted)
       .value();
 }
 
 // Columns: id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms,
-// last_sequence, checksum.
+// last_sequence, compacted, checksum.
 Result<SessionRow> ReadRow(Query& row) {
   row.Rewind();
   SessionRow result;
@@ -41,6 +43,7 @@ Result<SessionRow> ReadRow(Query& row) {
   r.first_time_ms = row.Int();
   r.last_time_ms = row.Int();
   r.last_sequence = row.Unsigned32();
+  r.compacted = row.Unsigned();
   if (row.Int() != HashOf(result)) {
     return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", result.id, " (",
                                                   r.key, ") is damaged: wrong checksum"));
@@ -53,7 +56,7 @@ Result<SessionRow> ReadRow(Query& row) {
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key) {
   Query row = connection.Prepare(
       "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, checksum FROM sessions WHERE vehicle = ? AND session = ?");
+      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? AND session = ?");
   row.Bind(std::string_view(key.vehicle)).Bind(std::string_view(key.session));
   if (!row.Step()) {
     return std::nullopt;
@@ -68,7 +71,7 @@ Result<std::optional<SessionRow>> FindSession(Connection& connection, const Sess
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id) {
   Query row = connection.Prepare(
       "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, checksum FROM sessions WHERE id = ?");
+      "last_sequence, compacted, checksum FROM sessions WHERE id = ?");
   row.Bind(id);
   if (!row.Step()) {
     return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", id, " is missing"));
@@ -79,7 +82,7 @@ Result<SessionRow> ReadSession(Connection& connection, std::int64_t id) {
 Result<std::vector<SessionRecord>> ReadSessions(Connection& connection) {
   Query row = connection.Prepare(
       "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, checksum FROM sessions ORDER BY vehicle, session");
+      "last_sequence, compacted, checksum FROM sessions ORDER BY vehicle, session");
   std::vector<SessionRecord> sessions;
   while (row.Step()) {
     auto session = ReadRow(row);
@@ -96,8 +99,12 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key) {
   if (!session) {
     return session.error();
   }
-  return *session ? CheckSessionStates(connection, (*session)->id, (*session)->record.state)
-                  : Status();
+  if (!*session) {
+    return {};
+  }
+  const auto& [id, record] = **session;
+  ATLAS_RETURN_IF_ERROR(CheckSessionStates(connection, id, record.state));
+  return CheckTombstones(connection, id, record.compacted);
 }
 
 void WriteSession(Connection& connection, const SessionRow& row) {
@@ -105,8 +112,8 @@ void WriteSession(Connection& connection, const SessionRow& row) {
   connection
       .Prepare(
           "INSERT OR REPLACE INTO sessions (id, vehicle, session, state, keyframes, bytes, "
-          "first_time_ms, last_time_ms, last_sequence, checksum) "
-          "VALUES (?,?,?,?,?,?,?,?,?,?)")
+          "first_time_ms, last_time_ms, last_sequence, compacted, checksum) "
+          "VALUES (?,?,?,?,?,?,?,?,?,?,?)")
       .Bind(row.id)
       .Bind(std::string_view(r.key.vehicle))
       .Bind(std::string_view(r.key.session))
@@ -116,6 +123,7 @@ void WriteSession(Connection& connection, const SessionRow& row) {
       .Bind(r.first_time_ms)
       .Bind(r.last_time_ms)
       .Bind(r.last_sequence)
+      .Bind(r.compacted)
       .Bind(HashOf(row))
       .Run();
 }
@@ -137,7 +145,7 @@ Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& ke
 
 void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe) {
   SessionRecord& r = session.record;
-  const bool is_first = r.keyframes == 0;
+  const bool is_first = HasNoneYet(r);
   r.first_time_ms = is_first ? keyframe.time_ms : std::min(r.first_time_ms, keyframe.time_ms);
   r.last_time_ms = is_first ? keyframe.time_ms : std::max(r.last_time_ms, keyframe.time_ms);
   r.last_sequence = std::max(r.last_sequence, keyframe.key.sequence);

@@ -19,7 +19,7 @@ struct SessionRow {
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
 Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
-// kInvalidData when its row or a line of its history is damaged.
+// kInvalidData when its row, a line of its history or a tombstone of its keyframes is damaged.
 Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 
 // The live session `key`, made if it is new.

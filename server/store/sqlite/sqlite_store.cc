@@ -3,6 +3,8 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/compaction_table.h"
+#include "server/store/sqlite/compaction_transactions.h"
 #include "server/store/sqlite/counters.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/dirty_table.h"
@@ -56,6 +58,11 @@ class SqliteStore final : public AtlasStore {
       return ChangeSessionInStore(connection, c);
     });
   }
+  void Compact(Compaction compaction, Done<CompactionResult> done) override {
+    Write<CompactionResult>(std::move(done), [c = std::move(compaction)](Connection& connection) {
+      return CompactInStore(connection, c);
+    });
+  }
   void ClaimDirty(ClaimRequest request, Done<ClaimResult> done) override {
     Write<ClaimResult>(std::move(done), [r = std::move(request)](Connection& connection) {
       return Result<ClaimResult>(ClaimTiles(connection, r));
@@ -84,7 +91,7 @@ class SqliteStore final : public AtlasStore {
 
   void Flush() override { writes_.Flush(); }
 
-  Result<std::vector<KeyframeRecord>> FindKeyframes(std::span<const KeyframeKey> keys) override;
+  Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override;
   Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override;
   Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) override {
     return readers_.Run<TileSources>([&id, revision](Connection& connection) {
@@ -142,6 +149,9 @@ class SqliteStore final : public AtlasStore {
     return ReadStatus(
         [&key](Connection& connection) { return CheckSessionHistory(connection, key); });
   }
+  Status CheckCompactions() override {
+    return ReadStatus([](Connection& connection) { return CheckCompactionRows(connection); });
+  }
 
  private:
   // Runs `read`, which returns a Status, in one snapshot.
@@ -179,10 +189,9 @@ class SqliteStore final : public AtlasStore {
   ReaderPool readers_;
 };
 
-Result<std::vector<KeyframeRecord>> SqliteStore::FindKeyframes(std::span<const KeyframeKey> keys) {
-  using Records = std::vector<KeyframeRecord>;
-  return readers_.Run<Records>([keys](Connection& connection) -> Result<Records> {
-    Records records;
+Result<FoundKeyframes> SqliteStore::FindKeyframes(std::span<const KeyframeKey> keys) {
+  return readers_.Run<FoundKeyframes>([keys](Connection& connection) -> Result<FoundKeyframes> {
+    FoundKeyframes records;
     for (const KeyframeKey& key : keys) {
       auto record = FindKeyframeRecord(connection, key);
       if (!record) {
@@ -198,7 +207,8 @@ Result<TileSources> SqliteStore::GatherTile(const TileId& id, std::uint64_t sinc
   return readers_.Run<TileSources>([&](Connection& connection) -> Result<TileSources> {
     TileSources sources;
     sources.revision = ReadCounter(connection, Counter::kRevision);
-    for (const FootprintRow& row : FootprintsSince(connection, id, since)) {
+    sources.is_whole = since < ReadCounter(connection, Counter::kHistoryHorizon) || since == 0;
+    for (const FootprintRow& row : FootprintsSince(connection, id, sources.is_whole ? 0 : since)) {
       if (!row.is_current) {
         sources.gone.push_back(row.keyframe_id);
         continue;
@@ -246,6 +256,7 @@ Result<StoreCounts> SqliteStore::ReadCounts() {
     counts.revision = ReadCounter(connection, Counter::kRevision);
     counts.keyframes = ReadCounter(connection, Counter::kKeyframes);
     counts.keyframe_bytes = ReadCounter(connection, Counter::kKeyframeBytes);
+    counts.compacted = ReadCounter(connection, Counter::kCompacted);
     counts.sessions = ReadCounter(connection, Counter::kSessions);
     counts.tiles = ReadCounter(connection, Counter::kTiles);
     counts.tile_bytes = ReadCounter(connection, Counter::kTileBytes);

@@ -1,11 +1,12 @@
 #include "server/store/sqlite/transactions.h"
 
-#include <algorithm>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/compaction_table.h"
 #include "server/store/sqlite/counters.h"
 #include "server/store/sqlite/dirty_table.h"
 #include "server/store/sqlite/footprint_table.h"
@@ -18,9 +19,37 @@
 namespace atlas {
 namespace {
 
-bool IsSameUpload(const KeyframeRow& stored, const NewKeyframe& keyframe) {
+// What was uploaded under a key.
+struct StoredUpload {
+  std::int64_t time_ms = 0;
+  std::uint64_t blob_hash = 0;
+  std::uint32_t blob_bytes = 0;
+};
+
+// Of a keyframe that is there, or was until a compaction dropped it.
+Result<std::optional<StoredUpload>> FindUpload(Connection& connection,
+                                               std::int64_t session_id,
+                                               std::uint32_t sequence) {
+  const auto row = FindKeyframeRow(connection, session_id, sequence);
+  if (!row) {
+    return Error(row.error());
+  }
+  if (*row) {
+    return StoredUpload{(*row)->record.time_ms, (*row)->blob_hash, (*row)->blob_bytes};
+  }
+  const auto tombstone = FindTombstone(connection, session_id, sequence);
+  if (!tombstone) {
+    return Error(tombstone.error());
+  }
+  if (*tombstone) {
+    return StoredUpload{(*tombstone)->time_ms, (*tombstone)->blob_hash, (*tombstone)->blob_bytes};
+  }
+  return std::nullopt;
+}
+
+bool IsSameUpload(const StoredUpload& stored, const NewKeyframe& keyframe) {
   return stored.blob_bytes == keyframe.blob.size() && stored.blob_hash == Hash64(keyframe.blob) &&
-         stored.record.time_ms == keyframe.time_ms;
+         stored.time_ms == keyframe.time_ms;
 }
 
 template <typename Tiles>
@@ -39,7 +68,7 @@ PutKeyframeResult AddKeyframe(Connection& connection,
   const std::string& author = keyframe.key.session.vehicle;
   WritePose(connection, {id, keyframe.pose, revision, 0, author});
   WriteFootprint(connection, id, keyframe.footprint, revision);
-  if (session.record.keyframes == 0) {
+  if (HasNoneYet(session.record)) {
     WriteSessionState(connection, {session.id, revision, session.record.state, author, ""});
   }
   const bool is_in_map = IsInMap(session.record.state);
@@ -64,19 +93,20 @@ Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const P
   if (!stored) {
     return Error(stored.error());
   }
-  if (stored->pose == update.pose) {
+  if (!*stored || (*stored)->pose == update.pose) {
     return PoseMove{};
   }
+  const KeyframeRecord& keyframe = **stored;
   PoseChange numbered = change;
-  numbered.keyframe_id = stored->id;
+  numbered.keyframe_id = keyframe.id;
   numbered.pose = update.pose;
   WritePose(connection, numbered);
   PoseMove move{true, {}};
-  if (IsInMap(stored->session_state)) {
-    move.tiles = ReadFootprint(connection, stored->id);
+  if (IsInMap(keyframe.session_state)) {
+    move.tiles = ReadFootprint(connection, keyframe.id);
     move.tiles.insert(move.tiles.end(), update.footprint.begin(), update.footprint.end());
   }
-  WriteFootprint(connection, stored->id, update.footprint, change.revision);
+  WriteFootprint(connection, keyframe.id, update.footprint, change.revision);
   return move;
 }
 
@@ -98,7 +128,7 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKe
   if (!session) {
     return Error(session.error());
   }
-  const auto stored = FindKeyframeRow(connection, session->id, keyframe.key.sequence);
+  const auto stored = FindUpload(connection, session->id, keyframe.key.sequence);
   if (!stored) {
     return Error(stored.error());
   }

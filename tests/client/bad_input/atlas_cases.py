@@ -181,7 +181,7 @@ def without_daemon_cases(cases, drives):
     listener.close()
     for line in (["ingest", drives.good], ["wait"], ["status"], ["point", "0", "0"],
                  ["query", "--center", "0,0", "--radius", "5"], ["sessions"], ["digest"], ["verify"],
-                 ["session", "retract", "vehicle/good"], ["digest", "--at", "1"], ["point", "0", "0", "--at", "1"],
+                 ["session", "retract", "vehicle/good"], ["compact", "--before", "1"], ["digest", "--at", "1"], ["point", "0", "0", "--at", "1"],
                  ["localize", drives.good], ["plan", "--from", "0,0,0", "--to", "1,0,0"],
                  ["render", "-o", drives.folder / "never.png"]):
         done = gone.call(*line, "--json")
@@ -206,6 +206,7 @@ def run(cases, source, work):
     upload_cases(cases, drives)
     correction_cases(cases, drives)
     other_profile_case(cases, drives, work)
+    cases.refused("compact an atlas of preset strict", ["compact", "--before", "1"], "invalid_argument", "bounded")
     place_cases(cases)
     target_cases(cases, drives, work)
     without_daemon_cases(cases, drives)

@@ -40,6 +40,9 @@ USAGE = {
     "sessions": [["more"]],
     "session": [[], ["retract"], ["restore"], ["purge", "vehicle/good"], ["retract", "vehicle/good", "more"],
                 ["restore", "vehicle"], ["retract", "vehicle/good/1"], ["retract", "--at", "1", "vehicle/good"]],
+    "compact": [[], ["more"], ["--before"], ["--before", "yesterday"], ["--before", "-1"], ["--before", "nan"],
+                ["--before", "1e13"], ["--before", "1", "--timeout", "-1"], ["--before", "1", "--before", "2"],
+                ["--before", "1", "more"]],
     "digest": [["more"], ["--timeout", "-1"], ["--at"], ["--at", "-1"], ["--at", "first"], ["--at", "1", "--at", "2"]],
     "verify": [["more"], ["--rebuild=often"], ["--timeout", "x"]],
     "segment": [

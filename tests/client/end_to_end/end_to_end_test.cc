@@ -1,69 +1,18 @@
 // From a simulated drive to a served map and back to a pose, through the real daemon: what the
 // product promises, seen from outside.
 #include <csignal>
-#include <filesystem>
 #include <fstream>
 #include <set>
 
-#include <gtest/gtest.h>
 #include <sqlite3.h>
 
 #include "client/render/image.h"
 #include "core/scan/scan_reader.h"
-#include "core/simulation/drive_writer.h"
 #include "core/tile/tile_codec.h"
-#include "tests/client/end_to_end/command_run.h"
-#include "tests/client/end_to_end/daemon_process.h"
+#include "tests/client/end_to_end/end_to_end_fixture.h"
 
 namespace atlas {
 namespace {
-
-namespace fs = std::filesystem;
-
-// The overpass, thinly sampled: two roads above each other, a jump between them.
-void WriteOverpass(const fs::path& folder) {
-  DriveOptions options;
-  options.sensor = *LidarSensorByName("h350");
-  options.spacing_m = 4.0;
-  auto world = MakeWorld(*WorldKindByName("overpass"));
-  const auto drive = SimulatedDrive::Create(*std::move(world), options);
-  ASSERT_TRUE(drive) << drive.error().message();
-  const Status status = WriteDrive(*drive, folder, {});
-  ASSERT_TRUE(status.ok()) << status.message();
-}
-
-class EndToEndTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    shared_root = fs::path(testing::TempDir()) / ("atlas_end_to_end." + std::to_string(getpid()));
-    fs::remove_all(shared_root);
-    fs::create_directories(shared_root);
-    WriteOverpass(shared_drive = shared_root / "overpass");
-  }
-  static void TearDownTestSuite() { fs::remove_all(shared_root); }
-
-  // A data directory that no other test of this run uses.
-  static fs::path NewData() { return shared_root / ("data" + std::to_string(++shared_data)); }
-
-  static CommandRun Ingest(const DaemonProcess& daemon, std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {
-        "ingest", shared_drive.string(), "--max-range", "12", "--every", "0"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunAtlas(daemon.address(), arguments);
-  }
-  static std::string Digest(const DaemonProcess& daemon) {
-    const CommandRun run = RunAtlas(daemon.address(), {"digest"});
-    EXPECT_EQ(run.exit_code, 0) << run.err;
-    return run.exit_code == 0 ? std::string(run.json().at("digest").as_string()) : "";
-  }
-
-  static const std::vector<std::string> kSmall;
-  static inline fs::path shared_root;
-  static inline fs::path shared_drive;
-  static inline int shared_data = 0;
-};
-
-const std::vector<std::string> EndToEndTest::kSmall = {"--cell-size", "0.2"};
 
 TEST_F(EndToEndTest, TwoRoadsAboveEachOtherAreTwoLayers) {
   DaemonProcess daemon(NewData(), kSmall);

@@ -43,12 +43,14 @@ inline testing::MapPose PoseAlong(std::uint32_t i) {
   return {1.5 * i - 6.0, 0.02 * i * i, 1.8, 3.0 * i};
 }
 
-inline UploadRequest DriveUpload(std::uint32_t i, const std::string& session = "day") {
+inline UploadRequest DriveUpload(std::uint32_t i,
+                                 const std::string& session = "day",
+                                 const MapProfile& profile = TestProfile()) {
   UploadRequest request;
   request.key = {{"bus", session}, i};
   request.time_ms = 1'000 + 100 * std::int64_t{i};
   request.pose = PoseOf(PoseAlong(i));
-  request.blob = EncodeKeyframe(testing::StreetKeyframe(TestProfile(), 24, 100 + i));
+  request.blob = EncodeKeyframe(testing::StreetKeyframe(profile, 24, 100 + i));
   return request;
 }
 
@@ -71,15 +73,15 @@ class ServiceTest : public ::testing::Test {
     Close();
     SqliteStoreOptions options;
     options.directory = directory_ / name;
-    options.new_profile = TestProfile();
+    options.new_profile = profile_;
     auto store = OpenSqliteStore(options);
     ASSERT_TRUE(store.has_value()) << store.error().message();
     store_ = std::move(*store);
     ServiceOptions service;
     service.fusion.workers = workers;
-    // Less than the drive: caches must not matter.
+    // Less than the drive, as a rule: caches must not matter.
     service.fusion.building.keyframe_bytes = 1u << 20;
-    service.fusion.building.surveys = {100'000, 100'000};
+    service.fusion.building.surveys = surveys_;
     service.past_cache_bytes = 1u << 20;
     service.scratch_directory = directory_;
     service_ = std::make_unique<AtlasService>(
@@ -122,6 +124,8 @@ class ServiceTest : public ::testing::Test {
     }
   }
 
+  MapProfile profile_ = TestProfile();  // of new atlases
+  SurveyCacheLimits surveys_{100'000, 100'000};
   std::filesystem::path directory_;
   std::unique_ptr<AtlasStore> store_;
   std::unique_ptr<AtlasService> service_;

@@ -91,6 +91,9 @@ class Follower {
 
   void CatchUp(AtlasStore& store) {
     const TileSources changed = store.GatherTile(tile_, revision_).value();
+    if (changed.is_whole) {
+      xs_.clear();
+    }
     for (const std::int64_t id : changed.gone) {
       xs_.erase(id);
     }
@@ -129,11 +132,19 @@ TEST_F(HistoryTest, WhoFollowsTheChangesOfATileKnowsAllOfIt) {
   };
   std::uint32_t keyframes = 0;
   for (int step = 0; step < 200; ++step) {
-    const auto kind = random() % 4;
-    if (kind == 0 || keyframes == 0) {
+    const auto kind = random() % 9;
+    if (kind <= 1 || keyframes == 0) {
       NewKeyframe keyframe = MakeKeyframe(keyframes++, footprint());
       ASSERT_TRUE(Put(std::move(keyframe)).has_value());
-    } else if (kind <= 2) {
+    } else if (kind == 8) {
+      const auto ids = store_->ListKeyframeIds(0, 1000).value();
+      std::vector<std::int64_t> dropped;
+      std::copy_if(ids.begin(), ids.end(), std::back_inserter(dropped),
+                   [&](std::int64_t) { return random() % 8 == 0; });
+      ASSERT_TRUE(Await<CompactionResult>([&](auto done) {
+                    store_->Compact({Dirty().revision, 0, dropped, "tester"}, std::move(done));
+                  }).has_value());
+    } else if (kind <= 4) {
       const auto x_um = static_cast<std::int64_t>(random() % 3);
       ASSERT_TRUE(
           Update({Moved(static_cast<std::uint32_t>(random() % keyframes), x_um, footprint())})

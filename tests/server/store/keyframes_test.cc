@@ -42,9 +42,10 @@ TEST_F(KeyframeStoreTest, UploadIsStoredAndMarksItsFootprint) {
   EXPECT_EQ(Ids(Claim()), (std::set<TileId>{kA, kB}));
   const KeyframeKey key{{"bus", "day"}, 5};
   const auto found = store_->FindKeyframes(std::vector{key}).value();
-  EXPECT_EQ(found[0].key, key);
-  EXPECT_EQ(found[0].time_ms, 1005);
-  EXPECT_EQ(store_->ReadKeyframeBlob(found[0].id).value(), (Bytes{7, 7, 5}));
+  ASSERT_TRUE(found[0].has_value());
+  EXPECT_EQ(found[0]->key, key);
+  EXPECT_EQ(found[0]->time_ms, 1005);
+  EXPECT_EQ(store_->ReadKeyframeBlob(found[0]->id).value(), (Bytes{7, 7, 5}));
 }
 
 TEST_F(KeyframeStoreTest, ResendIsADuplicateEvenAfterItsPoseWasCorrected) {

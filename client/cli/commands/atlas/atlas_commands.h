@@ -8,6 +8,7 @@
 
 namespace atlas {
 
+std::unique_ptr<Command> MakeCompactCommand();
 std::unique_ptr<Command> MakeDigestCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
 std::unique_ptr<Command> MakeSessionRestoreCommand();

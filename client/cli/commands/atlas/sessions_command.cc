@@ -13,13 +13,18 @@ boost::json::object SessionJson(const SessionSummary& session) {
           {"bytes", session.bytes},
           {"first_time_ms", session.first_time_ms},
           {"last_time_ms", session.last_time_ms},
-          {"last_sequence", session.last_sequence}};
+          {"last_sequence", session.last_sequence},
+          {"compacted", session.compacted}};
+}
+
+std::string StateText(const SessionSummary& session) {
+  return session.compacted == 0 ? session.state : session.state + ", compacted";
 }
 
 void PrintSessions(const std::vector<SessionSummary>& sessions, std::ostream& out) {
   TextTable table({"vehicle", "session", "state", ">keyframes", ">bytes", ">last sequence"});
   for (const SessionSummary& session : sessions) {
-    table.Row({session.key.vehicle, session.key.session, session.state,
+    table.Row({session.key.vehicle, session.key.session, StateText(session),
                std::to_string(session.keyframes), BytesText(session.bytes),
                std::to_string(session.last_sequence)});
   }

@@ -18,7 +18,8 @@ boost::json::object StatusJson(const AtlasStatus& status, const MapProfile& prof
           {"keyframe_bytes", status.keyframe_bytes},
           {"cells", status.cells},
           {"multilayer_cells", status.multilayer_cells},
-          {"rss_bytes", status.rss_bytes}};
+          {"rss_bytes", status.rss_bytes},
+          {"compacted", status.compacted}};
 }
 
 void PrintStatus(const AtlasStatus& status, const MapProfile& profile, std::ostream& out) {
@@ -28,6 +29,9 @@ void PrintStatus(const AtlasStatus& status, const MapProfile& profile, std::ostr
   facts.Add("sessions", std::to_string(status.sessions));
   facts.Add("keyframes",
             std::to_string(status.keyframes) + ", " + BytesText(status.keyframe_bytes));
+  if (status.compacted != 0) {
+    facts.Add("compacted", std::to_string(status.compacted) + " more, dropped since");
+  }
   facts.Add("tiles", std::to_string(status.tiles) + ", " + BytesText(status.tile_bytes));
   facts.Add("to be fused", std::to_string(status.dirty_tiles) + " tiles");
   if (status.damaged_tiles != 0) {

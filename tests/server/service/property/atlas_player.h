@@ -26,7 +26,9 @@ struct PlayCounts {
   std::uint64_t compared_past = 0;  // digests of earlier revisions
   std::uint64_t tiles = 0;          // in the compared digests
   std::uint64_t reopened = 0;
-  std::uint64_t refused = 0;  // uploads and pose batches, as they should be
+  std::uint64_t refused = 0;  // uploads, pose batches and compactions, as they should be
+  std::uint64_t compacted = 0;
+  std::uint64_t dropped = 0;  // keyframes
 };
 
 class AtlasPlayer {
@@ -57,6 +59,7 @@ class AtlasPlayer {
   void UploadTwice(const std::vector<Placing>& placings);
   void MovePoses(const std::vector<Placing>& placings);
   void ChangeSession(const Step& step);
+  void Compact(const Step& step);
   void AwaitAnswers();
   void Compare();
   void CompareTiles(const ModelAtlas::Payloads& expected);
@@ -80,6 +83,7 @@ class AtlasPlayer {
   std::vector<std::function<void()>> unanswered_;
   std::map<std::uint64_t, TileState> tiles_;  // when they were compared last
   std::vector<Note> notes_;
+  std::uint64_t horizon_ = 0;
   std::string failure_;
 };
 

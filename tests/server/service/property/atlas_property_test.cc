@@ -74,7 +74,9 @@ TEST_P(AtlasPropertyTest, TheDigestIsTheOraclesWhateverHappened) {
   std::cout << "property: " << counts.cases << " cases, " << counts.steps << " steps, "
             << counts.reopened << " restarts, " << counts.refused << " refusals, "
             << counts.compared << " digests of " << counts.tiles << " tiles, "
-            << counts.compared_past << " of the past, " << time.count() << " s" << std::endl;
+            << counts.compared_past << " of the past, " << counts.dropped
+            << " keyframes dropped in " << counts.compacted << " compactions, " << time.count()
+            << " s" << std::endl;
   RecordProperty("cases", std::to_string(counts.cases));
 }
 

@@ -15,6 +15,8 @@ const char* NameOf(StepKind kind) {
       return "move poses";
     case StepKind::kChangeSession:
       return "change session";
+    case StepKind::kCompact:
+      return "compact";
     case StepKind::kAwaitAnswers:
       return "await answers";
     case StepKind::kCompare:
@@ -56,6 +58,9 @@ std::ostream& operator<<(std::ostream& out, const Step& step) {
   if (step.kind == StepKind::kChangeSession) {
     out << ": " << (step.action == SessionAction::kRetract ? "retract " : "restore ")
         << step.session;
+  }
+  if (step.kind == StepKind::kCompact) {
+    out << " before " << step.before_ms << " ms";
   }
   if (step.kind == StepKind::kReopen) {
     out << ": " << step.setup;

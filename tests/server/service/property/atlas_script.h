@@ -46,6 +46,7 @@ enum class StepKind {
   kUploadTwice,    // all of them from two threads at once, the second in reverse order
   kMovePoses,      // one batch
   kChangeSession,  // retract or restore
+  kCompact,        // what was taken before `before_ms`
   kAwaitAnswers,   // to all that was sent
   kCompare,        // when clean: with the oracle
   kNote,           // the revision, and what the atlas was then: read again at the end
@@ -63,6 +64,7 @@ struct Step {
   std::vector<Placing> placings;
   SessionKey session;
   SessionAction action = SessionAction::kRetract;
+  std::int64_t before_ms = 0;
   DaemonSetup setup;
 };
 

@@ -6,6 +6,7 @@
 
 #include <openssl/evp.h>
 
+#include "core/base/str_cat.h"
 #include "core/fusion/keyframe_placement.h"
 #include "core/tile/tile_codec.h"
 #include "core/tile/tile_pyramid.h"
@@ -19,7 +20,7 @@ Result<PutKeyframeResult> ModelAtlas::Put(const Placing& placing) {
     return found->second.content == placing.content ? Result<PutKeyframeResult>({true, 0, 0})
                                                     : Error(StatusCode::kConflict, "other content");
   }
-  frames_[placing.frame] = {placing.content, placing.pose};
+  frames_[placing.frame] = {placing.content, placing.pose, false};
   sessions_.emplace(SessionOf(placing.frame), true);
   if (!IsLive(placing.frame)) {
     return PutKeyframeResult{};
@@ -49,8 +50,8 @@ Result<PoseBatchResult> ModelAtlas::Move(const std::vector<Placing>& placings) {
     }
   };
   for (const Placing& placing : placings) {
-    QuantizedPose& pose = frames_.at(placing.frame).pose;
-    if (pose != placing.pose) {
+    auto& [content, pose, is_dropped] = frames_.at(placing.frame);
+    if (!is_dropped && pose != placing.pose) {
       ++result.updated;
       add_footprint(placing.frame);
       pose = placing.pose;
@@ -73,7 +74,7 @@ Result<SessionChangeResult> ModelAtlas::Change(const SessionKey& key, SessionAct
   if (result.is_changed) {
     std::set<TileId> tiles;
     for (const auto& [index, frame] : frames_) {
-      if (SessionOf(index) == key) {
+      if (SessionOf(index) == key && !frame.is_dropped) {
         const std::vector<TileId> footprint = Footprint(index);
         tiles.insert(footprint.begin(), footprint.end());
       }
@@ -81,6 +82,20 @@ Result<SessionChangeResult> ModelAtlas::Change(const SessionKey& key, SessionAct
     result.tiles_marked = Touch(tiles);
   }
   return result;
+}
+
+std::string ModelAtlas::Keep(const std::set<KeyframeKey>& remaining, std::int64_t before_ms) {
+  for (auto& [index, frame] : frames_) {
+    const ScriptFrame& script = script_.frames[index];
+    if (frame.is_dropped || remaining.contains(script.key)) {
+      continue;
+    }
+    if (!IsLive(index) || script.contents[frame.content].time_ms >= before_ms) {
+      return StrCat("keyframe ", script.key, " was dropped");
+    }
+    frame.is_dropped = true;
+  }
+  return "";
 }
 
 PlacedKeyframe ModelAtlas::Placed(std::size_t index, const Frame& frame) const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "core/base/bytes.h"
@@ -29,6 +30,10 @@ class ModelAtlas {
   Result<PutKeyframeResult> Put(const Placing& placing);
   Result<PoseBatchResult> Move(const std::vector<Placing>& placings);
   Result<SessionChangeResult> Change(const SessionKey& key, SessionAction action);
+  // Makes the accepted keyframes `remaining` ones; the others were dropped, and may be sent again.
+  // Empty, or what should not have been dropped: what was not taken before `before_ms`, or is in no
+  // live session.
+  std::string Keep(const std::set<KeyframeKey>& remaining, std::int64_t before_ms);
 
   Payloads Tiles() const;
   // Level-0 tiles that changes could reach since this was asked last, and their ancestors.
@@ -38,10 +43,13 @@ class ModelAtlas {
   struct Frame {
     std::size_t content = 0;
     QuantizedPose pose;
+    bool is_dropped = false;
   };
 
   const SessionKey& SessionOf(std::size_t frame) const { return script_.frames[frame].key.session; }
-  bool IsLive(std::size_t frame) const { return sessions_.at(SessionOf(frame)); }
+  bool IsLive(std::size_t frame) const {
+    return sessions_.at(SessionOf(frame)) && !frames_.at(frame).is_dropped;
+  }
   PlacedKeyframe Placed(std::size_t index, const Frame& frame) const;
   std::vector<TileId> Footprint(std::size_t index) const;
   std::uint32_t Touch(const std::set<TileId>& tiles);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -44,7 +45,8 @@ class Drawing {
   void DrawProfile();
   void DrawFrames();
   void DrawSession(const SessionKey& key);
-  FrameContent DrawContent(std::uint32_t sequence);
+  Keyframe DrawKeyframe();
+  FrameContent MakeContent(Keyframe keyframe, std::uint32_t sequence);
   DaemonSetup DrawSetup();
   Eigen::Quaterniond DrawTilt(double max_deg);
   QuantizedPose DrawPose(std::size_t frame);
@@ -59,6 +61,10 @@ class Drawing {
   double centre_x_m_ = 0.0;
   double centre_y_m_ = 0.0;
   std::uint32_t decks_ = 1;
+  // Most frames are the same scan at one of two places: a world that compactions thin out.
+  bool is_repeated_ = false;
+  std::optional<Keyframe> repeated_scan_;
+  std::vector<QuantizedPose> repeated_poses_;
   std::vector<SessionKey> sessions_;
   std::vector<Eigen::Quaterniond> levels_;         // R_level_sensor of each frame
   std::vector<std::vector<QuantizedPose>> poses_;  // of each frame, as they were drawn
@@ -79,8 +85,9 @@ void Drawing::DrawProfile() {
   profile.column_segments = static_cast<std::uint8_t>(2u << Below(4));
   profile.segment_height_mm = OneIn(3) ? 1'000 : 500;
   profile.stretch_keyframes = 16;
-  profile.preset = OneIn(2) ? FusionPreset::kBounded : FusionPreset::kStrict;
-  profile.band_segments = static_cast<std::uint8_t>(1 + Below(4));
+  is_repeated_ = OneIn(3);
+  profile.preset = is_repeated_ || OneIn(3) ? FusionPreset::kBounded : FusionPreset::kStrict;
+  profile.band_segments = static_cast<std::uint8_t>(1 + Below(is_repeated_ ? 2 : 4));
   profile.band_vehicle_segments = static_cast<std::uint8_t>(1 + Below(3));
   const std::array<double, 4> far_m{0.0, 0.8, -1'234.0, 1'600'000.0};
   centre_x_m_ = OneOf(far_m);
@@ -91,7 +98,7 @@ void Drawing::DrawProfile() {
 void Drawing::DrawFrames() {
   const std::array<std::string, 5> names{"s1", "s10", "s2", "A", "a"};
   const std::uint32_t vehicles = 1 + Below(3);
-  const std::uint32_t sessions = 1 + Below(5);
+  const std::uint32_t sessions = is_repeated_ ? 5 + Below(4) : 1 + Below(5);
   for (std::uint32_t i = 0; i < sessions; ++i) {
     const SessionKey key{"car" + std::to_string(Below(vehicles)), OneOf(names)};
     if (std::find(sessions_.begin(), sessions_.end(), key) == sessions_.end()) {
@@ -110,10 +117,15 @@ void Drawing::DrawSession(const SessionKey& key) {
   const std::uint32_t count = 1 + Below(8);
   for (std::uint32_t i = 0; i < count; ++i) {
     ScriptFrame frame{{key, sequence}, {}};
-    levels_.push_back(DrawTilt(5.0));
+    levels_.push_back(DrawTilt(is_repeated_ ? 0.0 : 5.0));
     FrameContent& right = frame.contents[0];
-    right = DrawContent(sequence);
-    frame.contents[1] = DrawContent(sequence);
+    const bool is_again = repeated_scan_ && !OneIn(6);
+    Keyframe scan = is_again ? *repeated_scan_ : DrawKeyframe();
+    if (is_repeated_ && !repeated_scan_) {
+      repeated_scan_ = scan;
+    }
+    right = MakeContent(std::move(scan), sequence);
+    frame.contents[1] = MakeContent(DrawKeyframe(), sequence);
     frame.contents[1].time_ms = right.time_ms;
     frame.contents[2] = right;
     frame.contents[2].time_ms += 700;
@@ -125,7 +137,7 @@ void Drawing::DrawSession(const SessionKey& key) {
 
 // Grounds of 40 mm noise below the sensor and some far off, so that layers join, split and straddle
 // the gates.
-FrameContent Drawing::DrawContent(std::uint32_t sequence) {
+Keyframe Drawing::DrawKeyframe() {
   const auto radius = static_cast<std::int32_t>(6 + Below(15));
   Keyframe keyframe =
       RandomKeyframe(script_.profile, radius, static_cast<std::uint32_t>(random_()));
@@ -135,6 +147,10 @@ FrameContent Drawing::DrawContent(std::uint32_t sequence) {
     }
   }
   keyframe.level_quaternion = Quantized(levels_.back());
+  return keyframe;
+}
+
+FrameContent Drawing::MakeContent(Keyframe keyframe, std::uint32_t sequence) {
   // Seconds are what tiles tell of times; they do not always follow the sequence.
   const std::int64_t time_ms = 5'000 + 500 * std::int64_t{sequence} - (OneIn(4) ? 3'000 : 0);
   FrameContent content{time_ms, nullptr, EncodeKeyframe(keyframe)};
@@ -165,6 +181,9 @@ Eigen::Quaterniond Drawing::DrawTilt(double max_deg) {
 
 // Near the others as a rule, on one of the decks, at times one that the frame had before.
 QuantizedPose Drawing::DrawPose(std::size_t frame) {
+  if (repeated_poses_.size() == 2 && !OneIn(6)) {
+    return repeated_poses_[Below(2)];
+  }
   std::vector<QuantizedPose>& before = poses_[frame];
   if (!before.empty() && OneIn(3)) {
     return before[Below(static_cast<std::uint32_t>(before.size()))];
@@ -179,6 +198,9 @@ QuantizedPose Drawing::DrawPose(std::size_t frame) {
   const Eigen::Quaterniond tilt = DrawTilt(1.5);
   T_world_sensor.linear() = (yaw * tilt * levels_[frame]).toRotationMatrix();
   before.push_back(QuantizedPose::FromPose(T_world_sensor));
+  if (is_repeated_ && repeated_poses_.size() < 2) {
+    repeated_poses_.push_back(before.back());
+  }
   return before.back();
 }
 
@@ -255,7 +277,11 @@ void Drawing::AddChance() {
   } else if (chance < 88) {
     step.kind = StepKind::kAwaitAnswers;
     script_.steps.push_back(std::move(step));
-  } else if (chance < 94) {
+  } else if (chance < 92) {
+    step.kind = StepKind::kCompact;
+    step.before_ms = OneIn(2) ? 1'000'000 : 5'000 + 500 * std::int64_t{Below(40)};
+    script_.steps.push_back(std::move(step));
+  } else if (chance < 96) {
     step.kind = StepKind::kCompare;
     script_.steps.push_back(std::move(step));
   } else {
