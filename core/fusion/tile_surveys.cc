@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
-#include <tuple>
 #include <utility>
 
 #include "core/base/small_sort.h"
-#include "core/fusion/disc.h"
-#include "core/fusion/fusion_stretch.h"
 
 namespace atlas {
 namespace {
@@ -29,11 +26,6 @@ void SortByStretch(std::vector<SegmentView>& segments) {
 
 }  // namespace
 
-TileSurveys::Surveyed TileSurveys::Describe(const FrameOnMap& frame) {
-  return {frame.key.sequence, frame.grid.radius_cells, frame.time_ms, frame.content,
-          frame.placement};
-}
-
 std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
                                             const FusionContext& context) {
   const MapProfile& profile = context.profile;
@@ -44,7 +36,7 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
     touched_ = CellSet(tile_.cell_begin.size() - 1);
     touched_.Fill();
   }
-  std::vector<Wanted> wanted = Plan(change, profile);
+  std::vector<PlannedStretch> wanted = Plan(change, profile);
   SurveyForgottenAgain(wanted);
   TakeStretches(wanted, profile);
   Settle(profile);
@@ -57,7 +49,7 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
     if (stretch.open) {
       open_.push_back(i);
     }
-    for (const Surveyed& frame : std::span(stretch.frames).subspan(wanted[i].kept)) {
+    for (const StretchMember& frame : std::span(stretch.frames).subspan(wanted[i].kept)) {
       expected.push_back({{stretch.key, frame.sequence},
                           frame.time_ms,
                           frame.placement,
@@ -77,113 +69,48 @@ void TileSurveys::Add(const FrameOnMap& frame,
   awaited_.pop_back();
 }
 
-// What the tile is to be made of, in canonical order, and what there is of it already: of a stretch
-// that grows at its end, all of its survey; of one that changes otherwise, nothing.
-std::vector<TileSurveys::Wanted> TileSurveys::Plan(const TileChange& change,
-                                                   const MapProfile& profile) {
-  std::vector<Wanted> wanted;
-  wanted.reserve(stretches_.size() + 1);
+std::vector<PlannedStretch> TileSurveys::Plan(const TileChange& change, const MapProfile& profile) {
+  std::vector<PlannedStretch> plan;
+  plan.reserve(stretches_.size() + 1);
   for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
     Stretch& stretch = stretches_[i];
     const std::size_t surveyed = stretch.frames.size();
-    wanted.push_back({stretch.key, stretch.number, std::move(stretch.frames), i, surveyed});
+    plan.push_back({stretch.key, stretch.number, std::move(stretch.frames), i, surveyed});
   }
-  const Square tile = TileSquare(id_, profile);
-  std::vector<std::uint64_t> absent = change.absent;
-  std::vector<const FrameOnMap*> present;
-  for (const FrameOnMap& frame : change.present) {
-    if (Touches(FootprintDisc(frame.placement, frame.grid), tile)) {
-      present.push_back(&frame);
-    } else {
-      absent.push_back(frame.content);
-    }
-  }
-  std::sort(absent.begin(), absent.end());
-  std::sort(present.begin(), present.end(),
-            [](const FrameOnMap* a, const FrameOnMap* b) { return a->key < b->key; });
-  Remove(absent, wanted);
-  for (const FrameOnMap* frame : present) {
-    Place(*frame, profile, wanted);
-  }
-  std::erase_if(wanted, [](const Wanted& w) { return w.frames.empty(); });
-  return wanted;
-}
-
-// `contents` sorted.
-void TileSurveys::Remove(std::span<const std::uint64_t> contents,
-                         std::vector<Wanted>& wanted) const {
-  if (contents.empty()) {
-    return;
-  }
-  const auto is_gone = [&](const Surveyed& frame) {
-    return std::binary_search(contents.begin(), contents.end(), frame.content);
-  };
-  for (Wanted& w : wanted) {
-    if (std::erase_if(w.frames, is_gone) > 0) {
-      w.old = kNone;
-      w.kept = 0;
-    }
-  }
-}
-
-void TileSurveys::Place(const FrameOnMap& frame,
-                        const MapProfile& profile,
-                        std::vector<Wanted>& wanted) const {
-  const std::uint32_t number = StretchNumber(frame.key, profile);
-  const auto is_before = [&](const Wanted& w, const FrameOnMap& f) {
-    return std::tie(w.key, w.number) < std::tie(f.key.session, number);
-  };
-  auto w = std::lower_bound(wanted.begin(), wanted.end(), frame, is_before);
-  if (w == wanted.end() || w->key != frame.key.session || w->number != number) {
-    w = wanted.insert(w, {frame.key.session, number, {}, kNone, 0});
-  }
-  const Surveyed placed = Describe(frame);
-  const auto at = std::lower_bound(
-      w->frames.begin(), w->frames.end(), placed,
-      [](const Surveyed& a, const Surveyed& b) { return a.sequence < b.sequence; });
-  if (at != w->frames.end() && *at == placed) {
-    return;
-  }
-  if (static_cast<std::size_t>(at - w->frames.begin()) < w->kept) {
-    w->old = kNone;
-    w->kept = 0;
-  }
-  if (at != w->frames.end() && at->sequence == placed.sequence) {
-    *at = placed;
-  } else {
-    w->frames.insert(at, placed);
-  }
+  ApplyChange(change, id_, profile, plan);
+  return plan;
 }
 
 // What was forgotten did not count beside the settled segments as they were: where those change,
 // all that was forgotten is surveyed again.
-void TileSurveys::SurveyForgottenAgain(std::span<Wanted> wanted) const {
+void TileSurveys::SurveyForgottenAgain(std::span<PlannedStretch> wanted) const {
   std::size_t unchanged = 0;
-  for (const Wanted& w : wanted) {
-    unchanged += w.old != kNone && !stretches_[w.old].open && w.kept == w.frames.size() ? 1u : 0u;
+  for (const PlannedStretch& w : wanted) {
+    unchanged +=
+        w.old != PlannedStretch::kNone && !stretches_[w.old].open && w.kept == w.frames.size() ? 1u
+                                                                                               : 0u;
   }
   const auto settled =
       std::count_if(stretches_.begin(), stretches_.end(), [](const Stretch& s) { return !s.open; });
   if (unchanged == static_cast<std::size_t>(settled)) {
     return;
   }
-  for (Wanted& w : wanted) {
-    if (w.old != kNone && stretches_[w.old].has_forgotten) {
-      w.old = kNone;
-      w.kept = 0;
+  for (PlannedStretch& w : wanted) {
+    if (w.old != PlannedStretch::kNone && stretches_[w.old].has_forgotten) {
+      w.StartOver();
     }
   }
 }
 
-void TileSurveys::TakeStretches(std::span<Wanted> wanted, const MapProfile& profile) {
+void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfile& profile) {
   const TileBand whole{id_, 0, profile.tile_cells};
   std::vector<std::uint32_t> settled_numbers(stretches_.size(), SettledSegments::kGone);
   std::vector<Stretch> next;
   for (std::uint32_t i = 0; i < wanted.size(); ++i) {
-    Wanted& w = wanted[i];
+    PlannedStretch& w = wanted[i];
     const bool grows = w.kept < w.frames.size();
     Stretch stretch{std::move(w.key), w.number, 0, {}, {}, false, 0, 0};
-    if (w.old == kNone) {
+    if (w.old == PlannedStretch::kNone) {
       stretch.open.emplace(whole, profile);
     } else {
       stretch = std::move(stretches_[w.old]);
@@ -212,10 +139,10 @@ void TileSurveys::TakeStretches(std::span<Wanted> wanted, const MapProfile& prof
 }
 
 StretchSurvey TileSurveys::Reopen(std::uint32_t number,
-                                  std::span<const Surveyed> frames,
+                                  std::span<const StretchMember> frames,
                                   const MapProfile& profile) const {
   StretchSurvey survey({id_, 0, profile.tile_cells}, profile);
-  for (const Surveyed& frame : frames) {
+  for (const StretchMember& frame : frames) {
     survey.AddFrame({frame.sequence, frame.time_ms});
   }
   settled_.CopyTo(number, survey);
@@ -370,7 +297,7 @@ std::size_t TileSurveys::bytes() const {
                       tile_.layers.capacity() * sizeof(TileLayer) +
                       tile_.cell_begin.capacity() * sizeof(std::uint32_t);
   for (const Stretch& stretch : stretches_) {
-    bytes += sizeof(Stretch) + stretch.frames.capacity() * sizeof(Surveyed) +
+    bytes += sizeof(Stretch) + stretch.frames.capacity() * sizeof(StretchMember) +
              (stretch.open ? stretch.open->bytes() : 0);
   }
   return bytes;

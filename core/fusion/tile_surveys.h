@@ -20,17 +20,11 @@
 #include "core/fusion/cell_set.h"
 #include "core/fusion/fusion_context.h"
 #include "core/fusion/settled_segments.h"
+#include "core/fusion/stretch_plan.h"
 #include "core/fusion/stretch_survey.h"
 #include "core/fusion/tile_fusion.h"
 
 namespace atlas {
-
-// How the keyframes that touch a tile differ from those that it was made of last. Each is known by
-// its `content`, which is its own.
-struct TileChange {
-  std::vector<FrameOnMap> present;    // new ones, and those that lie otherwise than before
-  std::vector<std::uint64_t> absent;  // contents of those that are gone, or were never there
-};
 
 class TileSurveys {
  public:
@@ -53,45 +47,22 @@ class TileSurveys {
   void Unpack();
 
  private:
-  // A frame as it was surveyed.
-  struct Surveyed {
-    std::uint32_t sequence = 0;
-    std::int32_t radius_cells = 0;
-    std::int64_t time_ms = 0;
-    std::uint64_t content = 0;
-    KeyframePlacement placement;
-
-    friend bool operator==(const Surveyed&, const Surveyed&) = default;
-  };
   struct Stretch {
     SessionKey key;
     std::uint32_t number = 0;
     std::uint32_t vehicle = 0;  // equal for equal vehicle names, rising
-    std::vector<Surveyed> frames;
+    std::vector<StretchMember> frames;
     std::optional<StretchSurvey> open;  // else settled
     bool has_forgotten = false;         // some of its segments, when it settled
     std::uint32_t used = 0;             // segments that are part of a layer
     std::uint32_t grown_at = 0;         // the count of Expect() calls then
   };
-  static constexpr std::uint32_t kNone = SettledSegments::kGone;
 
-  // A stretch that the tile is to be made of.
-  struct Wanted {
-    SessionKey key;
-    std::uint32_t number = 0;
-    std::vector<Surveyed> frames;
-    std::uint32_t old = kNone;  // its number in stretches_, if its survey can go on from there
-    std::size_t kept = 0;       // frames that were surveyed
-  };
-
-  static Surveyed Describe(const FrameOnMap& frame);
-  std::vector<Wanted> Plan(const TileChange& change, const MapProfile& profile);
-  void Remove(std::span<const std::uint64_t> contents, std::vector<Wanted>& wanted) const;
-  void Place(const FrameOnMap& frame, const MapProfile& profile, std::vector<Wanted>& wanted) const;
-  void SurveyForgottenAgain(std::span<Wanted> wanted) const;
-  void TakeStretches(std::span<Wanted> wanted, const MapProfile& profile);
+  std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);
+  void SurveyForgottenAgain(std::span<PlannedStretch> wanted) const;
+  void TakeStretches(std::span<PlannedStretch> wanted, const MapProfile& profile);
   StretchSurvey Reopen(std::uint32_t number,
-                       std::span<const Surveyed> frames,
+                       std::span<const StretchMember> frames,
                        const MapProfile& profile) const;
   bool IsToSettle(std::size_t i, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
