@@ -32,7 +32,7 @@ int Folded(int sum, int said, const MapProfile& profile) {
 }  // namespace
 
 void PlainCell::Fuse(std::span<const PlainObservation> observations,
-                     std::vector<const SessionKey*>& used,
+                     std::set<const SessionKey*>& used,
                      std::vector<TileLayer>& out) {
   FindSegments(observations);
   if (profile_.preset == FusionPreset::kBounded) {
@@ -53,9 +53,8 @@ void PlainCell::Fuse(std::span<const PlainObservation> observations,
     out.push_back(Publish(i));
   }
   for (const Segment& segment : segments_) {
-    const SessionKey* key = &segment.first->key.session;
-    if (segment.layer >= 0 && (used.empty() || used.back() != key)) {
-      used.push_back(key);
+    if (segment.layer >= 0) {
+      used.insert(&segment.first->key.session);
     }
   }
 }
@@ -80,7 +79,10 @@ void PlainCell::FindSegments(std::span<const PlainObservation> observations) {
       AddTo(lent, 0, *ground.segment);
       continue;
     }
-    Segment& segment = SegmentFor(observation, stretch_begin);
+    Segment& segment =
+        SegmentFor(observation, observation.is_strong()
+                                    ? ground
+                                    : FindNearest(observation.altitude_mm, false, stretch_begin));
     if (segment.representative == nullptr ||
         observation.distance_step < segment.representative->distance_step) {
       segment.representative = &observation;
@@ -123,9 +125,7 @@ bool PlainCell::IsOneLayer(const PlainObservation& a, const PlainObservation& b)
 
 // A new one when the nearest would be another layer.
 PlainCell::Segment& PlainCell::SegmentFor(const PlainObservation& observation,
-                                          std::size_t stretch_begin) {
-  const Nearest nearest =
-      FindNearest(observation.altitude_mm, observation.is_strong(), stretch_begin);
+                                          const Nearest& nearest) {
   if (nearest.segment != nullptr && (nearest.alike == kMaxSegments ||
                                      IsOneLayer(*nearest.segment->representative, observation))) {
     return *nearest.segment;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -29,10 +30,10 @@ class PlainCell {
   PlainCell(const MapProfile& profile, const SigmaTable& sigmas)
       : profile_(profile), sigmas_(sigmas) {}
 
-  // The layers of a cell from its observations in canonical order, lowest first; sets the flag in
-  // `used` of each session that took part.
+  // The layers of a cell from its observations in canonical order, lowest first; adds to `used` a
+  // key of each session that took part.
   void Fuse(std::span<const PlainObservation> observations,
-            std::vector<const SessionKey*>& used,
+            std::set<const SessionKey*>& used,
             std::vector<TileLayer>& out);
 
  private:
@@ -67,7 +68,7 @@ class PlainCell {
   void FindSegments(std::span<const PlainObservation> observations);
   Nearest FindNearest(std::int64_t altitude_mm, bool is_strong, std::size_t stretch_begin);
   bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
-  Segment& SegmentFor(const PlainObservation& observation, std::size_t stretch_begin);
+  Segment& SegmentFor(const PlainObservation& observation, const Nearest& nearest);
   void AddTo(const PlainObservation& observation, std::int64_t weight, Segment& segment) const;
   void AddColumn(const PlainObservation& observation, Segment& segment) const;
   void KeepLatest();

@@ -1,6 +1,7 @@
 #include "tests/core/fusion/oracle/plain_fusion.h"
 
 #include <algorithm>
+#include <set>
 #include <vector>
 
 #include "core/base/integer_math.h"
@@ -19,8 +20,27 @@ class PlainResampler {
     const Int128 sin = p.sin_yaw;
     u_origin_ = RoundDiv128(2 * (p.x_um * cos + p.y_um * sin), profile.cell_size_um);
     v_origin_ = RoundDiv128(2 * (p.y_um * cos - p.x_um * sin), profile.cell_size_um);
+    center_i_ = FloorDiv(p.x_um, profile.cell_size_um);
+    center_j_ = FloorDiv(p.y_um, profile.cell_size_um);
   }
 
+  // Appends the keyframe's words on the world cells of row j from i on, one cell of `row` each.
+  void LookAlong(std::int64_t i,
+                 std::int64_t j,
+                 std::span<std::vector<PlainObservation>> row) const {
+    const std::int64_t reach = placed_.keyframe->grid.radius_cells + 1;
+    if (std::abs(j - center_j_) > reach) {
+      return;
+    }
+    for (std::vector<PlainObservation>& cell : row) {
+      if (std::abs(i - center_i_) <= reach) {
+        Look(i, j, cell);
+      }
+      ++i;
+    }
+  }
+
+ private:
   // Appends the keyframe's word on world cell (i, j), if it has one.
   void Look(std::int64_t i, std::int64_t j, std::vector<PlainObservation>& out) const {
     const KeyframePlacement& p = placed_.placement;
@@ -38,7 +58,6 @@ class PlainResampler {
     }
   }
 
- private:
   void Read(std::int32_t ix,
             std::int32_t iy,
             std::int64_t squared,
@@ -74,6 +93,8 @@ class PlainResampler {
   const MapProfile& profile_;
   std::int64_t u_origin_ = 0;
   std::int64_t v_origin_ = 0;
+  std::int64_t center_i_ = 0;  // the world cell that the sensor is in
+  std::int64_t center_j_ = 0;
 };
 
 std::vector<const PlacedKeyframe*> InOrder(std::span<const PlacedKeyframe> keyframes) {
@@ -97,20 +118,24 @@ Tile PlainFuseTile(const TileId& id,
   }
   const SigmaTable sigmas(profile, radius);
   const std::int64_t side = profile.tile_cells;
-  std::vector<std::vector<PlainObservation>> cells(static_cast<std::size_t>(side * side));
+  std::size_t cells = 0;
+  std::vector<PlainResampler> resamplers;
   for (const PlacedKeyframe* placed : InOrder(keyframes)) {
-    const PlainResampler resampler(*placed, sigmas, profile);
-    for (std::int64_t cell = 0; cell < side * side; ++cell) {
-      resampler.Look(id.x * side + cell % side, id.y * side + cell / side,
-                     cells[static_cast<std::size_t>(cell)]);
-    }
+    resamplers.emplace_back(*placed, sigmas, profile);
   }
   Tile tile = EmptyTile(id, profile);
   PlainCell fuser(profile, sigmas);
-  std::vector<const SessionKey*> used;
-  for (std::size_t cell = 0; cell < cells.size(); ++cell) {
-    fuser.Fuse(cells[cell], used, tile.layers);
-    tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
+  std::set<const SessionKey*> used;
+  std::vector<std::vector<PlainObservation>> row(static_cast<std::size_t>(side));
+  for (std::int64_t j = id.y * side; j < (id.y + 1) * side; ++j) {
+    for (const PlainResampler& resampler : resamplers) {
+      resampler.LookAlong(id.x * side, j, row);
+    }
+    for (std::vector<PlainObservation>& cell : row) {
+      fuser.Fuse(cell, used, tile.layers);
+      cell.clear();
+      tile.cell_begin[++cells] = static_cast<std::uint32_t>(tile.layers.size());
+    }
   }
   for (const SessionKey* key : used) {
     tile.contributors.push_back(*key);
