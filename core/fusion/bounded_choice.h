@@ -3,6 +3,7 @@
 // measured.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,24 +20,34 @@ class BoundedChoice {
   // `profile` must outlive the choice.
   explicit BoundedChoice(const MapProfile& profile) : profile_(profile) {}
 
-  // Removes what does not count: strong ones first and of each kind the latest, a segment counts
-  // while its band holds fewer than `band_segments`, and fewer than `band_vehicle_segments` of its
-  // vehicle. The order is kept.
-  void KeepLatest(std::vector<SegmentView>& segments);
+  // Strong ones first and of each kind the latest, a segment counts while its band holds fewer than
+  // `band_segments`, and fewer than `band_vehicle_segments` of its vehicle. Moves those that count
+  // to the front, the order kept, and says how many they are.
+  std::size_t MoveLatestToFront(std::span<SegmentView> segments);
 
  private:
+  // Bands are found by their last bits, so that others may have to be told apart.
+  static constexpr std::size_t kSlots = 64;
+  static constexpr std::uint32_t kNone = 0xFFFF'FFFF;
+
   struct Candidate {
-    std::int64_t band = 0;
+    std::int32_t band = 0;
     std::uint32_t index = 0;
+    bool counts = false;
+    std::uint32_t next = kNone;  // the one of its slot that was chosen before
   };
 
-  void FindCandidates(const std::vector<SegmentView>& segments, std::uint32_t limit);
-  static bool IsPreferred(const SegmentView& a, const SegmentView& b);
-  void ChooseOfBand(std::span<Candidate> band, const std::vector<SegmentView>& segments);
+  static std::size_t Slot(std::int32_t band) { return static_cast<std::uint32_t>(band) % kSlots; }
+  void FindCandidates(std::span<const SegmentView> segments);
+  void Choose(std::span<const SegmentView> segments, bool is_strong);
+  bool HasRoom(const Candidate& candidate, std::span<const SegmentView> segments) const;
+  std::size_t MoveRestBack(std::span<SegmentView> segments);
 
   const MapProfile& profile_;
-  std::vector<Candidate> candidates_;
-  std::vector<bool> counts_;  // by segment
+  std::vector<Candidate> candidates_;           // the latest first
+  std::array<std::uint32_t, kSlots> chosen_{};  // the last candidate of each slot, or kNone
+  std::vector<bool> is_dropped_;                // by segment
+  std::vector<SegmentView> rest_;
 };
 
 }  // namespace atlas

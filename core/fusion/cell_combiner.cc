@@ -2,9 +2,9 @@
 
 namespace atlas {
 
-void CellCombiner::Combine(std::vector<SegmentView>& segments, std::vector<TileLayer>& out) {
+void CellCombiner::Combine(std::span<SegmentView> segments, std::vector<TileLayer>& out) {
   if (profile_.preset == FusionPreset::kBounded) {
-    choice_.KeepLatest(segments);
+    segments = segments.first(choice_.MoveLatestToFront(segments));
   }
   layer_builder_.Build(segments);
   folder_.Fold(segments, layer_builder_.labels(), layer_builder_.layers(), out);

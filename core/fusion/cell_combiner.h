@@ -20,11 +20,14 @@ class CellCombiner {
   CellCombiner(const SigmaTable& sigmas, const MapProfile& profile)
       : profile_(profile), choice_(profile), layer_builder_(sigmas, profile), folder_(profile) {}
 
-  // Appends the layers of a cell to `out`. Segments in canonical order; those that do not count are
-  // removed (preset bounded).
-  void Combine(std::vector<SegmentView>& segments, std::vector<TileLayer>& out);
-  // Whether segment `i` of those that are left is part of a layer.
-  bool IsUsed(std::size_t i) const { return layer_builder_.labels()[i] != kNoLayer; }
+  // Appends the layers of a cell to `out`. Segments in canonical order; those that do not count
+  // come to stand behind those that do (preset bounded).
+  void Combine(std::span<SegmentView> segments, std::vector<TileLayer>& out);
+  // Whether segment `i`, as they stand then, is part of a layer.
+  bool IsUsed(std::size_t i) const {
+    const auto labels = layer_builder_.labels();
+    return i < labels.size() && labels[i] != kNoLayer;
+  }
 
  private:
   const MapProfile& profile_;

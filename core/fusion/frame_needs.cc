@@ -60,8 +60,8 @@ class NeedFinder {
   void MarkWhatCounts(BandSurveys& surveys) {
     for (std::size_t cell = 0; cell < surveys.cells(); ++cell) {
       surveys.Collect(cell, segments_);
-      choice_.KeepLatest(segments_);
-      for (const SegmentView& view : segments_) {
+      const std::size_t counting = choice_.MoveLatestToFront(segments_);
+      for (const SegmentView& view : std::span(segments_).first(counting)) {
         view.segment->is_used = true;
       }
     }

@@ -109,7 +109,7 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
   for (std::uint32_t i = 0; i < wanted.size(); ++i) {
     PlannedStretch& w = wanted[i];
     const bool grows = w.kept < w.frames.size();
-    Stretch stretch{std::move(w.key), w.number, 0, {}, {}, false, 0, 0};
+    Stretch stretch{std::move(w.key), w.number, 0, {}, {}, {}, false, 0, 0};
     if (w.old == PlannedStretch::kNone) {
       stretch.open.emplace(whole, profile);
     } else {
@@ -126,6 +126,10 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
       stretch.vehicle = next.back().vehicle + (is_same ? 0u : 1u);
     }
     stretch.frames = std::move(w.frames);
+    stretch.times_ms.clear();
+    for (const StretchMember& frame : stretch.frames) {
+      stretch.times_ms.push_back(frame.time_ms);
+    }
     stretch.grown_at = grows ? expected_count_ : stretch.grown_at;
     next.push_back(std::move(stretch));
   }
@@ -199,20 +203,12 @@ void TileSurveys::Settle(const MapProfile& profile) {
 
 // Leaves those of segments_ that count while they all are there.
 void TileSurveys::Forget(BoundedChoice& choice) {
-  const std::vector<SegmentView> all = segments_;
-  choice.KeepLatest(segments_);
-  if (segments_.size() == all.size()) {
-    return;
+  const std::size_t kept = choice.MoveLatestToFront(segments_);
+  for (const SegmentView& view : std::span(segments_).subspan(kept)) {
+    SetUsed(view, false);
+    stretches_[view.stretch].has_forgotten = true;
   }
-  std::size_t kept = 0;
-  for (const SegmentView& view : all) {
-    if (kept < segments_.size() && segments_[kept].segment == view.segment) {
-      ++kept;
-    } else {
-      SetUsed(view, false);
-      stretches_[view.stretch].has_forgotten = true;
-    }
-  }
+  segments_.resize(kept);
 }
 
 const Tile& TileSurveys::Combine(const FusionContext& context) {
@@ -257,19 +253,19 @@ void TileSurveys::CombineCell(std::size_t cell,
     return;
   }
   SortByStretch(segments_);
-  for (const SegmentView& view : segments_) {
-    SetUsed(view, false);
-  }
   combiner.Combine(segments_, out);
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     SetUsed(segments_[i], combiner.IsUsed(i));
   }
 }
 
+// Most stay what they were: what is not written is not to be carried back to memory.
 void TileSurveys::SetUsed(const SegmentView& view, bool is_used) {
-  stretches_[view.stretch].used += static_cast<std::uint32_t>(is_used);
-  stretches_[view.stretch].used -= static_cast<std::uint32_t>(view.segment->is_used);
-  view.segment->is_used = is_used;
+  if (view.segment->is_used != is_used) {
+    std::uint32_t& used = stretches_[view.stretch].used;
+    used = is_used ? used + 1 : used - 1;
+    view.segment->is_used = is_used;
+  }
 }
 
 void TileSurveys::CollectSettled(std::size_t cell) {
@@ -288,7 +284,7 @@ void TileSurveys::CollectOpen(std::size_t cell, std::uint32_t stretch) {
 }
 
 SegmentView TileSurveys::View(Segment& segment, std::uint32_t stretch) const {
-  return {&segment, stretches_[stretch].frames[segment.last_frame].time_ms, stretch,
+  return {&segment, stretches_[stretch].times_ms[segment.last_frame], stretch,
           stretches_[stretch].vehicle};
 }
 
@@ -298,6 +294,7 @@ std::size_t TileSurveys::bytes() const {
                       tile_.cell_begin.capacity() * sizeof(std::uint32_t);
   for (const Stretch& stretch : stretches_) {
     bytes += sizeof(Stretch) + stretch.frames.capacity() * sizeof(StretchMember) +
+             stretch.times_ms.capacity() * sizeof(std::int64_t) +
              (stretch.open ? stretch.open->bytes() : 0);
   }
   return bytes;

@@ -52,10 +52,11 @@ class TileSurveys {
     std::uint32_t number = 0;
     std::uint32_t vehicle = 0;  // equal for equal vehicle names, rising
     std::vector<StretchMember> frames;
-    std::optional<StretchSurvey> open;  // else settled
-    bool has_forgotten = false;         // some of its segments, when it settled
-    std::uint32_t used = 0;             // segments that are part of a layer
-    std::uint32_t grown_at = 0;         // the count of Expect() calls then
+    std::vector<std::int64_t> times_ms;  // of the frames: they are looked up for every segment
+    std::optional<StretchSurvey> open;   // else settled
+    bool has_forgotten = false;          // some of its segments, when it settled
+    std::uint32_t used = 0;              // segments that are part of a layer
+    std::uint32_t grown_at = 0;          // the count of Expect() calls then
   };
 
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);

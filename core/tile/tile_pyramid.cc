@@ -1,6 +1,8 @@
 #include "core/tile/tile_pyramid.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <span>
 
 #include "core/base/integer_math.h"
@@ -27,13 +29,16 @@ std::int64_t Information(const TileLayer& layer) {
   return std::max<std::int64_t>(RoundDiv(kInformationScale, SigmaOf(layer) * SigmaOf(layer)), 1);
 }
 
+// Of each nibble the larger.
 std::uint64_t MaxNibbles(std::uint64_t a, std::uint64_t b) {
-  std::uint64_t result = 0;
-  for (unsigned shift = 0; shift < 64; shift += 4) {
-    const std::uint64_t mask = std::uint64_t{15} << shift;
-    result |= std::max(a & mask, b & mask);
-  }
-  return result;
+  using Lanes = std::uint8_t __attribute__((vector_size(16)));
+  using Halves = std::array<std::uint64_t, 2>;  // the nibbles at even and at odd places
+  constexpr std::uint64_t kEven = 0x0F0F'0F0F'0F0F'0F0F;
+  const auto lanes_a = std::bit_cast<Lanes>(Halves{a & kEven, (a >> 4) & kEven});
+  const auto lanes_b = std::bit_cast<Lanes>(Halves{b & kEven, (b >> 4) & kEven});
+  const Lanes larger = lanes_a > lanes_b ? lanes_a : lanes_b;
+  const auto [even, odd] = std::bit_cast<Halves>(larger);
+  return even | (odd << 4);
 }
 
 void CombineAltitudes(std::span<const ChildLayer> group, TileLayer& parent) {
