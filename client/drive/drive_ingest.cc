@@ -52,11 +52,11 @@ class Ingest {
     if (!survey) return survey.error();
     KeyframeBuilderOptions builder_options;
     builder_options.max_range_m = options_.max_range_m;
-    builder_options.sensor_height_m = survey->sensor_height_m;
+    builder_options.mount = survey->mount;
     builder_options.ring_step = survey->ring_step;
     ATLAS_RETURN_IF_ERROR(builder_options.Validate(profile));
     builder_.emplace(profile, survey->layout, builder_options);
-    report_.sensor_height_m = survey->sensor_height_m;
+    report_.mount = survey->mount;
     if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
     return {};
   }

@@ -10,6 +10,7 @@
 #include "client/connection/keyframe_uploader.h"
 #include "client/drive/drive_selection.h"
 #include "core/base/status.h"
+#include "core/keyframe/sensor_mount.h"
 #include "core/scan/drive_folder.h"
 
 namespace atlas {
@@ -35,7 +36,7 @@ struct IngestReport {
   UploadTotals totals;
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob
-  double sensor_height_m = 0.0;
+  SensorMount mount;
   std::uint64_t sessions = 0;
 };
 

@@ -32,18 +32,20 @@ Status ForSomeScans(const DriveFolder& drive,
   return is_any_read ? Status() : first_failure;
 }
 
-Result<double> SurveyHeight(const DriveFolder& drive,
-                            const DriveSurvey& survey,
-                            const SurveyOptions& options) {
-  std::vector<LeveledScan> scans;
+Result<SensorMount> SurveyMount(const DriveFolder& drive,
+                                const DriveSurvey& survey,
+                                const SurveyOptions& options) {
+  SensorMountEstimator estimator;
   const Status status = ForSomeScans(
-      drive, options.max_height_scans, [&](const DriveScan& scan, const PointCloud& cloud) {
-        const Eigen::Quaterniond R_world_sensor(scan.T_world_sensor.linear());
-        scans.push_back(SegmentScan(cloud, survey.layout, survey.ring_step,
-                                    SplitYaw(R_world_sensor).R_level_sensor, options.segmenter));
+      drive, options.max_mount_scans, [&](const DriveScan& scan, const PointCloud& cloud) {
+        const Eigen::Quaterniond R_level_sensor =
+            SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear())).R_level_sensor;
+        estimator.Add(
+            SegmentScan(cloud, survey.layout, survey.ring_step, R_level_sensor, options.segmenter),
+            R_level_sensor);
       });
   if (!status.ok()) return Error(status);
-  return EstimateSensorHeight(scans);
+  return estimator.Estimate();
 }
 
 }  // namespace
@@ -74,13 +76,13 @@ Result<DriveSurvey> SurveySensor(const DriveFolder& drive, const SurveyOptions& 
 Result<DriveSurvey> SurveyDrive(const DriveFolder& drive, const SurveyOptions& options) {
   Result<DriveSurvey> survey = SurveySensor(drive, options);
   if (!survey) return survey;
-  if (options.sensor_height_m) {
-    survey->sensor_height_m = *options.sensor_height_m;
-    return survey;
+  const Result<SensorMount> mount = SurveyMount(drive, *survey, options);
+  if (mount) {
+    survey->mount = *mount;
+  } else if (!options.sensor_height_m) {
+    return Error(mount.error().WithContext(drive.path.string()));
   }
-  const Result<double> height_m = SurveyHeight(drive, *survey, options);
-  if (!height_m) return Error(height_m.error().WithContext(drive.path.string()));
-  survey->sensor_height_m = *height_m;
+  survey->mount.height_m = options.sensor_height_m.value_or(survey->mount.height_m);
   return survey;
 }
 

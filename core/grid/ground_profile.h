@@ -12,7 +12,7 @@
 
 namespace atlas {
 
-// The ground that the vehicle stands on: a plane parallel to the sensor's own x-y plane. Spinning
+// The ground that the vehicle stands on: a plane at a right angle to the vehicle's up. Spinning
 // sensors do not see the ground next to the vehicle (a VLP-16 from 6.7 m on), but its wheels do.
 struct VehicleContact {
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // levelled frame, unit length

@@ -9,6 +9,7 @@
 #include "core/geometry/pose.h"
 #include "core/grid/local_grid.h"
 #include "core/keyframe/keyframe.h"
+#include "core/keyframe/sensor_mount.h"
 #include "core/scan/range_image.h"
 #include "core/scan/ray_table.h"
 #include "core/scan/sensor_layout.h"
@@ -17,9 +18,9 @@
 namespace atlas {
 
 struct KeyframeBuilderOptions {
-  double max_range_m = 20.0;      // paper: 20 or 30
-  double sensor_height_m = 1.73;  // above the ground below it
-  int ring_step = 1;              // use every ring_step-th channel from the lowest
+  double max_range_m = 20.0;  // paper: 20 or 30
+  SensorMount mount;
+  int ring_step = 1;  // use every ring_step-th channel from the lowest
   SegmenterOptions segmenter;
   ProfileOptions profile;
 
@@ -55,11 +56,5 @@ class KeyframeBuilder {
   KeyframeBuilderOptions options_;
   RayTable rays_;
 };
-
-// The height of the sensor above the ground it drives on, from segmented scans: the median over the
-// ground within 12 m ahead and behind, a metre off its axis at most (pavements beside a street lie
-// a kerb higher), else all around. kInvalidData when no ground was seen, or none where a vehicle's
-// is.
-Result<double> EstimateSensorHeight(std::span<const LeveledScan> scans);
 
 }  // namespace atlas

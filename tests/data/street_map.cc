@@ -35,7 +35,7 @@ StreetMap::StreetMap(const std::filesystem::path& folder, double sensor_height_m
     estimator.Add(clouds_.back());
   }
   KeyframeBuilderOptions options;
-  options.sensor_height_m = sensor_height_m;
+  options.mount.height_m = sensor_height_m;
   const KeyframeBuilder builder(profile_, Read(estimator.Estimate()), options);
   std::map<TileId, std::vector<PlacedKeyframe>> sources;
   const DriveScan* last = nullptr;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSessionJump_m = 10.0;  // as ingest
 constexpr std::size_t kLayoutScans = 60;
-constexpr std::size_t kHeightScans = 24;
+constexpr std::size_t kMountScans = 24;
 
 PointCloud CloudOf(const SimulatedScan& scan) {
   PointCloud cloud;
@@ -48,14 +48,16 @@ Result<KeyframeBuilder> FindBuilder(const SimulatedDrive& drive,
   if (!layout) return Error(layout.error());
   KeyframeBuilderOptions options;
   options.max_range_m = range_m;
-  std::vector<LeveledScan> scans;
-  ForSomeScans(begin, end, kHeightScans, [&](std::size_t i) {
-    scans.push_back(SegmentScan(CloudOf(drive.Scan(i)), *layout, options.ring_step,
-                                LevelOf(drive.sensor_pose(i)), options.segmenter));
+  SensorMountEstimator mounts;
+  ForSomeScans(begin, end, kMountScans, [&](std::size_t i) {
+    const Eigen::Quaterniond R_level_sensor = LevelOf(drive.sensor_pose(i));
+    mounts.Add(SegmentScan(CloudOf(drive.Scan(i)), *layout, options.ring_step, R_level_sensor,
+                           options.segmenter),
+               R_level_sensor);
   });
-  const Result<double> height_m = EstimateSensorHeight(scans);
-  if (!height_m) return Error(height_m.error());
-  options.sensor_height_m = *height_m;
+  const Result<SensorMount> mount = mounts.Estimate();
+  if (!mount) return Error(mount.error());
+  options.mount = *mount;
   if (Status status = options.Validate(profile); !status.ok()) return Error(std::move(status));
   return KeyframeBuilder(profile, *layout, options);
 }

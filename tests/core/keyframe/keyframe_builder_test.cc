@@ -34,7 +34,7 @@ class KeyframeBuilderTest : public ::testing::Test {
     SensorLayoutEstimator estimator;
     estimator.Add(cloud);
     KeyframeBuilderOptions options;
-    options.sensor_height_m = kHeight_m;
+    options.mount.height_m = kHeight_m;
     const KeyframeBuilder builder(profile_, *estimator.Estimate(), options);
     Keyframe keyframe = builder.Build(cloud, R_level_sensor);
     EXPECT_TRUE(ValidateKeyframe(keyframe).ok());
@@ -132,29 +132,8 @@ TEST_F(KeyframeBuilderTest, OptionsOutOfRangeAreNamed) {
   options.max_range_m = 0.5;
   EXPECT_EQ(options.Validate(profile_).code(), StatusCode::kInvalidArgument);
   options.max_range_m = 20.0;
-  options.sensor_height_m = std::nan("");
+  options.mount.height_m = std::nan("");
   EXPECT_EQ(options.Validate(profile_).code(), StatusCode::kInvalidArgument);
-}
-
-TEST_F(KeyframeBuilderTest, GroundAboveTheSensorTellsNoHeight) {
-  LeveledScan scan;
-  for (int i = 0; i < 200; ++i) {
-    testing::AddReturn(scan, {5.0F, 0.004F * static_cast<float>(i), 0.2F}, true);
-  }
-  const auto height = EstimateSensorHeight(std::span(&scan, 1));
-  ASSERT_FALSE(height.has_value());
-  EXPECT_EQ(height.error().code(), StatusCode::kInvalidData);
-}
-
-TEST_F(KeyframeBuilderTest, SensorHeightIsTheMedianOfTheGround) {
-  const PointCloud cloud =
-      Scan(Vlp16(), [](const Eigen::Vector3d& d) { return GroundRange(d, 1.42); });
-  SensorLayoutEstimator estimator;
-  estimator.Add(cloud);
-  const std::vector<LeveledScan> scans{
-      SegmentScan(cloud, *estimator.Estimate(), 1, Eigen::Quaterniond::Identity(), {})};
-  EXPECT_NEAR(EstimateSensorHeight(scans).value(), 1.42, 0.005);
-  EXPECT_EQ(EstimateSensorHeight({}).error().code(), StatusCode::kInvalidData);
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ boost::json::object ReportJson(const IngestReport& report, double wall_s) {
           {"metres", Rounded(report.metres, 3)},
           {"bytes_sent", report.totals.bytes_sent},
           {"frontend_ms_per_scan", Rounded(FrontendMsPerScan(report), 3)},
-          {"sensor_height_m", Rounded(report.sensor_height_m, 3)},
+          {"sensor_height_m", Rounded(report.mount.height_m, 3)},
+          {"sensor_tilt_deg", Rounded(report.mount.TiltDeg(), 2)},
           {"sessions", report.sessions},
           {"wall_s", Rounded(wall_s, 3)}};
 }
@@ -38,7 +39,8 @@ void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
   facts.Add("acknowledged", StrCat(report.totals.acked, ", of them ", report.totals.duplicates,
                                    " were there already"));
   facts.Add("sent", BytesText(report.totals.bytes_sent));
-  facts.Add("sensor height", FixedText(report.sensor_height_m, 3) + " m");
+  facts.Add("sensor", StrCat(FixedText(report.mount.height_m, 3), " m above the ground, tilted by ",
+                             FixedText(report.mount.TiltDeg(), 1), " deg"));
   facts.Add("front end", FixedText(FrontendMsPerScan(report), 1) + " ms CPU a scan");
   facts.Add("time", FixedText(wall_s, 1) + " s");
   facts.Print(out);
