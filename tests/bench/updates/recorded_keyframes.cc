@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "client/drive/drive_survey.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/scan/drive_folder.h"
 #include "core/scan/scan_reader.h"
@@ -11,21 +12,18 @@ namespace atlas::testing {
 namespace {
 
 constexpr double kSpacing_m = 1.0;
-constexpr int kRings = 16;
+constexpr std::uint32_t kRings = 16;
 constexpr std::int64_t kScan_ms = 100;
 
 Result<KeyframeBuilder> BuilderFor(const DriveFolder& drive, const MapProfile& profile) {
-  SensorLayoutEstimator estimator;
-  for (const DriveScan& scan : drive.scans) {
-    const auto cloud = ReadScan(scan.scan);
-    if (!cloud) return Error(cloud.error());
-    estimator.Add(*cloud);
-  }
-  const auto layout = estimator.Estimate();
-  if (!layout) return Error(layout.error());
+  SurveyOptions survey_options;
+  survey_options.rings = kRings;
+  const auto survey = SurveyDrive(drive, survey_options);
+  if (!survey) return Error(survey.error());
   KeyframeBuilderOptions options;
-  options.ring_step = RingStep(layout->channels(), kRings);
-  return KeyframeBuilder(profile, *layout, options);
+  options.ring_step = survey->ring_step;
+  options.mount = survey->mount;
+  return KeyframeBuilder(profile, survey->layout, options);
 }
 
 }  // namespace
