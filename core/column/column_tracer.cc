@@ -140,25 +140,16 @@ void MarkBody(const GridGeometry& grid,
               const HalfSegments& halves,
               std::span<const KeyframeCell> cells,
               LocalColumns& result) {
-  const auto reach = [&grid](float half_m) {
-    return std::min(static_cast<std::int32_t>(std::lround(half_m / grid.cell_size_m())),
-                    grid.radius_cells);
-  };
-  const std::int32_t reach_x = reach(options.body.half_length_m);
-  const std::int32_t reach_y = reach(options.body.half_width_m);
-  for (std::int32_t iy = -reach_y; iy < reach_y; ++iy) {
-    for (std::int32_t ix = -reach_x; ix < reach_x; ++ix) {
-      const std::size_t cell = grid.Index(ix, iy);
-      if (cells[cell].source == AltitudeSource::kNone) {
-        continue;
-      }
+  options.body.ForEachCell(grid, [&](std::int32_t ix, std::int32_t iy) {
+    const std::size_t cell = grid.Index(ix, iy);
+    if (cells[cell].source != AltitudeSource::kNone) {
       const int anchor = result.anchors[BlockOf(iy + grid.radius_cells, ix + grid.radius_cells,
                                                 grid, options.block_cells)];
       const std::uint64_t body = SpreadToNibbles(halves.From(anchor, halves.BelowSensor()));
       result.columns[cell] =
           LowNibbles((result.columns[cell] & ~(body * 15)) | body * kNibbleFree, options.segments);
     }
-  }
+  });
 }
 
 }  // namespace

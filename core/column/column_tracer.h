@@ -8,6 +8,7 @@
 
 #include "core/geometry/keyframe_cell.h"
 #include "core/geometry/map_profile.h"
+#include "core/geometry/vehicle_body.h"
 #include "core/scan/leveled_scan.h"
 #include "core/scan/ray_table.h"
 
@@ -17,14 +18,6 @@ struct LocalColumns {
   std::vector<std::uint64_t> columns;  // grid.size() nibbles, lowest segment first; 0 = no data
   // Per block of `block_cells`, row-major: the lowest segment's index in the levelled frame.
   std::vector<std::int16_t> anchors;
-};
-
-// Where the vehicle itself is, nothing else can be: the surest evidence against what once moved
-// there. A box around the sensor, levelled frame, from the ground to the sensor's height. Default:
-// a car with its mirrors; shorter than it is, for the sensor may stand at either end.
-struct VehicleBody {
-  float half_length_m = 1.5F;
-  float half_width_m = 1.1F;
 };
 
 struct ColumnOptions {

@@ -12,10 +12,6 @@
 namespace atlas {
 namespace {
 
-std::int16_t AddSaturating(int a, int b, int clamp) {
-  return static_cast<std::int16_t>(std::clamp(a + b, -clamp, clamp));
-}
-
 void SetRepresentative(const Observation& observation, Segment& segment) {
   segment.altitude_mm = observation.altitude_mm;
   segment.distance_step = observation.distance_step;
@@ -181,6 +177,17 @@ std::uint32_t StretchSurvey::AddSegment(std::size_t cell, const Segment& segment
   return index;
 }
 
+// As columns: where the vehicle stood evidence goes deeper than misses do, and hits add up from
+// there.
+std::int16_t StretchSurvey::AddOccupancy(int evidence, Occupancy occupancy) const {
+  if (occupancy == Occupancy::kDriven) {
+    return static_cast<std::int16_t>(-clamp_.driven);
+  }
+  const int added = occupancy_units_[static_cast<std::size_t>(occupancy)];
+  const int lowest = std::min<int>(evidence, -clamp_.usual);
+  return static_cast<std::int16_t>(std::clamp<int>(evidence + added, lowest, clamp_.usual));
+}
+
 void StretchSurvey::AddEvidence(const Observation& observation,
                                 Occupancy occupancy,
                                 std::int64_t weight,
@@ -194,8 +201,7 @@ void StretchSurvey::AddEvidence(const Observation& observation,
   }
   segment.last_frame = frame;
   segment.is_strong |= observation.is_strong();
-  segment.occupancy = AddSaturating(
-      segment.occupancy, occupancy_units_[static_cast<std::size_t>(occupancy)], clamp_.usual);
+  segment.occupancy = AddOccupancy(segment.occupancy, occupancy);
   if (observation.column != 0) {
     AddNibbles(observation.column, std::int64_t{observation.column_base} - segment.column_base,
                clamp_, segment.column, segment.column_seen);

@@ -86,6 +86,7 @@ class StretchSurvey {
                    std::int64_t weight,
                    std::uint32_t frame,
                    std::uint32_t segment);
+  std::int16_t AddOccupancy(int evidence, Occupancy occupancy) const;
   bool IsOneLayer(const Observation& observation,
                   const Match& match,
                   const SigmaTable& sigmas) const;
@@ -95,7 +96,7 @@ class StretchSurvey {
   MapProfile profile_;
   TileBand band_;
   EvidenceClamp clamp_;
-  std::array<std::int16_t, 3> occupancy_units_;  // by Occupancy
+  std::array<std::int16_t, 3> occupancy_units_;  // by Occupancy, but kDriven
   std::vector<StretchFrame> frames_;
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;

@@ -6,7 +6,12 @@
 namespace atlas {
 
 // Frozen: 2 bits each in the keyframe blob.
-enum class Occupancy : std::uint8_t { kUnknown = 0, kFree = 1, kObstacle = 2 };
+enum class Occupancy : std::uint8_t {
+  kUnknown = 0,
+  kFree = 1,
+  kObstacle = 2,
+  kDriven = 3,  // the vehicle itself stands there
+};
 enum class AltitudeSource : std::uint8_t {
   kNone = 0,          // the cell was not seen
   kMeasured = 1,      // ground returns fell into it

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "core/geometry/vehicle_body.h"
 #include "core/scan/leveled_scan.h"
 #include "core/scan/ray_table.h"
 
@@ -26,6 +27,7 @@ struct VehicleContact {
 
 struct ProfileOptions {
   float contact_radius_m = 1.5F;     // how far around the sensor the vehicle's plane is the ground
+  VehicleBody body;                  // what it stands on was driven on
   float vehicle_clearance_m = 2.5F;  // higher above the ground a vehicle passes below
   // A ground return must be reachable from the one before it at this slope plus this step, and
   // where it lies a step above all ground before it, the slope must show before the gap or behind

@@ -147,6 +147,9 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
       cell.occupancy = cell.occupancy == Occupancy::kUnknown ? Occupancy::kFree : cell.occupancy;
     }
   }
+  options.body.ForEachCell(rays.grid(), [&](std::int32_t ix, std::int32_t iy) {
+    grid.cells[rays.grid().Index(ix, iy)].occupancy = Occupancy::kDriven;
+  });
   altitudes.Store(grid.cells);
   for (KeyframeCell& cell : grid.cells) {
     if (cell.source == AltitudeSource::kNone) {

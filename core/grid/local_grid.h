@@ -14,7 +14,8 @@ struct LocalGrid {
   std::vector<KeyframeCell> cells;  // grid.size()
 };
 
-// Traces the virtual scan: each cell is updated at most once, hits before misses. Free cells
+// Traces the virtual scan: each cell is updated at most once, hits before misses, and those below
+// the vehicle itself are driven. Free cells
 // between ground returns get an interpolated altitude; cells beyond an obstacle that a return or a
 // ray above reached stay unknown and get the altitude of the nearest ground on the ray.
 LocalGrid BuildLocalGrid(const LeveledScan& scan,

@@ -24,7 +24,7 @@ bool IsUnit(const std::array<std::int32_t, 4>& quaternion) {
 
 Status CheckCell(const Keyframe& keyframe, std::size_t index) {
   const KeyframeCell& cell = keyframe.cells[index];
-  if (cell.occupancy > Occupancy::kObstacle || cell.source > AltitudeSource::kExtrapolated) {
+  if (cell.occupancy > Occupancy::kDriven || cell.source > AltitudeSource::kExtrapolated) {
     return Status(StatusCode::kInvalidData,
                   StrCat("keyframe: cell ", index, " has an unknown occupancy or altitude source"));
   }

@@ -115,7 +115,7 @@ Status ReadStates(ByteReader& in, Keyframe& keyframe, std::size_t& seen) {
   for (std::size_t i = 0; i < states.size(); ++i) {
     const unsigned source = states[i] & 3u;
     const unsigned occupancy = states[i] >> 2u;
-    if (occupancy > 2 || (source == 0 && occupancy != 0)) {
+    if (source == 0 && occupancy != 0) {
       return Status(StatusCode::kInvalidData,
                     StrCat("keyframe: cell ", i, " has state ", unsigned{states[i]}));
     }

@@ -58,6 +58,27 @@ TEST(TileEvidenceTest, WhatWasSeenLastDecides) {
   EXPECT_EQ(OccupancyOf({x, Session("a", 50, Occupancy::kUnknown)}), 64);  // says nothing
 }
 
+TEST(TileEvidenceTest, WhereTheVehicleStoodOneCanDrive) {
+  const auto occupancy_after = [](std::uint32_t hits_before, std::uint32_t hits_after) {
+    std::vector<PlacedKeyframe> keyframes;
+    const auto add = [&](Occupancy occupancy) {
+      const auto sequence = static_cast<std::uint32_t>(keyframes.size());
+      keyframes.push_back(See({.occupancy = occupancy}, {"car", "a", sequence}));
+    };
+    for (std::uint32_t i = 0; i < hits_before; ++i) add(Occupancy::kObstacle);
+    add(Occupancy::kDriven);
+    add(Occupancy::kFree);  // goes no deeper
+    for (std::uint32_t i = 0; i < hits_after; ++i) add(Occupancy::kObstacle);
+    return Middle(keyframes)[0].occupancy;
+  };
+  EXPECT_EQ(occupancy_after(50, 0), -64);  // as much as a stretch may say
+  EXPECT_EQ(occupancy_after(0, 5), 5 * 25 - 127);
+  EXPECT_EQ(occupancy_after(0, 6), 6 * 25 - 127);  // something came to stand there
+  // A later visit that sees something there is believed.
+  const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 1});
+  EXPECT_EQ(OccupancyOf({{driven}, Session("b", 100, Occupancy::kObstacle)}), 64 - 48);
+}
+
 TEST(TileEvidenceTest, AStretchFoldsInTheOrderOfItsSequence) {
   // Hits saturate at +64 in four; one miss before or after them differs.
   const auto occupancy_with_miss_at = [](std::uint32_t sequence) {

@@ -130,7 +130,7 @@ TEST(KeyframeCodecTest, RefusesBodiesOfTheWrongLength) {
 
 TEST(KeyframeCodecTest, RefusesStatesThatNoCellHas) {
   Bytes body = EncodeKeyframeBody(RandomKeyframe(MapProfile(), 8, 5));
-  body[0] = 0x0C;  // occupancy 3
+  body[0] = 0x0C;  // driven, but not seen
   EXPECT_TRUE(BodyIsRefused(body, 8));
   body[0] = 0x04;  // free, but not seen
   EXPECT_TRUE(BodyIsRefused(body, 8));

@@ -69,7 +69,7 @@ Keyframe RandomKeyframe(const MapProfile& profile, std::int32_t radius_cells, st
     if (cell.source == AltitudeSource::kNone) {
       continue;
     }
-    cell.occupancy = static_cast<Occupancy>(random() % 3);
+    cell.occupancy = static_cast<Occupancy>(random() % 4);
     cell.altitude_mm = static_cast<std::int16_t>(random());
     const std::uint64_t bits = (std::uint64_t{random()} << 32) | random();
     keyframe.columns[i] = random() % 3 == 0 ? bits & SegmentMask(profile) : 0;

@@ -147,8 +147,11 @@ void PlainCell::AddTo(const PlainObservation& observation,
   const int units = observation.occupancy == Occupancy::kObstacle ? profile_.hit_units
                     : observation.occupancy == Occupancy::kFree   ? profile_.miss_units
                                                                   : 0;
+  const int floor = std::min<int>(segment.occupancy, -profile_.stretch_clamp);
   segment.occupancy =
-      std::clamp<int>(segment.occupancy + units, -profile_.stretch_clamp, profile_.stretch_clamp);
+      observation.occupancy == Occupancy::kDriven
+          ? -profile_.driven_clamp
+          : std::clamp<int>(segment.occupancy + units, floor, profile_.stretch_clamp);
   if (observation.column != 0) {
     AddColumn(observation, segment);
   }
