@@ -38,6 +38,7 @@ Localizer::Localizer(const MapProfile& profile, TilesAround tiles, const Localiz
 void Localizer::Start(const Pose& T_world_sensor) {
   last_ = T_world_sensor;
   motion_.reset();
+  was_good_ = false;
   is_first_ = true;
   usual_fit_ = 0.0;
   lost_ = 0;
@@ -78,13 +79,14 @@ void Localizer::Remember(const LocalizationResult& result) {
       motion_.reset();  // looked for where it got to
     }
   } else {
-    const bool is_motion_known = !is_first_ && lost_ == 0;
-    if (is_motion_known && (motion_ || result.health == LocalizationHealth::kGood)) {
+    const bool is_good = result.health == LocalizationHealth::kGood;
+    if (!is_first_ && lost_ == 0 && (motion_ || (is_good && was_good_))) {
       motion_ = last_.inverse() * result.T_world_sensor;
     }
     lost_ = 0;
   }
   last_ = result.T_world_sensor;
+  was_good_ = result.health == LocalizationHealth::kGood;
   is_first_ = false;
 }
 

@@ -93,6 +93,7 @@ class Localizer {
   Eigen::Vector3d window_center_ = Eigen::Vector3d::Zero();
   Pose last_ = Pose::Identity();  // T_world_sensor
   std::optional<Pose> motion_;    // from one scan to the next, sensor frame
+  bool was_good_ = false;         // the last scan: the speed is known from two such in a row
   bool is_first_ = true;
   double usual_fit_ = 0.0;  // of good results, exponentially forgotten
   int lost_ = 0;            // scans in a row
