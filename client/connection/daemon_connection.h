@@ -27,7 +27,7 @@ class DaemonConnection {
   // returns that failure.
   Status Send(ByteSpan frame, std::chrono::milliseconds timeout);
   // The payload of the next frame. kUnavailable when the peer closed, kTimeout when the frame was
-  // not whole in time, kInvalidData or kResourceExhausted when it is not a frame.
+  // not whole in time, kInvalidData when it is not a frame.
   Result<Bytes> Receive(std::chrono::milliseconds timeout);
 
   const Endpoint& endpoint() const;

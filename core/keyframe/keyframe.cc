@@ -39,7 +39,8 @@ Status CheckCell(const Keyframe& keyframe, std::size_t index) {
 }  // namespace
 
 Status ValidateKeyframeFrame(const GridGeometry& grid,
-                             const std::array<std::int32_t, 4>& level_quaternion) {
+                             const std::array<std::int32_t, 4>& level_quaternion,
+                             std::int32_t sensor_height_mm) {
   if (grid.radius_cells < 1 || grid.radius_cells > Keyframe::kMaxRadiusCells) {
     return Status(StatusCode::kInvalidData,
                   StrCat("keyframe: radius is ", grid.radius_cells, " cells, expected 1 to ",
@@ -52,11 +53,18 @@ Status ValidateKeyframeFrame(const GridGeometry& grid,
   if (!IsUnit(level_quaternion)) {
     return Status(StatusCode::kInvalidData, "keyframe: level quaternion's length is not 1");
   }
+  if (sensor_height_mm < Keyframe::kMinSensorHeight_mm ||
+      sensor_height_mm > Keyframe::kMaxSensorHeight_mm) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("keyframe: sensor height is ", sensor_height_mm, " mm, expected ",
+                         Keyframe::kMinSensorHeight_mm, " to ", Keyframe::kMaxSensorHeight_mm));
+  }
   return {};
 }
 
 Status ValidateKeyframe(const Keyframe& keyframe) {
-  ATLAS_RETURN_IF_ERROR(ValidateKeyframeFrame(keyframe.grid, keyframe.level_quaternion));
+  ATLAS_RETURN_IF_ERROR(
+      ValidateKeyframeFrame(keyframe.grid, keyframe.level_quaternion, keyframe.sensor_height_mm));
   const std::size_t size = keyframe.grid.size();
   if (keyframe.cells.size() != size || keyframe.columns.size() != size ||
       keyframe.anchors.size() != keyframe.block_count()) {

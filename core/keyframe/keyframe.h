@@ -16,6 +16,8 @@ struct Keyframe {
   static constexpr std::int32_t kMaxRadiusCells = 1024;
   // Column anchors stand per block of this many cells a side, counted from the grid's corner.
   static constexpr std::int32_t kBlockCells = 8;
+  static constexpr std::int32_t kMinSensorHeight_mm = 100;
+  static constexpr std::int32_t kMaxSensorHeight_mm = 10'000;
 
   std::uint64_t profile_hash = 0;
   GridGeometry grid;
@@ -47,6 +49,7 @@ struct Keyframe {
 // The invariants of a keyframe; kInvalidData naming the first one broken:
 //  - 1 <= radius_cells <= kMaxRadiusCells, cell size within a map profile's limits;
 //  - the level quaternion has length 1 within 1e-6;
+//  - kMinSensorHeight_mm <= sensor_height_mm <= kMaxSensorHeight_mm;
 //  - cells and columns have grid.size() elements, anchors block_count();
 //  - enumerators are in range;
 //  - a cell not seen (source kNone) has altitude 0, unknown occupancy and no column.
@@ -54,6 +57,7 @@ Status ValidateKeyframe(const Keyframe& keyframe);
 
 // The part of it that holds for what the blob's header says.
 Status ValidateKeyframeFrame(const GridGeometry& grid,
-                             const std::array<std::int32_t, 4>& level_quaternion);
+                             const std::array<std::int32_t, 4>& level_quaternion,
+                             std::int32_t sensor_height_mm);
 
 }  // namespace atlas

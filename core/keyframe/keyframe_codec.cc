@@ -82,7 +82,8 @@ Status ParseHeader(ByteReader& in, KeyframeHeader& header, BodySizes& sizes) {
   if (!in.ok()) {
     return Status(StatusCode::kInvalidData, "keyframe: header is truncated");
   }
-  ATLAS_RETURN_IF_ERROR(ValidateKeyframeFrame(header.grid, header.level_quaternion));
+  ATLAS_RETURN_IF_ERROR(
+      ValidateKeyframeFrame(header.grid, header.level_quaternion, header.sensor_height_mm));
   return CheckSizes(in, header.grid, sizes);
 }
 

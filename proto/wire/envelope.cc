@@ -25,7 +25,7 @@ Status Malformed() {
 }
 
 Status TooMany(const char* what, std::uint32_t limit) {
-  return Status(StatusCode::kResourceExhausted,
+  return Status(StatusCode::kInvalidData,
                 StrCat("envelope: too many ", what, ", expected at most ", limit));
 }
 
@@ -86,7 +86,7 @@ class ShapeCheck {
 
 Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
   if (payload.size() > kMaxFrameBytes) {
-    return Error(StatusCode::kResourceExhausted,
+    return Error(StatusCode::kInvalidData,
                  StrCat("envelope: ", payload.size(), " bytes, expected at most ", kMaxFrameBytes));
   }
   CodedInputStream shape(payload.data(), static_cast<int>(payload.size()));
@@ -107,9 +107,8 @@ Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
 Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope) {
   const std::size_t size = envelope.ByteSizeLong();
   if (size > kMaxFrameBytes) {
-    return Error(
-        StatusCode::kResourceExhausted,
-        StrCat("envelope: message of ", size, " bytes, expected at most ", kMaxFrameBytes));
+    return Error(StatusCode::kInvalidArgument, StrCat("envelope: message of ", size,
+                                                      " bytes, expected at most ", kMaxFrameBytes));
   }
   Bytes frame(kFrameHeaderBytes + size);
   envelope.SerializeWithCachedSizesToArray(frame.data() + kFrameHeaderBytes);

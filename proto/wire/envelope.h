@@ -17,12 +17,12 @@ inline constexpr std::uint32_t kMaxRepeatedFields = 1u << 18;
 // Fields this build does not know, in one envelope; they are skipped and dropped.
 inline constexpr std::uint32_t kMaxUnknownFields = 1024;
 
-// The payload of one frame. kInvalidData when it is not an Envelope, kResourceExhausted when it is
-// larger than a frame may be or breaks one of the limits above. An envelope whose body this build
-// does not know parses, with BODY_NOT_SET.
+// The payload of one frame. kInvalidData when it is not an Envelope, is larger than a frame may be
+// or breaks one of the limits above. An envelope whose body this build does not know parses, with
+// BODY_NOT_SET.
 Result<wire::Envelope> ParseEnvelope(ByteSpan payload);
 
-// Header and payload, ready to be written. kResourceExhausted when the payload is above
+// Header and payload, ready to be written. kInvalidArgument when the payload is above
 // kMaxFrameBytes.
 Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope);
 

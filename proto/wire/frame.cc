@@ -54,9 +54,8 @@ Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload
   result.payload_bytes = in.U32();
   result.checksum = in.U32();
   if (result.payload_bytes > max_payload_bytes) {
-    return Error(StatusCode::kResourceExhausted,
-                 StrCat("frame: payload of ", result.payload_bytes, " bytes, expected at most ",
-                        max_payload_bytes));
+    return Error(StatusCode::kInvalidData, StrCat("frame: payload of ", result.payload_bytes,
+                                                  " bytes, expected at most ", max_payload_bytes));
   }
   return result;
 }

@@ -27,7 +27,7 @@ struct FrameHeader {
 };
 
 // Exactly kFrameHeaderBytes bytes in. kInvalidData when the magic is wrong (another protocol on
-// this port), kResourceExhausted when the length is above `max_payload_bytes`.
+// this port) or the length is above `max_payload_bytes`.
 Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload_bytes);
 
 // kInvalidData when the payload does not have the header's checksum.

@@ -20,26 +20,42 @@ struct Setting {
   const char* key;  // in the file
   const char* flag;
   const char* environment;
+  const char* value;  // what kind of one, for --help
   const char* help;
 };
 
 constexpr Setting kSettings[] = {
-    {"data", "--data", "ATLASD_DATA", "directory of the atlas; made if there is none"},
-    {"listen", "--listen", "ATLASD_LISTEN",
-     "HOST:PORT, loopback only; port 0 takes a free one (127.0.0.1:7447)"},
-    {"workers", "--workers", "ATLASD_WORKERS", "fusion threads; 0 is one a core (0)"},
-    {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "memory for decoded keyframes (128)"},
-    {"survey_mib", "--survey-mib", "ATLASD_SURVEY_MIB",
-     "memory for what tiles keep from one fusion to the next (384)"},
-    {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "debug, info, warning or error (info)"},
-    {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "new atlas: metres a cell (0.1)"},
-    {"map.segments", "--segments", "ATLASD_SEGMENTS",
-     "new atlas: segments a column: 2, 4, 8 or 16 (8)"},
-    {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT",
-     "new atlas: metres a segment (1)"},
-    {"map.preset", "--preset", "ATLASD_PRESET",
-     "new atlas: fusion preset: strict, bounded or paper (strict)"},
+    {"data", "--data", "ATLASD_DATA", "DIR", "directory of the atlas; made if there is none"},
+    {"listen", "--listen", "ATLASD_LISTEN", "HOST:PORT", "loopback only; port 0 takes a free one"},
+    {"workers", "--workers", "ATLASD_WORKERS", "N", "fusion threads; 0 is one a core"},
+    {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "MIB", "memory for decoded keyframes"},
+    {"survey_mib", "--survey-mib", "ATLASD_SURVEY_MIB", "MIB",
+     "memory for what tiles keep from one fusion to the next"},
+    {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error"},
+    {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell"},
+    {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
+     "new atlas: segments a column: 2, 4, 8 or 16"},
+    {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT", "M",
+     "new atlas: height of a segment"},
+    {"map.preset", "--preset", "ATLASD_PRESET", "NAME",
+     "new atlas: fusion preset: strict, bounded or paper"},
 };
+
+// What each setting is when it is not given, for --help.
+std::map<std::string, std::string> Defaults() {
+  const DaemonConfig config;
+  const MapProfile map;
+  return {{"data", "must be given"},
+          {"listen", StrCat(config.host, ":", config.port)},
+          {"workers", StrCat(config.workers)},
+          {"cache_mib", StrCat(config.cache_mib)},
+          {"survey_mib", StrCat(config.survey_mib)},
+          {"log_level", config.log_level},
+          {"map.cell_size", StrCat(map.cell_size_m())},
+          {"map.segments", StrCat(int{map.column_segments})},
+          {"map.segment_height", StrCat(map.segment_height_m())},
+          {"map.preset", StrCat(FusionPresetName(map.preset))}};
+}
 
 using Settings = std::map<std::string, GivenSetting>;
 
@@ -221,14 +237,16 @@ Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
   app.set_version_flag("--version", "atlasd " ATLAS_VERSION);
   Settings flags;
   std::string file;
-  app.add_option("--config", file, "TOML file with these settings");
+  app.add_option("--config", file, "TOML file with these settings")->type_name("FILE");
+  const std::map<std::string, std::string> defaults = Defaults();
   for (const Setting& setting : kSettings) {
-    app.add_option_function<std::string>(
+    CLI::Option* option = app.add_option_function<std::string>(
         setting.flag,
         [&flags, &setting](const std::string& value) {
           flags[setting.key] = {value, setting.flag};
         },
-        setting.help);
+        StrCat(setting.help, " [", defaults.at(setting.key), "]"));
+    option->type_name(setting.value);
   }
   DaemonCommand command;
   try {

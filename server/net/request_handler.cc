@@ -81,6 +81,11 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyW
 }
 
 asio::awaitable<Status> RequestHandler::Refuse(const Envelope& request) {
+  if (request.has_hello()) {
+    co_return Status(StatusCode::kInvalidArgument,
+                     StrCat("request ", request.request_id(),
+                            ": this connection has been greeted already, a Hello comes once"));
+  }
   co_return Status(StatusCode::kUnsupported, StrCat("request ", request.request_id(),
                                                     ": this daemon does not know its body (",
                                                     static_cast<int>(request.body_case()), ")"));

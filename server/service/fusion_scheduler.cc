@@ -35,7 +35,7 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
       refresher_(store, options.building) {
   for (unsigned i = 0; i < options_.workers; ++i) {
     threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
-      RunWorker(stop, owner);
+      RunWorker(stop, {owner, {}});
     });
   }
 }
@@ -51,12 +51,13 @@ void FusionScheduler::Stop() {
   threads_.clear();  // joins
 }
 
-void FusionScheduler::RunWorker(const std::stop_token& stop, const std::string& owner) {
+void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
   while (!stop.stop_requested()) {
     const std::uint64_t seen = changes_.version();
-    const std::vector<TileClaim> claims = NextClaims(owner);
+    const std::vector<TileClaim> claims =
+        GiveBack(worker) ? NextClaims(worker.owner) : std::vector<TileClaim>();
     if (!claims.empty()) {
-      BuildClaims(claims, stop);
+      BuildClaims(worker, claims, stop);
     } else if (!changes_.is_closed()) {
       changes_.WaitPast(seen, std::chrono::steady_clock::now() + kLookAgain, stop);
     } else {
@@ -97,12 +98,13 @@ bool FusionScheduler::StartNextWave(std::uint64_t done) {
 }
 
 // The store writes those that are done while the others are built.
-void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
+void FusionScheduler::BuildClaims(Worker& worker,
+                                  const std::vector<TileClaim>& claims,
                                   const std::stop_token& stop) {
   std::vector<TileId> ids;
   for (const TileClaim& claim : claims) {
     if (stop.stop_requested()) {
-      GiveBack(claim, 0);
+      worker.returns.push_back({claim, 0});
     } else {
       ids.push_back(claim.id);
     }
@@ -112,7 +114,7 @@ void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
     const TileClaim& claim =
         *std::find_if(claims.begin(), claims.end(), [&](const TileClaim& c) { return c.id == id; });
     if (!built) {
-      PostponeFailed(claim, built.error());
+      PostponeFailed(worker, claim, built.error());
       return;
     }
     damage_.Remove(id);
@@ -127,9 +129,10 @@ void FusionScheduler::BuildClaims(const std::vector<TileClaim>& claims,
     if (!result && result.error().code() == StatusCode::kConflict) {
       log_(LogLevel::kWarning, "fusion: " + result.error().message());
     } else if (!result) {
-      PostponeFailed(tile.claim, result.error());
+      PostponeFailed(worker, tile.claim, result.error());
     }
   }
+  GiveBack(worker);
   changes_.Notify();
 }
 
@@ -153,16 +156,30 @@ void FusionScheduler::Build(std::span<const TileId> ids, const TileRefresher::On
   }
 }
 
-void FusionScheduler::GiveBack(const TileClaim& claim, std::int64_t retry_at_ms) {
-  const auto released =
-      Await<bool>([&](auto done) { store_.ReleaseClaim(claim, retry_at_ms, std::move(done)); });
-  if (!released) {  // the lease runs out by itself
-    log_(LogLevel::kWarning,
-         StrCat("fusion: cannot release tile ", claim.id, ": ", released.error().message()));
+// False when the store takes none now, a full disk, say: the rest is kept for the next time. A
+// damaged store will not take it then either; that lease runs out by itself.
+bool FusionScheduler::GiveBack(Worker& worker) {
+  const bool has_returns = !worker.returns.empty();
+  while (!worker.returns.empty()) {
+    const Return& back = worker.returns.back();
+    const auto released = Await<bool>(
+        [&](auto done) { store_.ReleaseClaim(back.claim, back.retry_at_ms, std::move(done)); });
+    if (!released) {
+      log_(LogLevel::kWarning,
+           StrCat("fusion: cannot release tile ", back.claim.id, ": ", released.error().message()));
+      if (released.error().code() != StatusCode::kInvalidData) {
+        return false;
+      }
+    }
+    worker.returns.pop_back();
   }
+  if (has_returns) {
+    changes_.Notify();
+  }
+  return true;
 }
 
-void FusionScheduler::PostponeFailed(const TileClaim& claim, const Status& why) {
+void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why) {
   const std::int64_t backoff =
       std::min(options_.max_backoff_ms, options_.min_backoff_ms << std::min(claim.attempts, 20u));
   const bool is_damage = why.code() == StatusCode::kInvalidData &&
@@ -176,7 +193,7 @@ void FusionScheduler::PostponeFailed(const TileClaim& claim, const Status& why) 
   log_(is_news ? LogLevel::kError : LogLevel::kDebug,
        StrCat("fusion: tile ", claim.id, " keeps its content and stays dirty, next attempt in ",
               backoff, " ms: ", why.message()));
-  GiveBack(claim, clock_() + backoff);
+  worker.returns.push_back({claim, clock_() + backoff});
 }
 
 // True when there are some that can be built again, and the parent then.

@@ -54,13 +54,24 @@ class FusionScheduler {
   const DamageList& damage() const { return damage_; }
 
  private:
-  void RunWorker(const std::stop_token& stop, const std::string& owner);
+  struct Return {
+    TileClaim claim;
+    std::int64_t retry_at_ms = 0;
+  };
+  struct Worker {
+    std::string owner;
+    std::vector<Return> returns;  // claims to be given back; no others are taken before they are
+  };
+
+  void RunWorker(const std::stop_token& stop, Worker worker);
   std::vector<TileClaim> NextClaims(const std::string& owner);
   bool StartNextWave(std::uint64_t done);
-  void BuildClaims(const std::vector<TileClaim>& claims, const std::stop_token& stop);
+  void BuildClaims(Worker& worker,
+                   const std::vector<TileClaim>& claims,
+                   const std::stop_token& stop);
   void Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built);
-  void GiveBack(const TileClaim& claim, std::int64_t retry_at_ms);
-  void PostponeFailed(const TileClaim& claim, const Status& why);
+  bool GiveBack(Worker& worker);
+  void PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why);
   bool MarkDamagedChildren(const TileId& parent);
 
   AtlasStore& store_;

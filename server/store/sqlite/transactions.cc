@@ -139,8 +139,8 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKe
     return Error(
         StatusCode::kConflict,
         StrCat("keyframe ", keyframe.key,
-               " is in the atlas with other content: another scan, sensor height, range or "
-               "number of rings"));
+               " is in the atlas with other content: another scan, time (--start), sensor height, "
+               "range, number of rings or --deskew"));
   }
   return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
 }

@@ -56,7 +56,7 @@ TEST(AtlasClientTest, OversizedFrameIsRefusedWithoutReadingIt) {
               socket.Write(header.bytes());
               socket.Drain();
             }),
-            StatusCode::kResourceExhausted);
+            StatusCode::kInvalidData);
 }
 
 TEST(AtlasClientTest, HalfAFrameIsTimeout) {

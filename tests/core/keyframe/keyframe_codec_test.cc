@@ -152,13 +152,25 @@ TEST(KeyframeCodecTest, RefusesLyingHeaders) {
     std::size_t offset;
     unsigned value;  // of 16 bits
   };
-  for (const Lie& lie : {Lie{"radius 0", 17, 0}, Lie{"radius 1025", 17, 1'025},
-                         Lie{"another radius", 17, 5}, Lie{"65 m cells", 15, 1'000},
-                         Lie{"a short quaternion", 21, 0}, Lie{"a huge body", 41, 0xFFFF}}) {
+  for (const Lie& lie :
+       {Lie{"radius 0", 17, 0}, Lie{"radius 1025", 17, 1'025}, Lie{"another radius", 17, 5},
+        Lie{"65 m cells", 15, 1'000}, Lie{"a short quaternion", 21, 0},
+        Lie{"a sensor 9.9 cm up", 35, 99}, Lie{"a sensor 10.001 m up", 35, 10'001},
+        Lie{"a sensor 2 km below the ground", 37, 0xFFE0}, Lie{"a huge body", 41, 0xFFFF}}) {
     Bytes bad = blob;
     bad[lie.offset] = static_cast<std::uint8_t>(lie.value);
     bad[lie.offset + 1] = static_cast<std::uint8_t>(lie.value >> 8);
     EXPECT_EQ(DecodeError(WithChecksum(bad)), StatusCode::kInvalidData) << lie.about;
+  }
+}
+
+TEST(KeyframeCodecTest, SensorHeightsThatABuilderTakesReadBack) {
+  for (const std::int32_t height_mm : {100, 10'000}) {
+    Keyframe keyframe = BlankKeyframe(MapProfile(), 4);
+    keyframe.sensor_height_mm = height_mm;
+    const auto decoded = DecodeKeyframe(EncodeKeyframe(keyframe));
+    ASSERT_TRUE(decoded.has_value()) << decoded.error().message();
+    EXPECT_EQ(decoded->sensor_height_mm, height_mm);
   }
 }
 
@@ -175,6 +187,9 @@ TEST(KeyframeCodecTest, ValidateNamesWhatIsWrong) {
   keyframe = BlankKeyframe(MapProfile(), 4);
   keyframe.anchors.push_back(0);
   EXPECT_FALSE(ValidateKeyframe(keyframe).ok());
+  keyframe = BlankKeyframe(MapProfile(), 4);
+  keyframe.sensor_height_mm = -1;
+  EXPECT_NE(ValidateKeyframe(keyframe).message().find("-1 mm"), std::string::npos);
 }
 
 TEST(KeyframeCodecTest, GoldenFileReadsAndEncodesEqual) {

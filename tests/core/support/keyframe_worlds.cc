@@ -1,5 +1,6 @@
 #include "tests/core/support/keyframe_worlds.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -62,7 +63,8 @@ void FillDisc(Keyframe& keyframe, const KeyframeCell& cell, std::uint64_t column
 Keyframe RandomKeyframe(const MapProfile& profile, std::int32_t radius_cells, std::uint32_t seed) {
   std::mt19937 random(seed);
   Keyframe keyframe = BlankKeyframe(profile, radius_cells);
-  keyframe.sensor_height_mm = static_cast<std::int32_t>(random() % 3'000);
+  keyframe.sensor_height_mm =
+      std::max(Keyframe::kMinSensorHeight_mm, static_cast<std::int32_t>(random() % 3'000));
   for (std::size_t i = 0; i < keyframe.cells.size(); ++i) {
     KeyframeCell& cell = keyframe.cells[i];
     cell.source = static_cast<AltitudeSource>(random() % 4);

@@ -65,13 +65,13 @@ TEST(EnvelopeTest, CapsRepeatedElements) {
   const Bytes empty_update = {0x0A, 0x00};
   EXPECT_EQ(ParseCode(EnvelopeWithPoses(Repeat(empty_update, 1000))), StatusCode::kOk);
   EXPECT_EQ(ParseCode(EnvelopeWithPoses(Repeat(empty_update, kMaxRepeatedFields + 1))),
-            StatusCode::kResourceExhausted);
+            StatusCode::kInvalidData);
 }
 
 TEST(EnvelopeTest, CapsElementsSpreadOverSeveralBodies) {
   const Bytes half = EnvelopeWithPoses(Repeat({0x0A, 0x00}, kMaxRepeatedFields / 2 + 1));
   EXPECT_EQ(ParseCode(half), StatusCode::kOk);
-  EXPECT_EQ(ParseCode(Repeat(half, 2)), StatusCode::kResourceExhausted);
+  EXPECT_EQ(ParseCode(Repeat(half, 2)), StatusCode::kInvalidData);
 }
 
 TEST(EnvelopeTest, IgnoresAndDropsAFewUnknownFields) {
@@ -80,7 +80,7 @@ TEST(EnvelopeTest, IgnoresAndDropsAFewUnknownFields) {
   ASSERT_TRUE(envelope.has_value()) << envelope.error().message();
   EXPECT_EQ(envelope->ByteSizeLong(), 0u);
   EXPECT_EQ(envelope->body_case(), wire::Envelope::BODY_NOT_SET);
-  EXPECT_EQ(ParseCode(Repeat(unknown, kMaxUnknownFields + 1)), StatusCode::kResourceExhausted);
+  EXPECT_EQ(ParseCode(Repeat(unknown, kMaxUnknownFields + 1)), StatusCode::kInvalidData);
 }
 
 TEST(EnvelopeTest, RefusesAMessageLargerThanAFrame) {
@@ -88,7 +88,7 @@ TEST(EnvelopeTest, RefusesAMessageLargerThanAFrame) {
   envelope.mutable_tile()->set_blob(std::string(kMaxFrameBytes, 'x'));
   const auto frame = EncodeEnvelopeFrame(envelope);
   ASSERT_FALSE(frame.has_value());
-  EXPECT_EQ(frame.error().code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(frame.error().code(), StatusCode::kInvalidArgument);
 }
 
 }  // namespace

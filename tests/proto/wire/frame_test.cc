@@ -109,7 +109,7 @@ TEST(FrameTest, RefusesALengthAboveTheLimit) {
   decoder.Push(header);
   const auto next = decoder.Next();
   ASSERT_FALSE(next.has_value());
-  EXPECT_EQ(next.error().code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(next.error().code(), StatusCode::kInvalidData);
   header[4] = 100;
   EXPECT_TRUE(DecodeFrameHeader(header, 100).has_value());
 }

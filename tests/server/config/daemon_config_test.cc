@@ -208,6 +208,34 @@ TEST_F(DaemonConfigTest, HelpAndVersionArePrintedNotRefused) {
   EXPECT_THAT(version->text.value(), HasSubstr("atlasd "));
 }
 
+// The brackets behind a flag's help: what it is when it is not given.
+std::string DefaultInHelp(const std::string& help, const std::string& flag_and_value) {
+  const std::size_t flag = help.find("  " + flag_and_value + " ");
+  if (flag == std::string::npos) {
+    return "no " + flag_and_value;
+  }
+  const std::size_t begin = help.find('[', flag) + 1;
+  return help.substr(begin, help.find(']', begin) - begin);
+}
+
+TEST_F(DaemonConfigTest, HelpNamesTheDefaultsThatCount) {
+  const std::string help = Parse({"--help"})->text.value();
+  const DaemonConfig config;
+  const MapProfile map = config.NewProfile().value();
+  EXPECT_EQ(DefaultInHelp(help, "--data DIR"), "must be given");
+  EXPECT_EQ(DefaultInHelp(help, "--listen HOST:PORT"),
+            config.host + ":" + std::to_string(config.port));
+  EXPECT_EQ(DefaultInHelp(help, "--workers N"), std::to_string(config.workers));
+  EXPECT_EQ(DefaultInHelp(help, "--cache-mib MIB"), std::to_string(config.cache_mib));
+  EXPECT_EQ(DefaultInHelp(help, "--survey-mib MIB"), std::to_string(config.survey_mib));
+  EXPECT_EQ(DefaultInHelp(help, "--log-level LEVEL"), config.log_level);
+  EXPECT_DOUBLE_EQ(std::stod(DefaultInHelp(help, "--cell-size M")), map.cell_size_m());
+  EXPECT_EQ(DefaultInHelp(help, "--segments N"), std::to_string(map.column_segments));
+  EXPECT_DOUBLE_EQ(std::stod(DefaultInHelp(help, "--segment-height M")), map.segment_height_m());
+  EXPECT_EQ(DefaultInHelp(help, "--preset NAME"), FusionPresetName(map.preset));
+  EXPECT_EQ(help.find("TEXT"), std::string::npos);
+}
+
 TEST_F(DaemonConfigTest, AnExistingMapIsKeptToUnlessNothingWasAsked) {
   MapProfile existing;
   existing.segment_height_mm = 500;

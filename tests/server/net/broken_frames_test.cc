@@ -72,7 +72,13 @@ TEST_F(BrokenFrameTest, AFrameThatClaimsTooMuch) {
   for (const std::uint32_t claim : {kMaxFrameBytes + 1, 0x7FFF'FFFFu, 0xFFFF'FFFFu}) {
     const auto peer = Connect();
     peer->SendBytes(HeaderClaiming(claim));
-    EXPECT_EQ(LastWords(*peer), StatusCode::kResourceExhausted) << claim;
+    const auto reply = peer->Receive();
+    ASSERT_TRUE(reply.has_value()) << claim;
+    EXPECT_EQ(reply->request_id(), 0u);
+    EXPECT_EQ(CodeOf(reply), StatusCode::kInvalidData) << claim;
+    EXPECT_FALSE(reply->error().retry());
+    EXPECT_EQ(reply->error().retry_after_ms(), 0u);
+    EXPECT_TRUE(peer->IsClosed());
   }
 }
 

@@ -173,7 +173,8 @@ TEST_F(LimitTest, ALargeHelloIsRefused) {
   Serve();
   BlockingPeer peer(port_);
   const wire::Envelope reply = peer.Greet(kProtocolMajor, std::string(20'000, 'p'));
-  EXPECT_EQ(CodeOf(reply), StatusCode::kResourceExhausted);
+  EXPECT_EQ(CodeOf(reply), StatusCode::kInvalidData);
+  EXPECT_FALSE(reply.error().retry());
   EXPECT_TRUE(peer.IsClosed());
 }
 

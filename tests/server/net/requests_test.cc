@@ -171,6 +171,20 @@ TEST_F(RequestTest, ErrorsAreTypedAndTheConnectionGoesOn) {
   EXPECT_TRUE(peer->Receive()->has_status_reply());
 }
 
+TEST_F(RequestTest, ASecondHelloIsToldSo) {
+  Serve();
+  const auto peer = Connect();
+  wire::Envelope hello;
+  hello.set_request_id(7);
+  hello.mutable_hello()->set_protocol_major(kProtocolMajor);
+  peer->Send(hello);
+  const auto reply = peer->Receive();
+  EXPECT_EQ(CodeOf(reply), StatusCode::kInvalidArgument);
+  EXPECT_NE(reply->error().message().find("greeted already"), std::string::npos);
+  peer->Send(StatusOf(8));
+  EXPECT_TRUE(peer->Receive()->has_status_reply());
+}
+
 TEST_F(RequestTest, AWaitThatRunsOutSaysSo) {
   Serve(0);  // nothing is ever fused
   UploadDrive(1);

@@ -15,7 +15,7 @@ class SimulateCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     request_.Declare(arguments);
-    arguments.Required("-o,--output", "DIR", directory_, "Folder to write; must not exist");
+    arguments.Required("-o,--output", "DIR", directory_, "Folder to write; new or empty");
   }
 
   Status Run(CommandContext& context) override {

@@ -56,7 +56,11 @@ Result<DriveOptions> SimulationRequest::Options() const {
 
 Result<SimulatedDrive> SimulationRequest::DriveBuiltIn(const DriveOptions& options) const {
   const Result<WorldKind> kind = WorldKindByName(world_);
-  if (!kind) return Error(kind.error().WithContext("no built-in world and no .obj file"));
+  if (!kind) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("world '", world_,
+                        "': expected street, overpass, garage, city or the name of an .obj file"));
+  }
   if (!trajectory_.empty() || every_m_ != 0.0) {
     return Error(StatusCode::kInvalidArgument,
                  StrCat("the ", world_,
