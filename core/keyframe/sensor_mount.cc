@@ -7,12 +7,13 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "core/keyframe/keyframe.h"
 
 namespace atlas {
 namespace {
 
-constexpr double kMinHeight_m = 0.1;
-constexpr double kMaxHeight_m = 10.0;
+constexpr double kMinHeight_m = 1e-3 * Keyframe::kMinSensorHeight_mm;
+constexpr double kMaxHeight_m = 1e-3 * Keyframe::kMaxSensorHeight_mm;
 
 double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

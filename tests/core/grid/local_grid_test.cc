@@ -64,6 +64,10 @@ class LocalGridTest : public ::testing::Test {
     }
   }
 
+  static bool IsBelowVehicle(double x_m, double y_m) {
+    return std::abs(x_m) < 1.5 && std::abs(y_m) < 1.1;
+  }
+
   RayTable rays_{GridGeometry{100'000, 200}};
   VehicleContact contact_{Eigen::Vector3f::UnitZ(), kHeight_m};
   ProfileOptions options_;
@@ -80,7 +84,8 @@ TEST_F(LocalGridTest, HeightsLieOnTheSlopeWhereverTheyComeFrom) {
     ForEach(grid, [&](const KeyframeCell& cell, double x, double y) {
       if (std::hypot(x, y) < 10.0) {
         sources.insert(cell.source);
-        ASSERT_EQ(cell.occupancy, Occupancy::kFree) << x << " " << y;
+        ASSERT_EQ(cell.occupancy, IsBelowVehicle(x, y) ? Occupancy::kDriven : Occupancy::kFree)
+            << x << " " << y;
         // Half a cell off the middle, either way.
         const double slack_mm = 2.0 + 71.0 * gradient.norm();
         ASSERT_NEAR(cell.altitude_mm,
@@ -220,8 +225,8 @@ TEST_F(LocalGridTest, AHitStaysAHitWhereOtherRaysPass) {
 }
 
 TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
-  // Any scan: a cell is an obstacle if a ray ends in it at one or something is seen to stand in it
-  // behind, else free if a ray passed it, else unknown.
+  // Any scan: a cell is driven below the vehicle, else an obstacle if a ray ends in it at one or
+  // something is seen to stand in it behind, else free if a ray passed it, else unknown.
   std::mt19937 random(81);
   std::uniform_real_distribution<float> coordinate(-21.0F, 21.0F);
   for (int round = 0; round < 5; ++round) {
@@ -262,6 +267,9 @@ TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
     for (const std::uint32_t cell : hits) {
       expected[cell] = Occupancy::kObstacle;
     }
+    options_.body.ForEachCell(rays_.grid(), [&](std::int32_t ix, std::int32_t iy) {
+      expected[rays_.grid().Index(ix, iy)] = Occupancy::kDriven;
+    });
     int different = 0;  // where float division and multiplication round a border apart
     for (std::size_t i = 0; i < expected.size(); ++i) {
       different += grid.cells[i].occupancy != expected[i] ? 1 : 0;
@@ -308,7 +316,7 @@ TEST_F(LocalGridTest, TheVehicleStandsOnItsWheelsPlane) {
     ForEach(grid, [&](const KeyframeCell& cell, double x, double y) {
       if (std::hypot(x, y) < 1.35) {
         ASSERT_EQ(cell.source, AltitudeSource::kMeasured) << x << " " << y;
-        ASSERT_EQ(cell.occupancy, Occupancy::kFree);
+        ASSERT_EQ(cell.occupancy, IsBelowVehicle(x, y) ? Occupancy::kDriven : Occupancy::kFree);
         const float z_m = contact_.HeightAt(static_cast<float>(x), static_cast<float>(y));
         ASSERT_NEAR(cell.altitude_mm, 1000.0F * z_m, 15.0F);
       } else if (std::hypot(x, y) > 1.7) {
@@ -341,7 +349,7 @@ TEST_F(LocalGridTest, GroundOutOfReachOfItsNumbersIsNotSeen) {
     const LocalGrid grid = Build(LeveledScan());
     const KeyframeCell& cell = At(grid, 0.05, 0.05);
     EXPECT_EQ(cell.source != AltitudeSource::kNone, std::abs(z_m) < 32.0F) << z_m;
-    EXPECT_EQ(cell.occupancy == Occupancy::kFree, std::abs(z_m) < 32.0F) << z_m;
+    EXPECT_EQ(cell.occupancy == Occupancy::kDriven, std::abs(z_m) < 32.0F) << z_m;
     if (std::abs(z_m) < 32.0F) {
       EXPECT_NEAR(cell.altitude_mm, 1000.0F * z_m, 1.0F);
     }
