@@ -9,6 +9,7 @@ import math
 import os
 import pathlib
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -119,6 +120,41 @@ def localization(bin_dir):
     assert far.failures <= 0.02 * far.shots
 
 
+def ground(bin_dir):
+    """The map's ground near the path, which mostly no ray reached, against labelled returns of other scans."""
+    for piece in ("00", "02", "04", "08"):
+        folder = drive(f"semantickitti_mini/{piece}")
+        returns = ground_near_path(folder, 1.5)
+        with tempfile.TemporaryDirectory() as work:
+            atlas = Atlas(bin_dir, work)
+            height = atlas.run("ingest", folder, "--every", 0)["sensor_height_m"]
+            atlas.run("wait")
+            errors = []
+            for (x, y), heights in sorted(returns.items())[::max(1, len(returns) // 40)]:
+                layers = atlas.run("point", (x + 0.5) / 10, (y + 0.5) / 10)["layers"]
+                mean = sum(heights) / len(heights)
+                errors.append(min((layer["z_m"] - mean for layer in layers), key=abs))
+            assert atlas.stop() == 0
+        median = sorted(errors)[len(errors) // 2]
+        print(f"{piece}: sensor {height} m up, ground off by {median:+.3f} m in {len(errors)} cells (median)")
+        assert abs(median) <= 0.02
+
+
+def ground_near_path(folder, reach_m):
+    """World cells of 0.1 m within reach of the path: heights of the labelled ground returns in each, three or more."""
+    poses = [list(map(float, line.split())) for line in (folder / "poses.txt").read_text().splitlines()]
+    heights = {}
+    for scan, pose in zip(sorted((folder / "velodyne").iterdir()), poses):
+        labels = struct.iter_unpack("<HH", (folder / "labels" / f"{scan.stem}.label").read_bytes())
+        for (x, y, z, _), (label, _) in zip(struct.iter_unpack("<4f", scan.read_bytes()), labels):
+            if label not in (40, 44, 48, 49, 60, 72) or x * x + y * y > 18 ** 2:
+                continue
+            east, north, up = (pose[r] * x + pose[r + 1] * y + pose[r + 2] * z + pose[r + 3] for r in (0, 4, 8))
+            if any((east - p[3]) ** 2 + (north - p[7]) ** 2 < reach_m ** 2 for p in poses):
+                heights.setdefault((math.floor(east * 10), math.floor(north * 10)), []).append(up)
+    return {cell: ups for cell, ups in heights.items() if len(ups) >= 3}
+
+
 class Shots:
     """Summaries of `atlas localize`, pooled over all shots that did not fail."""
 
@@ -194,7 +230,8 @@ def main():
             finally:
                 assert atlas.stop() == 0
     else:
-        {"localization": localization, "segmentation": segmentation, "order": order}[name](bin_dir)
+        {"localization": localization, "segmentation": segmentation, "order": order,
+         "ground": ground}[name](bin_dir)
 
 
 if __name__ == "__main__":
