@@ -30,7 +30,7 @@ double MedianHeight(std::span<const Eigen::Vector3d> points) {
 }
 
 // z = plane.x x + plane.y y + plane.z, levelled frame, and how well it fits.
-struct PlaneFit {
+struct GroundFit {
   Eigen::Vector3d plane;
   double spread_m = 0.0;
 };
@@ -52,7 +52,7 @@ double Residual(const Eigen::Vector3d& plane, const Eigen::Vector3d& point) {
 
 // Weighted least squares, again and again: what lies off the plane (a kerb, the foot of a ramp)
 // weighs less from round to round (Geman and McClure's weights).
-std::optional<PlaneFit> FitGround(std::span<const Eigen::Vector3d> points) {
+std::optional<GroundFit> FitGround(std::span<const Eigen::Vector3d> points) {
   constexpr int kRounds = 16;
   constexpr double kFirstScale_m = 1.0;
   constexpr double kLastScale_m = 0.03;  // the sensor's noise
@@ -61,7 +61,7 @@ std::optional<PlaneFit> FitGround(std::span<const Eigen::Vector3d> points) {
   if (points.size() < kEnough) {
     return std::nullopt;
   }
-  PlaneFit fit{{0.0, 0.0, MedianHeight(points)}, 0.0};
+  GroundFit fit{{0.0, 0.0, MedianHeight(points)}, 0.0};
   double scale_m = kFirstScale_m;
   for (int round = 0; round < kRounds; ++round) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
@@ -107,7 +107,7 @@ Status SensorMount::Validate() const {
 void SensorMountEstimator::Add(const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor) {
   constexpr float kLane_m = 1.5F;
   constexpr float kAnywhere_m = 100.0F;
-  std::optional<PlaneFit> fit = FitGround(GroundBelow(scan, kLane_m));
+  std::optional<GroundFit> fit = FitGround(GroundBelow(scan, kLane_m));
   if (!fit) {
     fit = FitGround(GroundBelow(scan, kAnywhere_m));
   }
