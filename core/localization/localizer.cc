@@ -1,7 +1,9 @@
 #include "core/localization/localizer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -16,6 +18,17 @@ Pose LevelFrame(const Pose& T_world_sensor) {
   level.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   level.translation() = T_world_sensor.translation();
   return level;
+}
+
+Eigen::Matrix4d PoseInformation(const Eigen::Matrix<double, 6, 6>& information) {
+  constexpr std::array<int, 4> kAxes{0, 1, 2, 5};
+  return information(kAxes, kAxes);
+}
+
+bool AreApart(const Pose& a, const Pose& b, const PoseSearchOptions& options) {
+  const Eigen::AngleAxisd turned(a.linear().transpose() * b.linear());
+  return (a.translation() - b.translation()).norm() > options.apart_m ||
+         turned.angle() > options.apart_rad;
 }
 
 }  // namespace
@@ -33,12 +46,10 @@ std::string_view LocalizationHealthName(LocalizationHealth health) {
 }
 
 Localizer::Localizer(const MapProfile& profile, TilesAround tiles, const LocalizerOptions& options)
-    : profile_(profile), tiles_(std::move(tiles)), options_(options) {}
+    : options_(options), map_(profile, std::move(tiles), options.map), motion_(options.motion) {}
 
 void Localizer::Start(const Pose& T_world_sensor) {
-  last_ = T_world_sensor;
-  motion_.reset();
-  was_good_ = false;
+  motion_.Start(T_world_sensor);
   is_first_ = true;
   usual_fit_ = 0.0;
   lost_ = 0;
@@ -46,95 +57,101 @@ void Localizer::Start(const Pose& T_world_sensor) {
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
                                                const Eigen::Quaterniond& R_level_sensor) {
-  const Pose predicted = motion_ ? last_ * *motion_ : last_;
-  if (Status status = RenewWindow(predicted.translation()); !status.ok()) {
+  const MotionModel before = motion_;
+  if (!is_first_) {
+    motion_.Predict();
+  }
+  const double radius_m = static_cast<double>(options_.features.max_range_m) + AdriftReach();
+  if (Status status = map_.Renew(motion_.T_world_sensor().translation(), radius_m); !status.ok()) {
+    motion_ = before;
     return Error(std::move(status));
   }
   const ScanFeatures features = ExtractFeatures(scan, options_.features);
-  const Pose T_world_level = LevelFrame(predicted);
   LocalizationResult result;
-  result.registration = Track(features, T_world_level);
-  if (IsDoubtful(result.registration)) {
-    if (auto found = Search(features, T_world_level, result.registration)) {
+  result.registration = Track(features).registration;
+  bool is_found = false;
+  if (IsDoubtful(result.registration) || IsAdrift()) {
+    if (auto found = Search(features, result.registration)) {
       result.registration = *std::move(found);
+      is_found = true;
     }
   }
   result.health = Judge(result.registration);
-  const bool is_lost = result.health == LocalizationHealth::kLost;
-  const Pose& believed = is_lost ? T_world_level : result.registration.T_world_level;
-  result.T_world_sensor = believed;
-  result.T_world_sensor.linear() = believed.linear() * R_level_sensor.toRotationMatrix();
-  Remember(result);
+  result.T_world_sensor = result.health == LocalizationHealth::kLost
+                              ? Prior().T_world_level
+                              : result.registration.T_world_level;
+  result.T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
+  Remember(result, is_found);
   return result;
 }
 
-void Localizer::Remember(const LocalizationResult& result) {
+void Localizer::Remember(const LocalizationResult& result, bool is_found) {
+  const bool is_next = !is_first_ && lost_ == 0;
+  is_first_ = false;
   if (result.health == LocalizationHealth::kGood) {
     const double fit = result.registration.fit;
     usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;
   }
   if (result.health == LocalizationHealth::kLost) {
-    ++lost_;
-    if (lost_ > options_.max_coasting) {
-      motion_.reset();  // looked for where it got to
+    motion_.SetTilt(result.T_world_sensor.linear());
+    if (++lost_ > options_.max_coasting) {
+      motion_.ForgetMotion();  // looked for where it got to
     }
+    return;
+  }
+  const Eigen::Matrix4d seen =
+      options_.information_share * PoseInformation(result.registration.information);
+  if (!is_found ||
+      LogDensity(Prior(), result.registration.T_world_level) > options_.surprising_log_density) {
+    motion_.Correct(result.T_world_sensor, seen);
+  } else if (is_next) {
+    motion_.Turn(result.T_world_sensor, seen);
   } else {
-    const bool is_good = result.health == LocalizationHealth::kGood;
-    if (!is_first_ && lost_ == 0 && (motion_ || (is_good && was_good_))) {
-      motion_ = last_.inverse() * result.T_world_sensor;
-    }
-    lost_ = 0;
+    motion_.Relocate(result.T_world_sensor, seen);
   }
-  last_ = result.T_world_sensor;
-  was_good_ = result.health == LocalizationHealth::kGood;
-  is_first_ = false;
+  lost_ = 0;
 }
 
-Status Localizer::RenewWindow(const Eigen::Vector3d& center) {
-  if (window_ && (center - window_center_).norm() < 0.5 * options_.window_margin_m) {
-    return {};
-  }
-  const double radius_m =
-      static_cast<double>(options_.features.max_range_m) + options_.window_margin_m;
-  const auto tiles = tiles_(center, radius_m);
-  if (!tiles) {
-    return tiles.error();
-  }
-  std::vector<const Tile*> views;
-  views.reserve(tiles->size());
-  for (const auto& tile : *tiles) {
-    views.push_back(tile.get());
-  }
-  window_.emplace(profile_, views, center, radius_m, options_.window);
-  window_center_ = center;
-  coarse_.reset();
-  return {};
+PosePrior Localizer::Prior() const {
+  return {LevelFrame(motion_.T_world_sensor()), motion_.covariance()};
 }
 
-std::vector<Pose> Localizer::AheadHypotheses(const Pose& T_world_level) const {
-  std::vector<Pose> starts{T_world_level};
-  if (!is_first_ && !motion_) {
-    const Eigen::Vector3d ahead = T_world_level.linear().col(0);
-    const int steps = static_cast<int>(options_.search_ahead_m / options_.search_step_m);
-    for (int step = 1; step <= steps; ++step) {
-      starts.push_back(T_world_level);
-      starts.back().translation() += step * options_.search_step_m * ahead;
+Localizer::Place Localizer::At(const RegistrationResult& registration, bool has_prior) const {
+  const double prior = has_prior ? LogDensity(Prior(), registration.T_world_level) : 0.0;
+  return {registration, options_.evidence_share * registration.evidence + prior};
+}
+
+std::vector<Pose> Localizer::Fan(const PosePrior& prior) const {
+  std::vector<Pose> starts{prior.T_world_level};
+  const HorizontalSpread spread = SpreadOf(prior.covariance);
+  if (is_first_ || spread.along_m < options_.fan_sigma_m) {
+    return starts;
+  }
+  const double reach_m = 2.0 * std::min(spread.along_m, options_.adrift_sigma_m);
+  const int steps = static_cast<int>(reach_m / options_.fan_step_m);
+  for (int step = -steps; step <= steps; ++step) {
+    if (step == 0) {
+      continue;  // is the first of all
     }
+    starts.push_back(prior.T_world_level);
+    starts.back().translation().head<2>() += step * options_.fan_step_m * spread.direction;
   }
   return starts;
 }
 
-RegistrationResult Localizer::Track(const ScanFeatures& features, const Pose& T_world_level) const {
-  RegistrationOptions options = options_.registration;
-  if (!is_first_) {
-    options.start_sigma_m = options_.predicted_sigma_m;
-    options.start_sigma_rad = options_.predicted_sigma_rad;
+Localizer::Place Localizer::Track(const ScanFeatures& features) const {
+  const PosePrior prior = Prior();
+  if (is_first_) {
+    return At(Register(map_.window(), features, prior.T_world_level, options_.registration), false);
   }
-  std::optional<RegistrationResult> best;
-  for (const Pose& start : AheadHypotheses(T_world_level)) {
-    RegistrationResult result = Register(*window_, features, start, options);
-    if (!best || result.fit > best->fit) {
-      best = std::move(result);
+  const PosePrior among_features{prior.T_world_level,
+                                 options_.information_share * prior.covariance};
+  std::optional<Place> best;
+  for (const Pose& start : Fan(prior)) {
+    Place place =
+        At(Register(map_.window(), features, start, among_features, options_.registration), true);
+    if (!best || place.log_likelihood > best->log_likelihood) {
+      best = std::move(place);
     }
   }
   return *best;
@@ -142,29 +159,71 @@ RegistrationResult Localizer::Track(const ScanFeatures& features, const Pose& T_
 
 bool Localizer::IsDoubtful(const RegistrationResult& result) const {
   return lost_ > 0 || result.fit < (is_first_ ? options_.good_fit : options_.min_fit) ||
-         result.fit < options_.doubtful_fit * usual_fit_;
+         result.fit < options_.doubtful_fit * usual_fit_ ||
+         result.column_fit < options_.doubtful_column_fit;
+}
+
+bool Localizer::IsAdrift() const {
+  return lost_ == 0 && SpreadOf(motion_.covariance()).along_m > options_.adrift_sigma_m;
+}
+
+double Localizer::AdriftReach() const {
+  constexpr double kStep_m = 20.0;  // the window is not made anew with every scan
+  if (!IsAdrift()) {
+    return 0.0;
+  }
+  const double reach_m = 2.0 * SpreadOf(motion_.covariance()).along_m;
+  return std::min(std::ceil(reach_m / kStep_m) * kStep_m, options_.max_adrift_m);
+}
+
+SearchReach Localizer::Reach() const {
+  if (IsAdrift()) {
+    const HorizontalSpread spread = SpreadOf(motion_.covariance());
+    return {std::min(2.0 * spread.along_m, options_.max_adrift_m),
+            std::min(2.0 * spread.beside_m, options_.max_adrift_beside_m), options_.adrift_yaw_rad,
+            std::atan2(spread.direction.y(), spread.direction.x())};
+  }
+  const auto widened = [&](double least, double most) {
+    return std::min((1 + lost_) * least, most);
+  };
+  const SearchReach& least = options_.search_reach;
+  const SearchReach& most = options_.max_search_reach;
+  return {widened(least.along_m, most.along_m), widened(least.beside_m, most.beside_m),
+          widened(least.yaw_rad, most.yaw_rad)};
 }
 
 std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features,
-                                                    const Pose& T_world_level,
                                                     const RegistrationResult& tracked) {
-  if (!coarse_) {
-    coarse_.emplace(*window_, options_.search.block_m);
+  PoseSearchOptions search = options_.search;
+  if (IsAdrift()) {
+    search.max_columns = options_.adrift_columns;
+    search.candidates = options_.adrift_candidates;
   }
-  const SearchReach reach{
-      std::min((1 + lost_) * options_.search_reach.distance_m,
-               options_.max_search_reach.distance_m),
-      std::min((1 + lost_) * options_.search_reach.yaw_rad, options_.max_search_reach.yaw_rad)};
-  std::optional<RegistrationResult> best;
-  for (const Pose& start :
-       SearchPoses(*coarse_, window_->origin(), features, T_world_level, reach, options_.search)) {
-    RegistrationResult result = Register(*window_, features, start, options_.registration);
-    if (!best || result.fit > best->fit) {
-      best = std::move(result);
-    }
+  const bool is_as_expected = !IsDoubtful(tracked);  // else the prior may be wrong, too
+  std::vector<Place> places{At(tracked, is_as_expected)};
+  for (const Pose& start : SearchPoses(map_.coarse(), map_.window().origin(), features,
+                                       Prior().T_world_level, Reach(), search)) {
+    places.push_back(
+        At(Register(map_.window(), features, start, options_.registration), is_as_expected));
   }
-  const bool is_believed = best && best->fit > options_.believed_gain * tracked.fit;
-  return is_believed ? best : std::nullopt;
+  const auto best = std::max_element(
+      places.begin() + 1, places.end(),
+      [](const auto& a, const auto& b) { return a.log_likelihood < b.log_likelihood; });
+  if (best == places.end() || !StandsOut(places, *best)) {
+    return std::nullopt;
+  }
+  return best->registration;
+}
+
+// The first of `places` is where the vehicle was tracked to.
+bool Localizer::StandsOut(const std::vector<Place>& places, const Place& best) const {
+  const bool is_likelier =
+      best.log_likelihood > places.front().log_likelihood + options_.believed_log_ratio;
+  return is_likelier && std::none_of(places.begin() + 1, places.end(), [&](const Place& other) {
+           return other.log_likelihood > best.log_likelihood - options_.unique_log_ratio &&
+                  AreApart(other.registration.T_world_level, best.registration.T_world_level,
+                           options_.search);
+         });
 }
 
 LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {

@@ -34,7 +34,8 @@ MapWindow::MapWindow(const MapProfile& profile,
                      double radius_m,
                      const MapWindowOptions& options)
     : cell_size_m_(static_cast<float>(profile.cell_size_m())),
-      segment_height_m_(static_cast<float>(profile.segment_height_m())) {
+      segment_height_m_(static_cast<float>(profile.segment_height_m())),
+      slab_m_(static_cast<float>(profile.slab_margin_mm) * 1e-3F) {
   const double cell_m = profile.cell_size_m();
   const double segment_m = profile.segment_height_m();
   first_cell_x_ = static_cast<std::int64_t>(std::floor((center.x() - radius_m) / cell_m));
@@ -46,6 +47,7 @@ MapWindow::MapWindow(const MapProfile& profile,
              static_cast<double>(first_segment_) * segment_m};
   const auto cells = static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_);
   masks_.assign(cells, 0);
+  free_masks_.assign(cells, 0);
   for (const Tile* tile : tiles) {
     AddTile(profile, *tile, options);
   }
@@ -83,8 +85,14 @@ void MapWindow::AddTile(const MapProfile& profile,
         const std::int64_t base = ColumnBaseIndex(layer.altitude_mm, profile) - first_segment_;
         for (int k = 0; k < profile.column_segments; ++k) {
           const std::int64_t bit = base + k;
-          if (NibbleAt(layer.column, k) >= options.occupied_nibble && bit >= 0 && bit < kMaskBits) {
+          const std::uint8_t nibble = NibbleAt(layer.column, k);
+          if (nibble == 0 || bit < 0 || bit >= kMaskBits) {
+            continue;
+          }
+          if (nibble >= options.occupied_nibble) {
             masks_[Index(cell)] |= std::uint64_t{1} << bit;
+          } else if (nibble <= options.free_nibble) {
+            free_masks_[Index(cell)] |= std::uint64_t{1} << bit;
           }
         }
       }
@@ -185,8 +193,24 @@ ColumnLine MapWindow::FitLine(CellRef cell, int segment, const MapWindowOptions&
   line.center = CellCenter(cell);
   if (line.is_wall) {
     line.center += cell_size_m_ * mean;
+    FindFreeSide(segment, options, line);
   }
   return line;
+}
+
+void MapWindow::FindFreeSide(int segment, const MapWindowOptions& options, ColumnLine& line) const {
+  const Eigen::Vector2f arm = options.free_side_m * line.normal;
+  const bool is_free_before = IsFreeAt(line.center + arm, segment);
+  const bool is_free_behind = IsFreeAt(line.center - arm, segment);
+  line.is_one_sided = is_free_before != is_free_behind;
+  if (line.is_one_sided && is_free_behind) {
+    line.normal = -line.normal;
+  }
+}
+
+bool MapWindow::IsFreeAt(const Eigen::Vector2f& p, int segment) const {
+  const CellRef cell = CellAt(p.x(), p.y());
+  return Contains(cell) && ((free_masks_[Index(cell)] >> segment) & 1) != 0;
 }
 
 const ColumnLine* MapWindow::NearestLine(const Eigen::Vector3f& p, float radius_m) const {
@@ -241,6 +265,26 @@ const SurfacePlane* MapWindow::NearestSurface(const Eigen::Vector3f& p,
 bool MapWindow::IsMapped(const Eigen::Vector3f& p) const {
   const CellRef cell = CellAt(p.x(), p.y());
   return Contains(cell) && surface_begin_[Index(cell)] != surface_begin_[Index(cell) + 1];
+}
+
+bool MapWindow::IsFree(const Eigen::Vector3f& p) const {
+  constexpr float kReach_m = 0.1F;  // what stands at a segment's edge may be counted beside it
+  const CellRef cell = CellAt(p.x(), p.y());
+  const int lower = SegmentAt(p.z() - kReach_m);
+  const int upper = SegmentAt(p.z() + kReach_m);
+  if (!Contains(cell) || lower < 0 || upper < 0) {
+    return false;
+  }
+  const std::size_t index = Index(cell);
+  const std::uint64_t free = free_masks_[index];
+  if (((free >> lower) & (free >> upper) & 1) == 0) {
+    return false;
+  }
+  const auto first = surfaces_.begin() + surface_begin_[index];
+  const auto last = surfaces_.begin() + surface_begin_[index + 1];
+  return std::none_of(first, last, [&](const SurfacePlane& surface) {
+    return p.z() < surface.z_m && p.z() > surface.z_m - slab_m_;
+  });
 }
 
 bool MapWindow::IsOccupied(const Eigen::Vector3f& p) const {

@@ -16,8 +16,10 @@ namespace atlas {
 
 struct MapWindowOptions {
   std::uint8_t occupied_nibble = 10;  // p >= 0.61
+  std::uint8_t free_nibble = 6;       // p <= 0.39: rays passed and none returned
   float line_radius_m = 0.7F;         // neighbourhood that a line's normal comes from
   float max_line_ratio = 0.35F;       // smaller over larger spread: a wall; above: a pole or a bush
+  float free_side_m = 0.5F;           // before a wall's face it is free, this far from it
   float slope_baseline_m = 1.0F;      // either way, over which the ground's gradient is taken
 };
 
@@ -26,6 +28,13 @@ struct ColumnLine {
   Eigen::Vector2f center = Eigen::Vector2f::Zero();  // of the neighbourhood, window frame, metres
   Eigen::Vector2f normal = Eigen::Vector2f::UnitX();
   bool is_wall = false;  // only the distance along the normal counts
+  // A wall of which one face was mapped: free space lies before it, along the normal, and nothing
+  // is known behind it. Who sees it is before it.
+  bool is_one_sided = false;
+
+  bool CanBeSeenFrom(const Eigen::Vector2f& sensor) const {
+    return !is_one_sided || normal.dot(sensor - center) > 0.0F;
+  }
 };
 
 // A surface layer at a cell: z = z_m + gradient . ((x, y) - cell centre).
@@ -58,8 +67,10 @@ class MapWindow {
   const SurfacePlane* NearestSurface(const Eigen::Vector3f& p,
                                      float reach_m,
                                      float* height_m) const;
-  // Whether the map says anything about the cell of `p`, at any height.
+  // Whether a surface was mapped in the cell of `p`, at any height.
   bool IsMapped(const Eigen::Vector3f& p) const;
+  // Whether the map says that nothing stands at `p`.
+  bool IsFree(const Eigen::Vector3f& p) const;
   // Whether an occupied segment stands at `p`.
   bool IsOccupied(const Eigen::Vector3f& p) const;
 
@@ -87,6 +98,8 @@ class MapWindow {
   void FitGradients(const MapWindowOptions& options);
   void FitLines(const MapWindowOptions& options);
   ColumnLine FitLine(CellRef cell, int segment, const MapWindowOptions& options) const;
+  void FindFreeSide(int segment, const MapWindowOptions& options, ColumnLine& line) const;
+  bool IsFreeAt(const Eigen::Vector2f& p, int segment) const;
   std::optional<float> SurfaceNear(CellRef cell, float z_m) const;
 
   CellRef CellAt(float x_m, float y_m) const;
@@ -103,9 +116,11 @@ class MapWindow {
   std::int32_t side_ = 0;
   float cell_size_m_ = 0.1F;
   float segment_height_m_ = 1.0F;
+  float slab_m_ = 0.0F;  // what lies less than this below a surface is the slab that carries it
   std::int64_t first_segment_ = 0;  // world segment of bit 0
 
   std::vector<std::uint64_t> masks_;       // occupied segments, by cell
+  std::vector<std::uint64_t> free_masks_;  // free ones
   std::vector<std::uint32_t> first_line_;  // by cell: index of its lowest occupied segment's line
   std::vector<ColumnLine> lines_;
   std::vector<std::uint32_t> surface_begin_;                       // by cell, plus one

@@ -119,6 +119,8 @@ std::vector<Pose> SearchPoses(const CoarseOccupancy& coarse,
     return {};
   }
   const Eigen::Vector3f center = (T_world_level.translation() - origin).cast<float>();
+  const Eigen::Vector3d along(std::cos(reach.direction_rad), std::sin(reach.direction_rad), 0.0);
+  const Eigen::Vector3d beside(-along.y(), along.x(), 0.0);
   Shortlist shortlist(options);
   std::vector<Eigen::Vector3f> turned(points.size());
   ForEachStep(reach.yaw_rad, options.yaw_step_rad, [&](double yaw_rad) {
@@ -127,9 +129,9 @@ std::vector<Pose> SearchPoses(const CoarseOccupancy& coarse,
             .cast<float>();
     std::transform(points.begin(), points.end(), turned.begin(),
                    [&](const Eigen::Vector3f& p) { return R * p + center; });
-    ForEachStep(reach.distance_m, options.step_m, [&](double dy) {
-      ForEachStep(reach.distance_m, options.step_m, [&](double dx) {
-        Candidate candidate{0, {dx, dy, 0.0}, yaw_rad};
+    ForEachStep(reach.beside_m, options.step_m, [&](double beside_m) {
+      ForEachStep(reach.along_m, options.step_m, [&](double along_m) {
+        Candidate candidate{0, along_m * along + beside_m * beside, yaw_rad};
         const Eigen::Vector3f shift = candidate.shift.cast<float>();
         for (const Eigen::Vector3f& p : turned) {
           candidate.score += coarse.IsOccupied(p + shift) ? 1 : 0;

@@ -14,7 +14,6 @@
 namespace atlas {
 
 struct PoseSearchOptions {
-  float block_m = 0.8F;  // of the coarse grid; structure is widened by one block either way
   double step_m = 0.5;
   double yaw_step_rad = 0.0175;  // 1 degree: a block at 46 m
   std::size_t max_columns = 64;  // of the scan, evenly chosen ...
@@ -26,11 +25,13 @@ struct PoseSearchOptions {
 
 // How far around a pose is searched.
 struct SearchReach {
-  double distance_m = 2.0;  // either way in x and y
-  double yaw_rad = 1.2;     // either way
+  double along_m = 2.0;        // either way along `direction_rad`
+  double beside_m = 2.0;       // either way across it
+  double yaw_rad = 1.2;        // either way
+  double direction_rad = 0.0;  // from the world's x
 };
 
-// The map window at arm's length.
+// The map window at arm's length: structure is widened by one block either way.
 class CoarseOccupancy {
  public:
   CoarseOccupancy(const MapWindow& map, float block_m);

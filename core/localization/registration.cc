@@ -1,9 +1,10 @@
 #include "core/localization/registration.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 namespace atlas {
 namespace {
@@ -17,8 +18,11 @@ struct NormalEquations {
   Vector6d g = Vector6d::Zero();
   int columns = 0;
   int ground = 0;
-  int mapped = 0;    // features where the map says something
-  double fit = 0.0;  // sum of robust weights
+  // Of features where the map says something: how many, and the sum of their robust weights.
+  int mapped_columns = 0;
+  int mapped_ground = 0;
+  double column_fit = 0.0;
+  double ground_fit = 0.0;
 
   // Residual along the unit vector `direction` (world) of a point at `arm` from the sensor.
   void Add(const Eigen::Vector3d& direction,
@@ -70,7 +74,10 @@ class Problem {
                  NormalEquations& equations) const {
     const Eigen::Vector3f p = arm + t;
     const ColumnLine* line = map_.NearestLine(p, stage.radius_m);
-    equations.mapped += line != nullptr || map_.IsMapped(p) ? 1 : 0;
+    if (line != nullptr && !line->CanBeSeenFrom(t.head<2>())) {
+      line = nullptr;
+    }
+    equations.mapped_columns += line != nullptr || map_.IsFree(p) ? 1 : 0;
     if (line == nullptr) {
       return;
     }
@@ -82,7 +89,7 @@ class Problem {
     const double robust = RobustWeight(std::hypot(along_normal, along_tangent), scale);
     const double weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
     ++equations.columns;
-    equations.fit += robust;
+    equations.column_fit += robust;
     equations.Add({line->normal.x(), line->normal.y(), 0.0}, arm.cast<double>(), along_normal,
                   weight);
     if (!line->is_wall) {
@@ -95,7 +102,7 @@ class Problem {
                  const Stage& stage,
                  NormalEquations& equations) const {
     float height_m = 0.0F;
-    equations.mapped += map_.IsMapped(arm + t) ? 1 : 0;
+    equations.mapped_ground += map_.IsMapped(arm + t) ? 1 : 0;
     const SurfacePlane* plane = map_.NearestSurface(arm + t, stage.reach_m, &height_m);
     if (plane == nullptr) {
       return;
@@ -108,7 +115,7 @@ class Problem {
     const double robust = RobustWeight(residual, 0.4 * stage.reach_m);
     const double weight = robust / (options_.ground_sigma_m * options_.ground_sigma_m);
     ++equations.ground;
-    equations.fit += robust;
+    equations.ground_fit += robust;
     equations.Add(normal, arm.cast<double>(), residual, weight);
   }
 
@@ -129,17 +136,15 @@ void AddTiltPrior(const Pose& pose, double sigma_rad, NormalEquations& equations
   }
 }
 
-void AddStartPrior(const Pose& pose,
-                   const Pose& start,
-                   const RegistrationOptions& options,
-                   NormalEquations& equations) {
-  const double translation = 1.0 / (options.start_sigma_m * options.start_sigma_m);
-  const double rotation = 1.0 / (options.start_sigma_rad * options.start_sigma_rad);
-  const Eigen::AngleAxisd turned(pose.linear() * start.linear().transpose());
-  equations.H.diagonal().head<3>().array() += translation;
-  equations.g.head<3>() += translation * (pose.translation() - start.translation());
-  equations.H(5, 5) += rotation;
-  equations.g(5) += rotation * turned.angle() * turned.axis().z();
+// Of a pose's (x, y, z, yaw) among the six unknowns.
+constexpr std::array<int, 4> kPriorAxes{0, 1, 2, 5};
+
+void AddPrior(const Pose& pose,
+              const Pose& expected,
+              const Eigen::Matrix4d& information,
+              NormalEquations& equations) {
+  equations.g(kPriorAxes) += information * PoseDifference(expected, pose);
+  equations.H(kPriorAxes, kPriorAxes) += information;
 }
 
 Pose Moved(const Pose& pose, const Vector6d& step) {
@@ -165,7 +170,9 @@ double Share(int part, std::size_t whole) {
 RegistrationResult Register(const MapWindow& map,
                             const ScanFeatures& features,
                             const Pose& T_world_level_start,
+                            const PosePrior& prior,
                             const RegistrationOptions& options) {
+  const Eigen::Matrix4d prior_information = prior.covariance.inverse();
   const Problem problem(map, features, options);
   const Stage fine{options.fine_radius_m, options.fine_reach_m};
   RegistrationResult result;
@@ -180,7 +187,7 @@ RegistrationResult Register(const MapWindow& map,
         options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m)};
     NormalEquations equations = problem.Linearize(result.T_world_level, stage);
     AddTiltPrior(result.T_world_level, options.tilt_sigma_rad, equations);
-    AddStartPrior(result.T_world_level, T_world_level_start, options, equations);
+    AddPrior(result.T_world_level, prior.T_world_level, prior_information, equations);
     const Matrix6d H = equations.H.selfadjointView<Eigen::Lower>();
     const Vector6d step = H.ldlt().solve(-equations.g);
     result.T_world_level = Moved(result.T_world_level, step);
@@ -190,10 +197,26 @@ RegistrationResult Register(const MapWindow& map,
   const NormalEquations last = problem.Linearize(result.T_world_level, fine);
   result.information = last.H.selfadjointView<Eigen::Lower>();
   result.matched_columns = last.columns;
-  result.fit = last.mapped < kEnough ? 0.0 : last.fit / last.mapped;
+  const int mapped = last.mapped_columns + last.mapped_ground;
+  const double fit = last.column_fit + last.ground_fit;
+  result.fit = mapped < kEnough ? 0.0 : fit / mapped;
+  result.column_fit = last.mapped_columns < kEnough ? 1.0 : last.column_fit / last.mapped_columns;
+  constexpr double kContradicted = 0.5;
+  result.evidence = last.column_fit - kContradicted * (mapped - fit);
   result.column_inliers = Share(last.columns, features.columns.size());
   result.ground_inliers = Share(last.ground, features.ground.size());
   return result;
+}
+
+RegistrationResult Register(const MapWindow& map,
+                            const ScanFeatures& features,
+                            const Pose& T_world_level_start,
+                            const RegistrationOptions& options) {
+  const double translation = options.start_sigma_m * options.start_sigma_m;
+  const double rotation = options.start_sigma_rad * options.start_sigma_rad;
+  const Eigen::Vector4d variances(translation, translation, translation, rotation);
+  return Register(map, features, T_world_level_start, {T_world_level_start, variances.asDiagonal()},
+                  options);
 }
 
 }  // namespace atlas

@@ -5,6 +5,7 @@
 
 #include "core/geometry/pose.h"
 #include "core/localization/map_window.h"
+#include "core/localization/pose_prior.h"
 #include "core/localization/scan_features.h"
 
 namespace atlas {
@@ -21,7 +22,7 @@ struct RegistrationOptions {
   double start_sigma_m = 0.5;
   double start_sigma_rad = 0.03;
   // Gentler slopes do not hold a vehicle in the horizontal: their gradient is mostly noise.
-  float min_gradient = 0.03F;
+  float min_gradient = 0.06F;
   int coarse_iterations = 8;
   int max_iterations = 30;
   double converged_m = 2e-4;
@@ -38,9 +39,19 @@ struct RegistrationResult {
   // Mean robust weight, 0..1, of the features that fall on cells the map knows, unmatched ones 0;
   // 0 where too few do to tell. What was never mapped speaks neither for nor against a pose.
   double fit = 0.0;
+  double column_fit = 1.0;  // the same of columns alone, 1 where too few do to tell
+  // How much more of the scan the map explains than contradicts: 1 for a feature that fits, -0.5
+  // for one where the map knows better. Tells places apart, where `fit` tells how good one is.
+  double evidence = 0.0;
   bool is_converged = false;
 };
 
+RegistrationResult Register(const MapWindow& map,
+                            const ScanFeatures& features,
+                            const Pose& T_world_level_start,
+                            const PosePrior& prior,
+                            const RegistrationOptions& options);
+// With a prior at the start of the options' sigmas.
 RegistrationResult Register(const MapWindow& map,
                             const ScanFeatures& features,
                             const Pose& T_world_level_start,

@@ -66,14 +66,15 @@ def overpass(atlas):
     print("layers at (0, -3):", heights)
     assert len(heights) == 2
     assert abs(heights[0] - 0.0) <= 0.03 and abs(heights[1] - 5.49) <= 0.03
-    # The other direction, the other lane: once structure is in view the track holds. Where on the bare
-    # plain before it the vehicle thinks it is hangs on a millimetre of the map (docs/results.md).
+    # The other direction, the other lane. On the bare plain of the first 17 scans nothing tells how fast
+    # the vehicle is; once structure is in view it is found, and nowhere it is said to be that it is not.
     lines = atlas.call("localize", drive("sim_overpass_B")).stdout.splitlines()
     scans = [json.loads(line) for line in lines[:-1]]
     ground = [scan["error_m"] for scan in scans if scan["scan"] <= 120]
     held = sum(error <= 1.0 for error in ground)
     print(f"tracked below the bridge: {held} of {len(ground)} scans within 1 m; summary {lines[-1]}")
-    assert len(ground) == 121 and held >= 85
+    assert len(ground) == 121 and held >= 95
+    assert all(scan["error_m"] <= 1.0 for scan in scans[:121] if scan["health"] == "good")
 
 
 def garage(atlas):

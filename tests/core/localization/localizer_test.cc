@@ -97,9 +97,7 @@ TEST(LocalizerTest, StaysOnItsDeckOfTwo) {
 TEST(LocalizerTest, ACorridorIsWeakAndCarriesTheVehicleOnAtItsSpeed) {
   PaintedMap map;
   map.Paint(testing::Corridor(), 30.0);
-  LocalizerOptions options = QuickOptions();
-  options.search_ahead_m = 0.0;  // nothing there tells how far ahead
-  Localizer localizer(map.profile(), map.Source(), options);
+  Localizer localizer(map.profile(), map.Source(), QuickOptions());
   const auto at = [](int i) {
     return UprightPose({-3.0 + 0.1 * i, 0.0, 1.8}, 0.0);
   };
@@ -109,6 +107,35 @@ TEST(LocalizerTest, ACorridorIsWeakAndCarriesTheVehicleOnAtItsSpeed) {
     EXPECT_EQ(result.health, LocalizationHealth::kWeak) << i;
     EXPECT_LT(std::abs(result.T_world_sensor.translation().y()), 0.03) << i;
   }
+}
+
+// A bare plain to the west, houses to the east: nothing tells the speed until they are in sight.
+TEST(LocalizerTest, AdriftOnAPlainItIsFoundWhereStructureBegins) {
+  ShapeWorld world;
+  world.patches = {testing::Patch{}};
+  world.boxes = {testing::Box{{6.05, 4.05, -1.0}, {12.05, 9.05, 6.0}},
+                 testing::Box{{15.05, -11.05, -1.0}, {19.05, -5.05, 6.0}},
+                 testing::Box{{8.05, -7.05, -1.0}, {8.45, -6.65, 6.0}}};
+  PaintedMap map;
+  map.Paint(world, 45.0);
+  Localizer localizer(map.profile(), map.Source(), QuickOptions());
+  const auto at = [](int i) {
+    return UprightPose({-42.0 + 1.6 * i, 0.0, 1.8}, 0.0);
+  };
+  localizer.Start(at(0));
+  int found = 0;
+  for (int i = 0; i <= 30; ++i) {
+    const LocalizationResult result = At(localizer, world, at(i));
+    const double error_m = ErrorOf(result.T_world_sensor, at(i)).horizontal_m;
+    if (result.health == LocalizationHealth::kGood) {
+      EXPECT_LT(error_m, 0.15) << i;
+      ++found;
+    }
+    if (i >= 20) {  // 10 m before the first house
+      EXPECT_LT(error_m, 0.15) << i;
+    }
+  }
+  EXPECT_GE(found, 8);
 }
 
 TEST(LocalizerTest, TiltComesFromTheImu) {

@@ -201,5 +201,65 @@ TEST(MapWindowTest, SlopesHaveTheirGradientAndLevelGroundHasNone) {
   }
 }
 
+TEST(MapWindowTest, FreeIsWhatRaysCrossedAndNothingElse) {
+  for (int nibble = 0; nibble <= 15; ++nibble) {
+    PaintedMap map;
+    TileLayer layer = GroundLayer(0.0);
+    layer.column = static_cast<std::uint64_t>(nibble) << 4;
+    map.Put(0, 0, layer);
+    const MapWindow window = map.Window(kOrigin, 5.0);
+    EXPECT_EQ(window.IsFree(InWindow(window, 0.05, 0.05, 1.5)), nibble >= 1 && nibble <= 6);
+    EXPECT_FALSE(window.IsFree(InWindow(window, 0.05, 0.05, 0.5)));   // another segment
+    EXPECT_FALSE(window.IsFree(InWindow(window, 0.15, 0.05, 1.5)));   // another cell
+    EXPECT_FALSE(window.IsFree(InWindow(window, 0.05, 0.05, 1.95)));  // may belong to the next
+  }
+}
+
+TEST(MapWindowTest, WhatIsJustBelowASurfaceIsItsSlabAndNotFree) {
+  PaintedMap map;
+  TileLayer ground = GroundLayer(0.0);
+  ground.column = 0x11111;
+  TileLayer deck = GroundLayer(5.5);
+  deck.column = 0x11;  // 5 m to 7 m: the slab is in the lowest
+  map.Put(0, 0, ground);
+  map.Put(0, 0, deck);
+  const MapWindow window = map.Window(kOrigin, 5.0);
+  for (const auto& [z, is_free] : {std::pair(4.5, true), std::pair(4.85, false),
+                                   std::pair(5.3, false), std::pair(5.6, true)}) {
+    EXPECT_EQ(window.IsFree(InWindow(window, 0.05, 0.05, z)), is_free) << z;
+  }
+}
+
+// A wall along x at y = 0.05 m with free ground on the sides asked for.
+PaintedMap WallWithFreeSides(bool is_free_south, bool is_free_north) {
+  TileLayer free = GroundLayer(0.0);
+  free.column = 0x11;
+  PaintedMap map;
+  for (int x = -30; x <= 30; ++x) {
+    map.Put(x, 0, ColumnLayer(0.0, 0b0011));
+    for (int y = 1; y <= 10; ++y) {
+      if (is_free_south) map.Put(x, -y, free);
+      if (is_free_north) map.Put(x, y, free);
+    }
+  }
+  return map;
+}
+
+TEST(MapWindowTest, AFaceIsSeenFromItsFreeSideAlone) {
+  for (const auto& [south, north] : {std::pair(true, true), std::pair(true, false),
+                                     std::pair(false, true), std::pair(false, false)}) {
+    const MapWindow window = WallWithFreeSides(south, north).Window(kOrigin, 10.0);
+    const ColumnLine* line = window.NearestLine(InWindow(window, 0.05, 0.05, 0.5), 0.3F);
+    ASSERT_NE(line, nullptr);
+    EXPECT_TRUE(line->is_wall);
+    EXPECT_EQ(line->is_one_sided, south != north);
+    const auto is_seen_from = [&](double y) {
+      return line->CanBeSeenFrom(InWindow(window, 1.0, y, 0.0).head<2>());
+    };
+    EXPECT_EQ(is_seen_from(-3.0), south || !north);
+    EXPECT_EQ(is_seen_from(3.0), north || !south);
+  }
+}
+
 }  // namespace
 }  // namespace atlas

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/integer_math.h"
+#include "core/geometry/nibble.h"
 #include "core/tile/column_lattice.h"
 
 namespace atlas::testing {
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double kCell_m = 0.1;
 constexpr double kEdge_m = 0.501 * kCell_m;
+constexpr std::uint8_t kOccupied = 15;
 
 bool IsWithin(double value, double low, double high) {
   return value > low && value < high;
@@ -30,7 +32,7 @@ bool IsInside(const Box& box, double x, double y, double z) {
          z >= box.low.z() && z < box.high.z();
 }
 
-// The segments of a column at (x, y) that faces of boxes reach into.
+// A column at (x, y): occupied where faces of boxes reach into a segment, free elsewhere.
 std::uint64_t ColumnAt(const ShapeWorld& world,
                        double x,
                        double y,
@@ -40,11 +42,11 @@ std::uint64_t ColumnAt(const ShapeWorld& world,
   for (int k = 0; k < profile.column_segments; ++k) {
     const double low_m = (span.base + k) * profile.segment_height_m();
     const double high_m = low_m + profile.segment_height_m();
-    for (const Box& box : world.boxes) {
-      if (HasFaceAt(box, x, y) && box.low.z() < high_m - 0.05 && box.high.z() > low_m + 0.05) {
-        column |= std::uint64_t{15} << (4 * k);
-      }
-    }
+    const bool is_occupied =
+        std::any_of(world.boxes.begin(), world.boxes.end(), [&](const Box& box) {
+          return HasFaceAt(box, x, y) && box.low.z() < high_m - 0.05 && box.high.z() > low_m + 0.05;
+        });
+    column |= std::uint64_t{is_occupied ? kOccupied : kNibbleFree} << (4 * k);
   }
   return column & span.mask;
 }
@@ -81,12 +83,18 @@ void PaintedMap::Paint(const ShapeWorld& world, double half_m) {
         const ColumnSpan span =
             ColumnSpanOf(layer.altitude_mm, i + 1 < grounds.size() ? &next_mm : nullptr, profile_);
         layer.column = ColumnAt(world, x, y, span, profile_);
-        if (layer.column == 0 &&
-            std::none_of(world.boxes.begin(), world.boxes.end(),
-                         [&](const Box& box) { return IsInside(box, x, y, grounds[i] + 0.5); })) {
-          Put(cx, cy, layer);
-        } else if (layer.column != 0) {
+        const bool is_wall =
+            std::any_of(world.boxes.begin(), world.boxes.end(), [&](const Box& box) {
+              return HasFaceAt(box, x, y) && box.high.z() > grounds[i] + 0.05 &&
+                     (i + 1 == grounds.size() || box.low.z() < grounds[i + 1] - 0.05);
+            });
+        const bool is_hidden =
+            std::any_of(world.boxes.begin(), world.boxes.end(),
+                        [&](const Box& box) { return IsInside(box, x, y, grounds[i] + 0.5); });
+        if (is_wall) {
           layer.flags = TileLayer::kMeasured;
+        }
+        if (is_wall || !is_hidden) {
           Put(cx, cy, layer);
         }
       }
@@ -207,7 +215,7 @@ SyntheticSensor QuickSensor() {
 LocalizerOptions QuickOptions() {
   LocalizerOptions options;
   options.features.max_range_m = 25.0F;
-  options.window_margin_m = 10.0;
+  options.map.margin_m = 10.0;
   return options;
 }
 

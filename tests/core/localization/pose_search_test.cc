@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/localization/local_map.h"
 #include "tests/core/localization/painted_map.h"
 
 namespace atlas {
@@ -27,7 +28,7 @@ ScanFeatures FeaturesAt(const Pose& T_world_level) {
 
 TEST(PoseSearchTest, AmongItsStartsIsOneThatARegistrationReaches) {
   const MapWindow window = StreetMap().Window(kCenter, 30.0);
-  const CoarseOccupancy coarse(window, PoseSearchOptions().block_m);
+  const CoarseOccupancy coarse(window, LocalMapOptions().coarse_block_m);
   const Pose expected = UprightPose(kCenter, 0.0);
   for (const double ahead_m : {-1.8, 0.0, 1.9}) {
     for (const double turn_deg : {-60.0, -20.0, 35.0, 65.0}) {
@@ -47,9 +48,9 @@ TEST(PoseSearchTest, AmongItsStartsIsOneThatARegistrationReaches) {
 TEST(PoseSearchTest, StartsAreInReachAndApart) {
   const MapWindow window = StreetMap().Window(kCenter, 30.0);
   const PoseSearchOptions options;
-  const CoarseOccupancy coarse(window, options.block_m);
+  const CoarseOccupancy coarse(window, LocalMapOptions().coarse_block_m);
   const Pose expected = UprightPose(kCenter, 0.4);
-  const SearchReach reach{1.5, 0.5};
+  const SearchReach reach{1.5, 1.5, 0.5};
   const std::vector<Pose> starts =
       SearchPoses(coarse, window.origin(), FeaturesAt(expected), expected, reach, options);
   ASSERT_FALSE(starts.empty());

@@ -219,5 +219,57 @@ TEST(RegistrationTest, IsTheSameEveryTime) {
   EXPECT_EQ(first.fit, second.fit);
 }
 
+// A thin wall was mapped from the south; who stands north of it sees its other face 0.6 m further.
+TEST(RegistrationTest, TheFarFaceOfAWallIsNotTakenForTheMappedOne) {
+  ShapeWorld world;
+  world.patches = {testing::Patch{}};
+  world.boxes = {testing::Box{{-20.0, 0.05, -1.0}, {20.0, 0.65, 4.0}}};
+  PaintedMap map;
+  for (int x = -200; x < 200; ++x) {
+    for (int y = -100; y < 0; ++y) {
+      TileLayer free = testing::GroundLayer(0.0);
+      free.column = 0x1111;
+      map.Put(x, y, free);
+    }
+    map.Put(x, 0, testing::ColumnLayer(0.0, 0b1111));
+  }
+  for (const double y_m : {-4.0, 4.65}) {
+    const Pose truth = UprightPose({0.0, y_m, 1.8}, 0.0);
+    const RegistrationResult result =
+        Register(map.Window(truth.translation(), 30.0), FeaturesAt(world, truth), truth, {});
+    EXPECT_LT(std::abs(result.T_world_level.translation().y() - y_m), 0.06) << y_m;
+    EXPECT_EQ(result.matched_columns > 0, y_m < 0.0) << y_m;
+  }
+}
+
+TEST(RegistrationTest, EvidenceIsHighestWhereTheScanWasTaken) {
+  const Pose truth = UprightPose({-3.0, 0.5, 1.77}, 0.0);
+  const MapWindow window = StreetMap().Window(truth.translation(), 30.0);
+  const ScanFeatures features = FeaturesAt(testing::Street(), truth);
+  const RegistrationResult right = Register(window, features, truth, {});
+  EXPECT_GT(right.evidence, 0.3 * static_cast<double>(features.columns.size()));
+  EXPECT_GT(right.column_fit, 0.5);
+  for (const Offset& offset :
+       {Offset{6.0, 0.0, 0.0}, Offset{-9.0, 0.0, 0.0}, Offset{0.0, 0.0, 100.0}}) {
+    const RegistrationResult wrong = Register(window, features, Displaced(truth, offset), {});
+    EXPECT_LT(wrong.evidence, 0.5 * right.evidence) << offset.x_m << " " << offset.yaw_deg;
+    EXPECT_LT(wrong.column_fit, right.column_fit);
+  }
+}
+
+TEST(RegistrationTest, TheScanAndThePriorMeetByTheirInformation) {
+  // Along a corridor nothing holds the vehicle but its prior; across it the walls do.
+  PaintedMap map;
+  map.Paint(testing::Corridor(), 30.0);
+  const Pose truth = UprightPose({0.0, 0.0, 1.8}, 0.0);
+  const Pose expected = Displaced(truth, {0.5, 0.3, 0.0});
+  const Eigen::Vector4d variances(0.01, 0.01, 0.01, 1e-4);
+  const RegistrationResult result =
+      Register(map.Window(truth.translation(), 30.0), FeaturesAt(testing::Corridor(), truth), truth,
+               {expected, variances.asDiagonal()}, {});
+  EXPECT_NEAR(result.T_world_level.translation().x(), 0.5, 0.02);
+  EXPECT_NEAR(result.T_world_level.translation().y(), 0.0, 0.03);
+}
+
 }  // namespace
 }  // namespace atlas

@@ -1,0 +1,48 @@
+// The map window around a vehicle: renewed as it drives, wider where its place is uncertain.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/base/status.h"
+#include "core/localization/map_window.h"
+#include "core/localization/pose_search.h"
+
+namespace atlas {
+
+// Level-0 tiles that touch the square of `radius_m` around a place; they live as long as the
+// result.
+using TilesAround = std::function<Result<std::vector<std::shared_ptr<const Tile>>>(
+    const Eigen::Vector3d& center, double radius_m)>;
+
+struct LocalMapOptions {
+  MapWindowOptions window;
+  double margin_m = 12.0;       // beyond what is asked for; the window is renewed half-way
+  float coarse_block_m = 0.8F;  // of coarse()
+};
+
+class LocalMap {
+ public:
+  LocalMap(const MapProfile& profile, TilesAround tiles, const LocalMapOptions& options);
+
+  // Makes window() hold `radius_m` around `center`. Errors are those of the tiles' source; the
+  // window stays then.
+  Status Renew(const Eigen::Vector3d& center, double radius_m);
+
+  // Both require Renew().
+  const MapWindow& window() const { return *window_; }
+  const CoarseOccupancy& coarse();  // made when first asked for
+
+ private:
+  MapProfile profile_;
+  TilesAround tiles_;
+  LocalMapOptions options_;
+  std::optional<MapWindow> window_;
+  std::optional<CoarseOccupancy> coarse_;
+  Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
+  double radius_m_ = 0.0;
+};
+
+}  // namespace atlas

@@ -1,0 +1,92 @@
+#include "core/localization/motion_model.h"
+
+#include <Eigen/LU>
+
+namespace atlas {
+namespace {
+
+Eigen::Vector4d Squares(double a, double b, double c, double d) {
+  return {a * a, b * b, c * c, d * d};
+}
+
+Eigen::Matrix3d TurnAboutVertical(double angle_rad) {
+  return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
+
+Eigen::Vector4d UnknownMotion(const MotionOptions& options) {
+  return Squares(options.ahead_m, options.beside_m, options.up_m, options.turn_rad);
+}
+
+}  // namespace
+
+MotionModel::MotionModel(const MotionOptions& options) : options_(options) {}
+
+void MotionModel::Start(const Pose& T_world_sensor) {
+  pose_ = T_world_sensor;
+  covariance_.setZero();
+  covariance_.topLeftCorner<4, 4>().diagonal() =
+      Squares(options_.start_m, options_.start_m, options_.start_m, options_.start_rad);
+  ForgetMotion();
+}
+
+void MotionModel::ForgetMotion() {
+  motion_.setZero();
+  covariance_.topRightCorner<4, 4>().setZero();
+  covariance_.bottomLeftCorner<4, 4>().setZero();
+  covariance_.bottomRightCorner<4, 4>() = UnknownMotion(options_).asDiagonal();
+}
+
+void MotionModel::Predict() {
+  last_ = pose_;
+  const Eigen::Matrix3d R = TurnAboutVertical(0.5 * motion_(3)) * pose_.linear();
+  const Eigen::Vector3d step = R * motion_.head<3>();
+  const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(step);  // d step / d yaw
+  Matrix8d F = Matrix8d::Identity();
+  F.block<3, 1>(0, 3) = across;
+  F.block<3, 3>(0, 4) = R;
+  F.block<3, 1>(0, 7) = 0.5 * across;
+  F(3, 7) = 1.0;
+  covariance_.bottomRightCorner<4, 4>().diagonal() +=
+      Squares(options_.ahead_change_m, options_.beside_change_m, options_.up_change_m,
+              options_.turn_change_rad);
+  covariance_ = F * covariance_ * F.transpose();
+  pose_.translation() += step;
+  pose_.linear() = TurnAboutVertical(motion_(3)) * pose_.linear();
+}
+
+void MotionModel::Correct(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) {
+  const Eigen::Matrix4d prior = covariance_.topLeftCorner<4, 4>();
+  const Eigen::Matrix4d posterior = (prior.inverse() + seen).inverse();
+  const Eigen::Matrix4d motion_by_pose = covariance_.bottomLeftCorner<4, 4>() * prior.inverse();
+  motion_ += motion_by_pose * PoseDifference(pose_, T_world_sensor);
+  covariance_.bottomRightCorner<4, 4>() -=
+      motion_by_pose * (prior - posterior) * motion_by_pose.transpose();
+  covariance_.bottomLeftCorner<4, 4>() = motion_by_pose * posterior;
+  covariance_.topRightCorner<4, 4>() = covariance_.bottomLeftCorner<4, 4>().transpose();
+  covariance_.topLeftCorner<4, 4>() = posterior;
+  pose_ = T_world_sensor;
+}
+
+void MotionModel::Turn(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) {
+  Relocate(T_world_sensor, seen);
+  const Eigen::Vector4d difference = PoseDifference(last_, T_world_sensor);
+  motion_.head<3>() =
+      (TurnAboutVertical(0.5 * difference(3)) * last_.linear()).transpose() * difference.head<3>();
+  motion_(3) = difference(3);
+  covariance_.bottomRightCorner<4, 4>() =
+      Squares(options_.ahead_surprise_m, options_.beside_surprise_m, options_.up_surprise_m,
+              options_.turn_surprise_rad)
+          .asDiagonal();
+}
+
+void MotionModel::Relocate(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) {
+  Start(T_world_sensor);
+  const Eigen::Matrix4d prior = covariance();
+  covariance_.topLeftCorner<4, 4>() = (prior.inverse() + seen).inverse();
+}
+
+void MotionModel::SetTilt(const Eigen::Matrix3d& R_world_sensor) {
+  pose_.linear() = R_world_sensor;
+}
+
+}  // namespace atlas

@@ -1,0 +1,31 @@
+#include "core/localization/pose_prior.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace atlas {
+
+Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to) {
+  Eigen::Vector4d difference;
+  difference.head<3>() = to.translation() - from.translation();
+  difference(3) = SplitYaw(Eigen::Quaterniond(to.linear() * from.linear().transpose())).yaw_rad;
+  return difference;
+}
+
+double LogDensity(const PosePrior& prior, const Pose& pose) {
+  const Eigen::Vector4d offset = PoseDifference(prior.T_world_level, pose);
+  return -0.5 * offset.dot(prior.covariance.ldlt().solve(offset));
+}
+
+HorizontalSpread SpreadOf(const PoseCovariance& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance.topLeftCorner<2, 2>());
+  const auto sigma = [&](int i) {
+    return std::sqrt(std::max(0.0, solver.eigenvalues()(i)));
+  };
+  return {sigma(1), sigma(0), solver.eigenvectors().col(1)};
+}
+
+}  // namespace atlas

@@ -1,0 +1,32 @@
+// Where a vehicle is expected, and how surely.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+
+namespace atlas {
+
+// Of (x, y, z, yaw): world axes, metres and radians. Tilt is the IMU's.
+using PoseCovariance = Eigen::Matrix4d;
+
+struct PosePrior {
+  Pose T_world_level = Pose::Identity();
+  PoseCovariance covariance = PoseCovariance::Zero();
+};
+
+// (x, y, z, yaw) that take `from` to `to`.
+Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to);
+
+// Log of the prior's density at `pose`, up to its constant.
+double LogDensity(const PosePrior& prior, const Pose& pose);
+
+// A place's uncertainty in the plane, standard deviations.
+struct HorizontalSpread {
+  double along_m = 0.0;   // in the direction in which it is least certain
+  double beside_m = 0.0;  // across it
+  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();
+};
+HorizontalSpread SpreadOf(const PoseCovariance& covariance);
+
+}  // namespace atlas
