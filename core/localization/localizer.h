@@ -31,8 +31,8 @@ struct LocalizerOptions {
   MotionOptions motion;
   PoseSearchOptions search;
 
-  // Of RegistrationResult; less is lost. Wrong places on real drives, found from starts up to 6 m and
-  // 20 degrees off, fit 0.385 at most, right ones 0.48 and more but for two in a hundred.
+  // Of RegistrationResult; less is lost. Wrong places on real drives, found from starts up to 6 m
+  // and 20 degrees off, fit 0.385 at most, right ones 0.48 and more but for two in a hundred.
   double min_fit = 0.4;
   double good_fit = 0.45;          // less is weak
   double max_weak_sigma_m = 0.10;  // of the worst horizontal direction; more is weak
