@@ -1,5 +1,6 @@
 #include "core/traversability/window_plane.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -56,26 +57,37 @@ std::optional<Plane> ThroughPoints(const Eigen::Vector3f& a,
   return Plane{normal / length, -normal.dot(a) / length};
 }
 
-// Whole vectors: the padding is far from every plane.
-std::uint32_t CountInliers(const WindowReturns& window, const Plane& plane, float threshold_m) {
+// Whole vectors: the padding is far from every plane. Gives up, with fewer than `least`, as soon as
+// that many cannot be reached any more.
+std::uint32_t CountInliers(const WindowReturns& window,
+                           const Plane& plane,
+                           float threshold_m,
+                           std::uint32_t least) {
+  constexpr std::uint32_t kBlock = 4 * kLanes;
   const float nx = plane.normal.x();
   const float ny = plane.normal.y();
   const float nz = plane.normal.z();
   const float* x = window.x.data();
   const float* y = window.y.data();
   const float* z = window.z.data();
-  std::array<std::int32_t, kLanes> count{};
-  for (std::uint32_t i = 0; i < window.size(); i += kLanes) {
-    for (std::uint32_t k = 0; k < kLanes; ++k) {
-      const float distance = nx * x[i + k] + ny * y[i + k] + nz * z[i + k] + plane.offset_m;
-      count[k] += static_cast<std::int32_t>(std::abs(distance) < threshold_m);
+  std::uint32_t total = 0;
+  for (std::uint32_t block = 0; block < window.size(); block += kBlock) {
+    const std::uint32_t end = std::min(block + kBlock, window.size());
+    std::array<std::int32_t, kLanes> count{};
+    for (std::uint32_t i = block; i < end; i += kLanes) {
+      for (std::uint32_t k = 0; k < kLanes; ++k) {
+        const float distance = nx * x[i + k] + ny * y[i + k] + nz * z[i + k] + plane.offset_m;
+        count[k] += static_cast<std::int32_t>(std::abs(distance) < threshold_m);
+      }
+    }
+    for (const std::int32_t lane : count) {
+      total += static_cast<std::uint32_t>(lane);
+    }
+    if (total + window.size() - end < least) {
+      break;
     }
   }
-  std::int32_t total = 0;
-  for (const std::int32_t lane : count) {
-    total += lane;
-  }
-  return static_cast<std::uint32_t>(total);
+  return total;
 }
 
 }  // namespace
@@ -88,25 +100,26 @@ int WindowReturns::FilledRings() const {
   return filled;
 }
 
-std::optional<PlaneFit> FitPlane(const WindowReturns& window,
-                                 float threshold_m,
-                                 TripleChoice choice) {
+std::optional<PlaneFit> FitPlane(const WindowReturns& window, const PlaneFitOptions& options) {
   const auto corner = [&](const Triple& triple, std::size_t k) {
     const std::uint32_t i =
-        choice == TripleChoice::kOneInARing
+        options.choice == TripleChoice::kOneInARing
             ? Corner(window, k, triple.at[k])
             : static_cast<std::uint32_t>(triple.at[k] * static_cast<float>(window.size()));
     return window.Point(i);
   };
+  const float enough = options.min_inlier_ratio * static_cast<float>(window.size());
+  auto least = static_cast<std::uint32_t>(std::ceil(enough));
   std::optional<PlaneFit> best;
   for (const Triple& triple : kTable) {
     const auto plane = ThroughPoints(corner(triple, 0), corner(triple, 1), corner(triple, 2));
     if (!plane) {
       continue;
     }
-    const std::uint32_t inliers = CountInliers(window, *plane, threshold_m);
-    if (!best || inliers > best->inliers) {
+    const std::uint32_t inliers = CountInliers(window, *plane, options.threshold_m, least);
+    if (inliers >= least) {
       best = PlaneFit{*plane, inliers};
+      least = inliers + 1;
     }
     if (inliers == window.size()) {
       break;  // no later triple can have more: most windows of a road end here

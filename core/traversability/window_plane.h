@@ -37,10 +37,15 @@ enum class TripleChoice : std::uint8_t {
   kOneInARing,  // spread over the rings
 };
 
-// Best of a fixed table of 32 triples; nullopt when every triple is degenerate. Requires at least
-// one return, and infinite padding beyond size(): it must lie on no plane.
-std::optional<PlaneFit> FitPlane(const WindowReturns& window,
-                                 float threshold_m,
-                                 TripleChoice choice);
+struct PlaneFitOptions {
+  float threshold_m = 0.0F;  // distance of an inlier
+  TripleChoice choice = TripleChoice::kOneInARing;
+  float min_inlier_ratio = 0.0F;  // of the window's returns
+};
+
+// Best of a fixed table of 32 triples; nullopt when every triple is degenerate or has too few
+// inliers. Requires at least one return, and infinite padding beyond size(): it must lie on no
+// plane.
+std::optional<PlaneFit> FitPlane(const WindowReturns& window, const PlaneFitOptions& options);
 
 }  // namespace atlas

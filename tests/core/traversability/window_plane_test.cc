@@ -11,6 +11,7 @@ namespace atlas {
 namespace {
 
 constexpr float kThreshold_m = 0.12F;
+const PlaneFitOptions kOptions{kThreshold_m, TripleChoice::kOneInARing, 0.0F};
 constexpr std::size_t kPadding = 16;
 
 // Three rings of returns in one window of azimuth, as points of the world over z = height(x, y).
@@ -62,7 +63,7 @@ TEST(WindowPlaneTest, FindsAPlaneInAnyAttitude) {
     for (const float north : {-0.3F, 0.0F, 0.36F}) {
       const auto points =
           ThreeRings(20, [&](float x, float y) { return -1.8F + east * x + north * y; });
-      const auto fit = FitPlane(WindowOf(points), kThreshold_m, TripleChoice::kOneInARing);
+      const auto fit = FitPlane(WindowOf(points), kOptions);
       ASSERT_TRUE(fit.has_value());
       EXPECT_EQ(fit->inliers, points.size());
       const Eigen::Vector3f truth = Eigen::Vector3f(-east, -north, 1.0F).normalized();
@@ -77,7 +78,7 @@ TEST(WindowPlaneTest, CountsEveryReturnOfAnyWindowOnce) {
   std::normal_distribution<float> noise(0.0F, 0.1F);
   for (int columns = 1; columns < 40; ++columns) {  // whole vectors and every remainder
     const auto points = ThreeRings(columns, [&](float, float) { return -1.8F + noise(random); });
-    const auto fit = FitPlane(WindowOf(points), kThreshold_m, TripleChoice::kOneInARing);
+    const auto fit = FitPlane(WindowOf(points), kOptions);
     ASSERT_TRUE(fit.has_value()) << columns;
     // A return at the threshold itself may round either way.
     EXPECT_NEAR(fit->inliers, CountNear(points, fit->plane), 1) << columns;
@@ -92,7 +93,7 @@ TEST(WindowPlaneTest, TheMajorityWinsOverClutter) {
       const bool is_clutter = random() % 10 < 4;
       return is_clutter ? -1.5F + 0.01F * static_cast<float>(random() % 150) : -1.8F;
     });
-    const auto fit = FitPlane(WindowOf(points), kThreshold_m, TripleChoice::kOneInARing);
+    const auto fit = FitPlane(WindowOf(points), kOptions);
     ASSERT_TRUE(fit.has_value());
     EXPECT_GT(std::abs(fit->plane.normal.z()), 0.98F) << round;
     EXPECT_NEAR(std::abs(fit->plane.offset_m), 1.8F, 0.5F) << round;
@@ -104,9 +105,9 @@ TEST(WindowPlaneTest, NoPlaneGoesThroughALineOrAPoint) {
   for (int i = 0; i < 30; ++i) {
     line.emplace_back(5.0F + static_cast<float>(i), 2.0F * static_cast<float>(i), 0.5F);
   }
-  EXPECT_FALSE(FitPlane(WindowOf(line), kThreshold_m, TripleChoice::kOneInARing).has_value());
+  EXPECT_FALSE(FitPlane(WindowOf(line), kOptions).has_value());
   const std::vector<Eigen::Vector3f> point(30, Eigen::Vector3f(5.0F, 1.0F, -1.0F));
-  EXPECT_FALSE(FitPlane(WindowOf(point), kThreshold_m, TripleChoice::kOneInARing).has_value());
+  EXPECT_FALSE(FitPlane(WindowOf(point), kOptions).has_value());
 }
 
 TEST(WindowPlaneTest, AnEmptyRingIsReplacedByAnother) {
@@ -115,7 +116,7 @@ TEST(WindowPlaneTest, AnEmptyRingIsReplacedByAnother) {
        {std::array<std::uint32_t, 4>{0, 0, 15, 30}, {0, 15, 15, 30}, {0, 15, 30, 30}}) {
     const WindowReturns window = WindowOf(points, begin);
     EXPECT_EQ(window.FilledRings(), 2);
-    const auto fit = FitPlane(window, kThreshold_m, TripleChoice::kOneInARing);
+    const auto fit = FitPlane(window, kOptions);
     ASSERT_TRUE(fit.has_value());
     EXPECT_EQ(fit->inliers, 30U);
   }
@@ -128,8 +129,8 @@ TEST(WindowPlaneTest, IsTheSameEveryTime) {
   std::mt19937 random(43);
   std::normal_distribution<float> noise(0.0F, 0.3F);
   const auto points = ThreeRings(25, [&](float, float) { return -1.8F + noise(random); });
-  const auto first = FitPlane(WindowOf(points), kThreshold_m, TripleChoice::kOneInARing);
-  const auto second = FitPlane(WindowOf(points), kThreshold_m, TripleChoice::kOneInARing);
+  const auto first = FitPlane(WindowOf(points), kOptions);
+  const auto second = FitPlane(WindowOf(points), kOptions);
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->plane.normal, second->plane.normal);
   EXPECT_EQ(first->plane.offset_m, second->plane.offset_m);
