@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "core/fusion/sigma_table.h"
+#include "core/fusion/observation/sigma_table.h"
 #include "core/fusion/tile_surveys.h"
 #include "server/service/stored_keyframes.h"
 #include "server/service/survey_cache.h"
