@@ -15,6 +15,7 @@ FLOOR_2 = FLOOR_1 + ["core/scan"]
 FLOOR_3 = FLOOR_2 + ["core/traversability", "core/grid", "core/column"]
 FLOOR_4 = FLOOR_3 + ["core/keyframe", "core/tile"]
 FUSED = FLOOR_1 + ["core/keyframe", "core/tile", "core/fusion", "core/fusion/observation", "server/store"]
+STORE = FLOOR_1 + ["server/store"]
 WIRE = ["proto/wire", "proto/roadatlas/v1"]
 COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/output", "client/connection"]
 ALLOWED = {
@@ -41,7 +42,13 @@ ALLOWED = {
     "core/simulation/worlds": FLOOR_4 + ["core/simulation", "core/simulation/mesh"],
     "proto/wire": FLOOR_1 + ["proto/roadatlas/v1"],
     "server/store": FLOOR_1,
-    "server/store/sqlite": FLOOR_1 + ["server/store"],
+    "server/store/sqlite": STORE + ["server/store/sqlite/connection", "server/store/sqlite/schema",
+                                    "server/store/sqlite/tables", "server/store/sqlite/transactions"],
+    "server/store/sqlite/connection": FLOOR_1,
+    "server/store/sqlite/schema": STORE + ["server/store/sqlite/connection"],
+    "server/store/sqlite/tables": STORE + ["server/store/sqlite/connection", "server/store/sqlite/schema"],
+    "server/store/sqlite/transactions": STORE + ["server/store/sqlite/connection", "server/store/sqlite/schema",
+                                                 "server/store/sqlite/tables"],
     "client/connection": FLOOR_1 + WIRE,
     "client/score": FLOOR_1,
     "client/map": FLOOR_1 + ["core/tile", "client/connection"],
@@ -70,7 +77,7 @@ ALLOWED = {
 FENCED = {
     r"<boost/asio|<boost/beast": ["server/net", "server", "client/connection"],
     r"\.pb\.h\"": ["proto/wire", "server/net", "client/connection"],
-    r"<SQLiteCpp|<sqlite3": ["server/store/sqlite"],
+    r"<SQLiteCpp|<sqlite3": ["server/store/sqlite/connection"],
     r"<CLI/": ["client/cli/command_line", "server/config"],
     r"<toml\+\+": ["server/config"],
     r"<spdlog": ["server", "server/config", "server/net", "server/service", "server/store",
