@@ -1,4 +1,4 @@
-#include "server/service/damage_list.h"
+#include "server/service/fusion/damage_list.h"
 
 #include "core/base/str_cat.h"
 

@@ -1,4 +1,4 @@
-#include "server/service/fusion_scheduler.h"
+#include "server/service/fusion/fusion_scheduler.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,8 +1,8 @@
-#include "server/service/atlas_digest.h"
+#include "server/service/verification/atlas_digest.h"
 
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
-#include "server/service/tile_hasher.h"
+#include "server/service/verification/tile_hasher.h"
 
 namespace atlas {
 namespace {

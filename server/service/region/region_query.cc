@@ -1,4 +1,4 @@
-#include "server/service/region_query.h"
+#include "server/service/region/region_query.h"
 
 #include <algorithm>
 #include <iterator>

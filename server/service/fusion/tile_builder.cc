@@ -1,4 +1,4 @@
-#include "server/service/tile_builder.h"
+#include "server/service/fusion/tile_builder.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include "core/fusion/tile_fusion.h"
 #include "core/tile/tile_codec.h"
 #include "core/tile/tile_pyramid.h"
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
 
 namespace atlas {
 

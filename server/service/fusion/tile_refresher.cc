@@ -1,10 +1,10 @@
-#include "server/service/tile_refresher.h"
+#include "server/service/fusion/tile_refresher.h"
 
 #include <algorithm>
 #include <tuple>
 #include <utility>
 
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
 
 namespace atlas {
 

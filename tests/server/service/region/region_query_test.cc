@@ -1,5 +1,5 @@
 // Region queries: order, budget, and the disc.
-#include "server/service/region_query.h"
+#include "server/service/region/region_query.h"
 
 #include <set>
 

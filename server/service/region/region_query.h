@@ -11,8 +11,8 @@
 
 #include "core/base/integer_math.h"
 #include "core/base/status.h"
-#include "server/service/region_disc.h"
-#include "server/service/tile_view.h"
+#include "server/service/region/region_disc.h"
+#include "server/service/region/tile_view.h"
 
 namespace atlas {
 

@@ -1,7 +1,7 @@
 // The tiles as they are stored.
 #pragma once
 
-#include "server/service/tile_view.h"
+#include "server/service/region/tile_view.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -1,4 +1,4 @@
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
 
 #include <memory>
 #include <utility>

@@ -6,7 +6,7 @@
 #include "core/base/status.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/keyframe/keyframe.h"
-#include "server/service/lru_cache.h"
+#include "server/service/fusion/lru_cache.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -10,9 +10,9 @@
 #include "core/base/status.h"
 #include "core/fusion/observation/sigma_table.h"
 #include "core/fusion/tile_surveys.h"
-#include "server/service/stored_keyframes.h"
-#include "server/service/survey_cache.h"
-#include "server/service/tile_builder.h"
+#include "server/service/fusion/stored_keyframes.h"
+#include "server/service/fusion/survey_cache.h"
+#include "server/service/fusion/tile_builder.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

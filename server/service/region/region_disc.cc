@@ -1,4 +1,4 @@
-#include "server/service/region_disc.h"
+#include "server/service/region/region_disc.h"
 
 #include <algorithm>
 

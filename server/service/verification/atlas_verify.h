@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "server/service/tile_builder.h"
+#include "server/service/fusion/tile_builder.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

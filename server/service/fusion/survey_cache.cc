@@ -1,4 +1,4 @@
-#include "server/service/survey_cache.h"
+#include "server/service/fusion/survey_cache.h"
 
 #include <utility>
 

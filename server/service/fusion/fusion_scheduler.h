@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "server/service/change_signal.h"
-#include "server/service/damage_list.h"
+#include "server/service/fusion/damage_list.h"
+#include "server/service/fusion/tile_refresher.h"
 #include "server/service/log_sink.h"
-#include "server/service/tile_refresher.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -1,4 +1,4 @@
-#include "server/service/atlas_verify.h"
+#include "server/service/verification/atlas_verify.h"
 
 #include <utility>
 
