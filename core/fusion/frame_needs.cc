@@ -4,8 +4,8 @@
 #include <cassert>
 #include <utility>
 
-#include "core/fusion/band_surveys.h"
-#include "core/fusion/bounded_choice.h"
+#include "core/fusion/combination/bounded_choice.h"
+#include "core/fusion/survey/band_surveys.h"
 
 namespace atlas {
 namespace {

@@ -1,7 +1,7 @@
 // What every step of fusion needs beside its input.
 #pragma once
 
-#include "core/fusion/sigma_table.h"
+#include "core/fusion/observation/sigma_table.h"
 #include "core/geometry/map_profile.h"
 
 namespace atlas {

@@ -4,8 +4,8 @@
 #include <span>
 #include <tuple>
 
-#include "core/fusion/disc.h"
-#include "core/fusion/fusion_stretch.h"
+#include "core/fusion/observation/disc.h"
+#include "core/fusion/survey/fusion_stretch.h"
 
 namespace atlas {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/map_profile.h"

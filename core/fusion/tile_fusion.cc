@@ -4,9 +4,9 @@
 #include <cassert>
 #include <utility>
 
-#include "core/fusion/band_surveys.h"
-#include "core/fusion/cell_combiner.h"
-#include "core/fusion/fusion_stretch.h"
+#include "core/fusion/combination/cell_combiner.h"
+#include "core/fusion/survey/band_surveys.h"
+#include "core/fusion/survey/fusion_stretch.h"
 
 namespace atlas {
 namespace {

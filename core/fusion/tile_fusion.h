@@ -8,7 +8,7 @@
 #include <span>
 
 #include "core/base/status.h"
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/keyframe/keyframe.h"
 #include "core/tile/tile.h"

@@ -15,13 +15,13 @@
 #include <span>
 #include <vector>
 
-#include "core/fusion/bounded_choice.h"
-#include "core/fusion/cell_combiner.h"
-#include "core/fusion/cell_set.h"
+#include "core/fusion/combination/bounded_choice.h"
+#include "core/fusion/combination/cell_combiner.h"
 #include "core/fusion/fusion_context.h"
-#include "core/fusion/settled_segments.h"
 #include "core/fusion/stretch_plan.h"
-#include "core/fusion/stretch_survey.h"
+#include "core/fusion/survey/cell_set.h"
+#include "core/fusion/survey/settled_segments.h"
+#include "core/fusion/survey/stretch_survey.h"
 #include "core/fusion/tile_fusion.h"
 
 namespace atlas {

@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
-#include "server/service/current_tiles.h"
 #include "server/service/process_memory.h"
+#include "server/service/region/current_tiles.h"
 #include "server/store/await.h"
 
 namespace atlas {

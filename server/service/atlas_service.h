@@ -12,15 +12,15 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "server/service/atlas_digest.h"
-#include "server/service/atlas_verify.h"
 #include "server/service/change_signal.h"
 #include "server/service/compaction/compact_atlas.h"
-#include "server/service/fusion_scheduler.h"
+#include "server/service/fusion/fusion_scheduler.h"
 #include "server/service/history/past_atlas.h"
 #include "server/service/log_sink.h"
-#include "server/service/region_query.h"
+#include "server/service/region/region_query.h"
 #include "server/service/upload_check.h"
+#include "server/service/verification/atlas_digest.h"
+#include "server/service/verification/atlas_verify.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/keyframe/keyframe_codec.h"
 
 namespace atlas {

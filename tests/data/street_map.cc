@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/base/integer_math.h"
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/geometry/nibble.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/tile/column_lattice.h"

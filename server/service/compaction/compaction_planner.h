@@ -12,7 +12,7 @@
 
 #include "core/base/status.h"
 #include "core/fusion/tile_fusion.h"
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -8,9 +8,9 @@
 #include <memory>
 #include <mutex>
 
-#include "server/service/atlas_digest.h"
-#include "server/service/region_query.h"
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
+#include "server/service/region/region_query.h"
+#include "server/service/verification/atlas_digest.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "core/base/status.h"
-#include "server/service/atlas_digest.h"
 #include "server/service/history/past_tiles.h"
+#include "server/service/verification/atlas_digest.h"
 
 namespace atlas {
 

@@ -5,7 +5,7 @@
 
 #include "core/fusion/tile_fusion.h"
 #include "core/tile/tile_pyramid.h"
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
 
 namespace atlas {
 namespace {

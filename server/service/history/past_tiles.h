@@ -11,7 +11,7 @@
 #include "core/base/status.h"
 #include "core/keyframe/keyframe.h"
 #include "core/tile/tile.h"
-#include "server/service/stored_keyframes.h"
+#include "server/service/fusion/stored_keyframes.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {

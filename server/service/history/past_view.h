@@ -6,8 +6,8 @@
 #include <map>
 
 #include "server/service/history/past_tiles.h"
-#include "server/service/region_query.h"
-#include "server/service/tile_view.h"
+#include "server/service/region/region_query.h"
+#include "server/service/region/tile_view.h"
 
 namespace atlas {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "core/base/str_cat.h"
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/keyframe/keyframe_codec.h"
 #include "core/scan/drive_folder.h"
 #include "core/simulation/city/city_world.h"

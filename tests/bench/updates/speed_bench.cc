@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/base/str_cat.h"
-#include "core/fusion/frame_resampler.h"
+#include "core/fusion/observation/frame_resampler.h"
 #include "core/fusion/tile_surveys.h"
 #include "tests/bench/accuracy/bench_drive.h"
 #include "tests/bench/accuracy/drive_map.h"

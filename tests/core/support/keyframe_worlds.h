@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/geometry/map_profile.h"
 #include "core/keyframe/keyframe.h"

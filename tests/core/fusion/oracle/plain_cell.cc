@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "core/base/integer_math.h"
-#include "core/fusion/cell_layers.h"
+#include "core/fusion/combination/cell_layers.h"
 #include "core/geometry/nibble.h"
 #include "core/tile/layer_association.h"
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/fusion/sigma_table.h"
+#include "core/fusion/observation/sigma_table.h"
 #include "core/fusion/tile_fusion.h"
 
 namespace atlas::testing {

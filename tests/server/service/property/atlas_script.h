@@ -15,7 +15,7 @@
 #include "core/geometry/map_profile.h"
 #include "core/geometry/pose.h"
 #include "core/keyframe/keyframe.h"
-#include "server/service/tile_refresher.h"
+#include "server/service/fusion/tile_refresher.h"
 #include "server/store/session_types.h"
 
 namespace atlas::testing {

@@ -7,7 +7,7 @@
 #include <openssl/evp.h>
 
 #include "core/base/str_cat.h"
-#include "core/fusion/keyframe_placement.h"
+#include "core/fusion/observation/keyframe_placement.h"
 #include "core/tile/tile_codec.h"
 #include "core/tile/tile_pyramid.h"
 #include "tests/core/fusion/oracle/plain_fusion.h"

@@ -1,0 +1,93 @@
+#include "core/fusion/combination/bounded_choice.h"
+
+#include <algorithm>
+
+#include "core/base/small_sort.h"
+
+namespace atlas {
+namespace {
+
+// floor(altitude / band), in 32 bits: it is asked of every segment.
+std::int32_t BandOf(const SegmentView& view, std::int32_t band_mm) {
+  const std::int32_t altitude_mm = view.segment->altitude_mm;
+  return altitude_mm / band_mm - (altitude_mm % band_mm < 0 ? 1 : 0);
+}
+
+}  // namespace
+
+std::size_t BoundedChoice::MoveLatestToFront(std::span<SegmentView> segments) {
+  FindCandidates(segments);
+  if (candidates_.empty()) {
+    return segments.size();
+  }
+  SmallStableSort(candidates_.begin(), candidates_.end(),
+                  [&](const Candidate& a, const Candidate& b) {
+                    return WasSeenEarlier(segments[b.index], segments[a.index]);
+                  });
+  chosen_.fill(kNone);
+  Choose(segments, true);
+  Choose(segments, false);
+  return MoveRestBack(segments);
+}
+
+// The segments of bands that may hold too many.
+void BoundedChoice::FindCandidates(std::span<const SegmentView> segments) {
+  const std::size_t limit = std::min(profile_.band_segments, profile_.band_vehicle_segments);
+  candidates_.clear();
+  if (segments.size() <= limit) {
+    return;
+  }
+  std::array<std::uint32_t, kSlots> counts{};
+  for (std::size_t i = segments.size(); i-- > 0;) {  // later stretches are mostly later in time
+    candidates_.push_back({BandOf(segments[i], profile_.band_mm), static_cast<std::uint32_t>(i)});
+    ++counts[Slot(candidates_.back().band)];
+  }
+  std::erase_if(candidates_, [&](const Candidate& c) { return counts[Slot(c.band)] <= limit; });
+}
+
+void BoundedChoice::Choose(std::span<const SegmentView> segments, bool is_strong) {
+  for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
+    Candidate& candidate = candidates_[i];
+    if (segments[candidate.index].segment->is_strong == is_strong && HasRoom(candidate, segments)) {
+      std::uint32_t& last = chosen_[Slot(candidate.band)];
+      candidate.counts = true;
+      candidate.next = last;
+      last = i;
+    }
+  }
+}
+
+bool BoundedChoice::HasRoom(const Candidate& candidate,
+                            std::span<const SegmentView> segments) const {
+  const std::uint32_t vehicle = segments[candidate.index].vehicle;
+  std::uint32_t of_band = 0;
+  std::uint32_t of_vehicle = 0;
+  for (std::uint32_t i = chosen_[Slot(candidate.band)]; i != kNone; i = candidates_[i].next) {
+    const Candidate& other = candidates_[i];
+    if (other.band == candidate.band) {
+      ++of_band;
+      of_vehicle += segments[other.index].vehicle == vehicle ? 1u : 0u;
+    }
+  }
+  return of_band < profile_.band_segments && of_vehicle < profile_.band_vehicle_segments;
+}
+
+std::size_t BoundedChoice::MoveRestBack(std::span<SegmentView> segments) {
+  is_dropped_.assign(segments.size(), false);
+  for (const Candidate& candidate : candidates_) {
+    is_dropped_[candidate.index] = !candidate.counts;
+  }
+  std::size_t kept = 0;
+  rest_.clear();
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (is_dropped_[i]) {
+      rest_.push_back(segments[i]);
+    } else {
+      segments[kept++] = segments[i];
+    }
+  }
+  std::copy(rest_.begin(), rest_.end(), segments.begin() + static_cast<std::ptrdiff_t>(kept));
+  return kept;
+}
+
+}  // namespace atlas

@@ -1,0 +1,53 @@
+// Preset bounded: of each band of altitude in a cell, only the segments that were seen last count,
+// so that what a cell costs does not grow with the passes. Guesses never push out what was
+// measured.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/fusion/segment/segment_view.h"
+#include "core/geometry/map_profile.h"
+
+namespace atlas {
+
+// Reused from cell to cell.
+class BoundedChoice {
+ public:
+  // `profile` must outlive the choice.
+  explicit BoundedChoice(const MapProfile& profile) : profile_(profile) {}
+
+  // Strong ones first and of each kind the latest, a segment counts while its band holds fewer than
+  // `band_segments`, and fewer than `band_vehicle_segments` of its vehicle. Moves those that count
+  // to the front, the order kept, and says how many they are.
+  std::size_t MoveLatestToFront(std::span<SegmentView> segments);
+
+ private:
+  // Bands are found by their last bits, so that others may have to be told apart.
+  static constexpr std::size_t kSlots = 64;
+  static constexpr std::uint32_t kNone = 0xFFFF'FFFF;
+
+  struct Candidate {
+    std::int32_t band = 0;
+    std::uint32_t index = 0;
+    bool counts = false;
+    std::uint32_t next = kNone;  // the one of its slot that was chosen before
+  };
+
+  static std::size_t Slot(std::int32_t band) { return static_cast<std::uint32_t>(band) % kSlots; }
+  void FindCandidates(std::span<const SegmentView> segments);
+  void Choose(std::span<const SegmentView> segments, bool is_strong);
+  bool HasRoom(const Candidate& candidate, std::span<const SegmentView> segments) const;
+  std::size_t MoveRestBack(std::span<SegmentView> segments);
+
+  const MapProfile& profile_;
+  std::vector<Candidate> candidates_;           // the latest first
+  std::array<std::uint32_t, kSlots> chosen_{};  // the last candidate of each slot, or kNone
+  std::vector<bool> is_dropped_;                // by segment
+  std::vector<SegmentView> rest_;
+};
+
+}  // namespace atlas

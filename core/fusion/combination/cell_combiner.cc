@@ -1,0 +1,13 @@
+#include "core/fusion/combination/cell_combiner.h"
+
+namespace atlas {
+
+void CellCombiner::Combine(std::span<SegmentView> segments, std::vector<TileLayer>& out) {
+  if (profile_.preset == FusionPreset::kBounded) {
+    segments = segments.first(choice_.MoveLatestToFront(segments));
+  }
+  layer_builder_.Build(segments);
+  folder_.Fold(segments, layer_builder_.labels(), layer_builder_.layers(), out);
+}
+
+}  // namespace atlas

@@ -1,0 +1,51 @@
+// Occupancy and columns of one cell's layers: the say of each stretch, in the order in which they
+// saw the layer last. The fold saturates, so that no stretch has more than its say, no evidence
+// becomes certainty, and what was seen last counts.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/fusion/combination/cell_layers.h"
+#include "core/fusion/segment/column_evidence.h"
+#include "core/fusion/segment/segment_view.h"
+#include "core/tile/column_lattice.h"
+#include "core/tile/tile.h"
+
+namespace atlas {
+
+// Reused from cell to cell.
+class EvidenceFolder {
+ public:
+  // `profile` must outlive the folder.
+  explicit EvidenceFolder(const MapProfile& profile) : profile_(profile) {}
+
+  // Appends the cell's layers to `out`, complete. Segments in canonical order with the layer of
+  // each, or kNoLayer.
+  void Fold(std::span<const SegmentView> segments,
+            std::span<const std::uint32_t> labels,
+            std::span<const CellLayer> layers,
+            std::vector<TileLayer>& out);
+
+ private:
+  // Of one layer, so far.
+  struct Sum {
+    ColumnSpan span;
+    int occupancy = 0;
+    ColumnSum column;
+  };
+
+  void Begin(std::span<const CellLayer> layers);
+  void SortByTime(std::span<const SegmentView> segments);
+  // Whether what the segment says of occupancy is about this layer: it measured it, or guessed it
+  // right.
+  bool SpeaksOfOccupancy(const Segment& segment, const CellLayer& layer) const;
+  static TileLayer Finish(const CellLayer& surface, const Sum& sum);
+
+  const MapProfile& profile_;
+  std::vector<Sum> sums_;
+  std::vector<std::uint32_t> order_;
+};
+
+}  // namespace atlas

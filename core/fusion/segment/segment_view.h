@@ -1,0 +1,26 @@
+// A segment beside those of other stretches in one cell.
+#pragma once
+
+#include <cstdint>
+
+#include "core/fusion/segment/segment.h"
+
+namespace atlas {
+
+struct SegmentView {
+  Segment* segment = nullptr;
+  std::int64_t last_time_ms = 0;  // of the keyframe that saw it last
+  std::uint32_t stretch = 0;      // its place in canonical order
+  std::uint32_t vehicle = 0;      // FusionStretch's number
+};
+
+// By the keyframe that saw it last: its time, then vehicle, session and sequence.
+inline bool WasSeenEarlier(const SegmentView& a, const SegmentView& b) {
+  if (a.last_time_ms != b.last_time_ms) {
+    return a.last_time_ms < b.last_time_ms;
+  }
+  return a.stretch != b.stretch ? a.stretch < b.stretch
+                                : a.segment->last_frame < b.segment->last_frame;
+}
+
+}  // namespace atlas

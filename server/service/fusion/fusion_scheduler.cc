@@ -1,0 +1,219 @@
+#include "server/service/fusion/fusion_scheduler.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <future>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/await.h"
+
+namespace atlas {
+namespace {
+
+// How often a worker without work looks again: for leases and back-offs that ran out.
+constexpr std::chrono::seconds kLookAgain{1};
+
+struct Unfinished {
+  TileClaim claim;
+  std::future<Result<FinishResult>> result;
+};
+
+}  // namespace
+
+FusionScheduler::FusionScheduler(AtlasStore& store,
+                                 ChangeSignal& changes,
+                                 WallClock clock,
+                                 LogSink log,
+                                 const FusionOptions& options)
+    : store_(store),
+      changes_(changes),
+      clock_(std::move(clock)),
+      log_(std::move(log)),
+      options_(options),
+      refresher_(store, options.building) {
+  for (unsigned i = 0; i < options_.workers; ++i) {
+    threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
+      RunWorker(stop, {owner, {}});
+    });
+  }
+}
+
+FusionScheduler::~FusionScheduler() {
+  Stop();
+}
+
+void FusionScheduler::Stop() {
+  for (std::jthread& thread : threads_) {
+    thread.request_stop();
+  }
+  threads_.clear();  // joins
+}
+
+void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
+  while (!stop.stop_requested()) {
+    const std::uint64_t seen = changes_.version();
+    const std::vector<TileClaim> claims =
+        GiveBack(worker) ? NextClaims(worker.owner) : std::vector<TileClaim>();
+    if (!claims.empty()) {
+      BuildClaims(worker, claims, stop);
+    } else if (!changes_.is_closed()) {
+      changes_.WaitPast(seen, std::chrono::steady_clock::now() + kLookAgain, stop);
+    } else {
+      return;
+    }
+  }
+}
+
+std::vector<TileClaim> FusionScheduler::NextClaims(const std::string& owner) {
+  while (true) {
+    const std::uint64_t wave = wave_;
+    const ClaimRequest request{owner, clock_(), options_.lease_ms, options_.tiles_per_claim, wave};
+    auto result =
+        Await<ClaimResult>([&](auto done) { store_.ClaimDirty(request, std::move(done)); });
+    if (!result) {
+      log_(LogLevel::kError, "fusion: cannot claim tiles: " + result.error().message());
+      return {};
+    }
+    if (!result->claims.empty() || !result->is_wave_done || !StartNextWave(wave)) {
+      return std::move(result->claims);
+    }
+  }
+}
+
+// False when there is nothing to do beyond the wave `done`.
+bool FusionScheduler::StartNextWave(std::uint64_t done) {
+  const auto state = store_.ReadDirtyState();
+  if (!state) {
+    log_(LogLevel::kError, "fusion: cannot read the dirty marks: " + state.error().message());
+    return false;
+  }
+  if (state->dirty_tiles == 0 || state->revision <= done) {
+    return wave_ > done;  // another worker started one
+  }
+  std::uint64_t expected = done;
+  wave_.compare_exchange_strong(expected, state->revision);
+  return true;
+}
+
+// The store writes those that are done while the others are built.
+void FusionScheduler::BuildClaims(Worker& worker,
+                                  const std::vector<TileClaim>& claims,
+                                  const std::stop_token& stop) {
+  std::vector<TileId> ids;
+  for (const TileClaim& claim : claims) {
+    if (stop.stop_requested()) {
+      worker.returns.push_back({claim, 0});
+    } else {
+      ids.push_back(claim.id);
+    }
+  }
+  std::vector<Unfinished> unfinished;
+  Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
+    const TileClaim& claim =
+        *std::find_if(claims.begin(), claims.end(), [&](const TileClaim& c) { return c.id == id; });
+    if (!built) {
+      PostponeFailed(worker, claim, built.error());
+      return;
+    }
+    damage_.Remove(id);
+    ++tiles_built_;
+    FinishedTile tile{claim, built->revision, std::move(built->content)};
+    unfinished.push_back({claim, Begin<FinishResult>([&](auto done) {
+                            store_.FinishTile(std::move(tile), std::move(done));
+                          })});
+  });
+  for (Unfinished& tile : unfinished) {
+    const auto result = tile.result.get();
+    if (!result && result.error().code() == StatusCode::kConflict) {
+      log_(LogLevel::kWarning, "fusion: " + result.error().message());
+    } else if (!result) {
+      PostponeFailed(worker, tile.claim, result.error());
+    }
+  }
+  GiveBack(worker);
+  changes_.Notify();
+}
+
+// What it throws (no memory, say) is a failure of these tiles, not the end of the process: they are
+// tried one by one then.
+void FusionScheduler::Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built) {
+  std::vector<TileId> rest(ids.begin(), ids.end());
+  try {
+    refresher_.Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
+      std::erase(rest, id);
+      on_built(id, std::move(built));
+    });
+  } catch (const std::exception& error) {
+    if (rest.size() == 1) {
+      on_built(rest.front(), Error(StatusCode::kInternal, error.what()));
+      return;
+    }
+    for (const TileId& id : rest) {
+      Build(std::span(&id, 1), on_built);
+    }
+  }
+}
+
+// False when the store takes none now, a full disk, say: the rest is kept for the next time. A
+// damaged store will not take it then either; that lease runs out by itself.
+bool FusionScheduler::GiveBack(Worker& worker) {
+  const bool has_returns = !worker.returns.empty();
+  while (!worker.returns.empty()) {
+    const Return& back = worker.returns.back();
+    const auto released = Await<bool>(
+        [&](auto done) { store_.ReleaseClaim(back.claim, back.retry_at_ms, std::move(done)); });
+    if (!released) {
+      log_(LogLevel::kWarning,
+           StrCat("fusion: cannot release tile ", back.claim.id, ": ", released.error().message()));
+      if (released.error().code() != StatusCode::kInvalidData) {
+        return false;
+      }
+    }
+    worker.returns.pop_back();
+  }
+  if (has_returns) {
+    changes_.Notify();
+  }
+  return true;
+}
+
+void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why) {
+  const std::int64_t backoff =
+      std::min(options_.max_backoff_ms, options_.min_backoff_ms << std::min(claim.attempts, 20u));
+  const bool is_damage = why.code() == StatusCode::kInvalidData &&
+                         !(claim.id.level > 0 && MarkDamagedChildren(claim.id));
+  bool is_news = true;
+  if (is_damage) {
+    is_news = damage_.Add(claim.id, why);
+  } else {
+    damage_.Remove(claim.id);
+  }
+  log_(is_news ? LogLevel::kError : LogLevel::kDebug,
+       StrCat("fusion: tile ", claim.id, " keeps its content and stays dirty, next attempt in ",
+              backoff, " ms: ", why.message()));
+  worker.returns.push_back({claim, clock_() + backoff});
+}
+
+// True when there are some that can be built again, and the parent then.
+bool FusionScheduler::MarkDamagedChildren(const TileId& parent) {
+  std::vector<TileId> damaged;
+  for (const TileId& child : parent.Children()) {
+    const auto tile = store_.ReadTile(child);
+    if (!tile && tile.error().code() == StatusCode::kInvalidData && !damage_.Contains(child)) {
+      damaged.push_back(child);
+    }
+  }
+  if (damaged.empty()) {
+    return false;
+  }
+  const auto marked =
+      Await<std::uint32_t>([&](auto done) { store_.MarkDirty(damaged, std::move(done)); });
+  if (!marked) {
+    log_(LogLevel::kError, "fusion: cannot mark damaged tiles: " + marked.error().message());
+  }
+  return marked.has_value();
+}
+
+}  // namespace atlas

@@ -1,0 +1,126 @@
+#include "server/service/fusion/tile_refresher.h"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "server/service/fusion/stored_keyframes.h"
+
+namespace atlas {
+
+TileRefresher::TileRefresher(AtlasStore& store, const TileRefresherOptions& options)
+    : store_(store),
+      profile_(store.identity().profile),
+      sigmas_(profile_, Keyframe::kMaxRadiusCells),
+      group_bytes_(options.group_bytes),
+      keyframes_(options.keyframe_bytes),
+      tiles_(options.tile_bytes),
+      surveys_(options.surveys),
+      builder_(store, keyframes_, tiles_, options.group_bytes) {}
+
+void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) {
+  std::vector<Job> jobs;
+  std::size_t bytes = 0;
+  for (const TileId& id : ids) {
+    if (id.level > 0 || profile_.preset == FusionPreset::kPaper) {
+      on_built(id, builder_.Build(id));
+      continue;
+    }
+    Result<Job> job = Prepare(id);
+    if (!job) {
+      on_built(id, Error(job.error()));
+      continue;
+    }
+    const std::size_t job_bytes = job->surveys.ExpectedBytes(profile_);
+    if (job_bytes > group_bytes_) {
+      on_built(id, builder_.Build(id));
+      continue;
+    }
+    if (bytes + job_bytes > group_bytes_) {
+      Run(jobs, on_built);
+      jobs.clear();
+      bytes = 0;
+    }
+    jobs.push_back(*std::move(job));
+    bytes += job_bytes;
+  }
+  Run(jobs, on_built);
+}
+
+// With the surveys of the last time, where they are still there. They are taken out meanwhile: what
+// fails is lost, and two workers never share.
+Result<TileRefresher::Job> TileRefresher::Prepare(const TileId& id) {
+  std::optional<KeptSurveys> kept = surveys_.Take(id);
+  Job job{kept ? std::move(kept->surveys) : TileSurveys(id), kept ? kept->revision : 0, {}, {}};
+  const auto sources = store_.GatherTile(id, job.revision);
+  if (!sources) {
+    return Error(sources.error());
+  }
+  if (sources->is_whole && job.revision != 0) {
+    job.surveys = TileSurveys(id);
+  }
+  auto frames = PlaceKeyframes(sources->keyframes);
+  if (!frames) {
+    return Error(frames.error());
+  }
+  TileChange change{*std::move(frames), {}};
+  for (const std::int64_t keyframe : sources->gone) {
+    change.absent.push_back(static_cast<std::uint64_t>(keyframe));
+  }
+  job.revision = sources->revision;
+  job.expected = job.surveys.Expect(change, context());
+  return job;
+}
+
+void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
+  AddKeyframes(jobs);
+  for (Job& job : jobs) {
+    const TileId id = job.surveys.id();
+    if (!job.status.ok()) {
+      on_built(id, Error(std::move(job.status)));
+      continue;
+    }
+    const Tile& tile = job.surveys.Combine(context());
+    auto content = ToContent(tile, profile_);
+    if (content) {
+      tiles_.Insert(content->payload_hash, std::make_shared<const Tile>(tile));
+    }
+    surveys_.Put({std::move(job.surveys), job.revision});
+    on_built(id, BuiltTile{job.revision, std::move(content)});
+  }
+}
+
+// In canonical order, which is that of each job.
+void TileRefresher::AddKeyframes(std::vector<Job>& jobs) {
+  struct Use {
+    const FrameOnMap* frame = nullptr;
+    Job* job = nullptr;
+  };
+  std::vector<Use> uses;
+  for (Job& job : jobs) {
+    for (const FrameOnMap& frame : job.expected) {
+      uses.push_back({&frame, &job});
+    }
+  }
+  std::stable_sort(uses.begin(), uses.end(),
+                   [](const Use& a, const Use& b) { return a.frame->key < b.frame->key; });
+  std::uint64_t content = 0;
+  Result<KeyframeCache::Handle> keyframe = KeyframeCache::Handle();
+  for (const Use& use : uses) {
+    if (!use.job->status.ok()) {
+      continue;
+    }
+    if (*keyframe == nullptr || use.frame->content != content) {
+      content = use.frame->content;
+      keyframe = ReadKeyframe(*use.frame, store_, keyframes_);
+    }
+    if (!keyframe) {
+      use.job->status = keyframe.error();
+      keyframe = KeyframeCache::Handle();
+    } else {
+      use.job->surveys.Add(*use.frame, **keyframe, context());
+    }
+  }
+}
+
+}  // namespace atlas

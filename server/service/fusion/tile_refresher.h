@@ -1,0 +1,63 @@
+// Brings tiles up to date, several at a time: a keyframe is decoded once for all of them, and what
+// is known of a tile from the last time is not asked for again. Used by the workers. Thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/base/status.h"
+#include "core/fusion/observation/sigma_table.h"
+#include "core/fusion/tile_surveys.h"
+#include "server/service/fusion/stored_keyframes.h"
+#include "server/service/fusion/survey_cache.h"
+#include "server/service/fusion/tile_builder.h"
+#include "server/store/atlas_store.h"
+
+namespace atlas {
+
+struct TileRefresherOptions {
+  std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded keyframes, all workers together
+  std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
+  SurveyCacheLimits surveys;                            // kept from one time to the next
+  std::size_t group_bytes = std::size_t{128} << 20;     // surveys of the tiles at hand, a worker
+};
+
+class TileRefresher {
+ public:
+  using OnBuilt = std::function<void(const TileId& id, Result<BuiltTile> built)>;
+
+  TileRefresher(AtlasStore& store, const TileRefresherOptions& options);
+
+  // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's.
+  void Build(std::span<const TileId> ids, const OnBuilt& on_built);
+
+  // What is kept from one time to the next.
+  std::size_t kept_bytes() const { return surveys_.bytes(); }
+
+ private:
+  // A level-0 tile under way.
+  struct Job {
+    TileSurveys surveys;
+    std::uint64_t revision = 0;
+    std::vector<FrameOnMap> expected;  // frames to be added
+    Status status;
+  };
+
+  Result<Job> Prepare(const TileId& id);
+  void Run(std::vector<Job>& jobs, const OnBuilt& on_built);
+  void AddKeyframes(std::vector<Job>& jobs);
+  FusionContext context() const { return {profile_, sigmas_}; }
+
+  AtlasStore& store_;
+  const MapProfile profile_;
+  const SigmaTable sigmas_;
+  const std::size_t group_bytes_;
+  KeyframeCache keyframes_;
+  TileCache tiles_;
+  SurveyCache surveys_;
+  TileBuilder builder_;  // for what is not done here
+};
+
+}  // namespace atlas

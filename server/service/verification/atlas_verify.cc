@@ -1,0 +1,216 @@
+#include "server/service/verification/atlas_verify.h"
+
+#include <utility>
+
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+#include "core/keyframe/keyframe_codec.h"
+#include "core/tile/tile_codec.h"
+
+namespace atlas {
+namespace {
+
+constexpr std::uint32_t kPage = 1'024;
+
+Status CheckTileBlob(const StoredTile& tile, const MapProfile& profile) {
+  const auto payload = TilePayloadFromBlob(tile.blob);
+  if (!payload) {
+    return payload.error().WithContext(StrCat("tile ", tile.id));
+  }
+  const auto decoded = DecodeTile(tile.blob, profile);
+  if (!decoded) {
+    return decoded.error().WithContext(StrCat("tile ", tile.id));
+  }
+  if (Hash64(*payload) != tile.payload_hash || decoded->id != tile.id) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("tile ", tile.id, " holds the content of another tile"));
+  }
+  return {};
+}
+
+}  // namespace
+
+AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
+    : store_(store),
+      options_(std::move(options)),
+      keyframes_(options_.keyframe_bytes),
+      builder_(store, keyframes_, tiles_, options_.tile_bytes) {}
+
+Result<VerifyReport> AtlasVerifier::Run() {
+  for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyCompactions,
+                          &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
+                          &AtlasVerifier::VerifyMissingTiles}) {
+    if (Status status = (this->*step)(); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return std::move(report_);
+}
+
+// Counts damage; every other failure ends the verification.
+Status AtlasVerifier::Note(Status problem) {
+  if (problem.ok() || problem.code() != StatusCode::kInvalidData) {
+    return problem;
+  }
+  ++report_.damaged;
+  if (report_.findings.size() < options_.max_findings) {
+    report_.findings.push_back(problem.message());
+  }
+  return {};
+}
+
+void AtlasVerifier::Mismatch(const TileId& id, const std::string& what) {
+  ++report_.mismatched;
+  if (report_.findings.size() < options_.max_findings) {
+    report_.findings.push_back(StrCat("tile ", id, " ", what));
+  }
+}
+
+Status AtlasVerifier::VerifySessions() {
+  const auto sessions = store_.ListSessions();
+  if (!sessions) {
+    return Note(sessions.error());
+  }
+  for (const SessionRecord& session : *sessions) {
+    expected_keyframes_ += session.keyframes;
+    ATLAS_RETURN_IF_ERROR(Note(store_.CheckSession(session.key)));
+  }
+  return {};
+}
+
+Status AtlasVerifier::VerifyCompactions() {
+  return Note(store_.CheckCompactions());
+}
+
+// Uploads go on meanwhile: there may be more rows than the sessions knew of, never fewer.
+Status AtlasVerifier::VerifyKeyframes() {
+  std::uint64_t rows = 0;
+  std::int64_t after = 0;
+  while (true) {
+    const auto ids = store_.ListKeyframeIds(after, kPage);
+    if (!ids) {
+      return ids.error();
+    }
+    if (ids->empty()) {
+      return rows >= expected_keyframes_
+                 ? Status()
+                 : Note(Status(StatusCode::kInvalidData,
+                               StrCat("the sessions count ", expected_keyframes_,
+                                      " keyframes, and ", rows, " are there")));
+    }
+    rows += ids->size();
+    for (const std::int64_t id : *ids) {
+      ATLAS_RETURN_IF_ERROR(options_.check_stop());
+      ++report_.checked;
+      ATLAS_RETURN_IF_ERROR(Note(CheckKeyframe(id)));
+    }
+    after = ids->back();
+  }
+}
+
+Status AtlasVerifier::CheckKeyframe(std::int64_t id) {
+  const auto record = store_.ReadKeyframe(id);
+  if (!record) {
+    return record.error();
+  }
+  const std::string name = StrCat("keyframe ", record->key);
+  const auto blob = store_.ReadKeyframeBlob(id);
+  if (!blob) {
+    return blob.error().WithContext(name);
+  }
+  const auto keyframe = DecodeKeyframe(*blob);
+  return keyframe ? Status() : keyframe.error().WithContext(name);
+}
+
+Status AtlasVerifier::VerifyTiles() {
+  std::int64_t after = -1;
+  while (true) {
+    const auto page = store_.ListTiles(after, kPage);
+    if (!page) {
+      return page.error();
+    }
+    if (page->empty()) {
+      return {};
+    }
+    for (const TileSummary& tile : *page) {
+      ATLAS_RETURN_IF_ERROR(options_.check_stop());
+      ++report_.checked;
+      ATLAS_RETURN_IF_ERROR(Note(CheckTile(tile.id)));
+    }
+    after = static_cast<std::int64_t>(page->back().id.Key());
+  }
+}
+
+Status AtlasVerifier::CheckTile(const TileId& id) {
+  const auto tile = store_.ReadTile(id);
+  if (!tile) {
+    return tile.error();
+  }
+  if (!*tile) {
+    return {};
+  }
+  ATLAS_RETURN_IF_ERROR(CheckTileBlob(**tile, store_.identity().profile));
+  if (!options_.rebuild) {
+    return {};
+  }
+  ATLAS_RETURN_IF_ERROR(CheckParentExists(id));
+  return CompareTile(id, *tile);
+}
+
+// Parents are rebuilt from stored children, which are themselves compared: level by level this is a
+// rebuild from the keyframes.
+Status AtlasVerifier::CompareTile(const TileId& id, const std::optional<StoredTile>& stored) {
+  const auto built = builder_.Build(id);
+  if (!built) {
+    return built.error().WithContext(StrCat("rebuilding tile ", id));
+  }
+  if (!built->content && !stored) {
+    return {};
+  }
+  if (!built->content || !stored) {
+    Mismatch(id, stored ? "is stored but its keyframes make none" : "is missing");
+    return {};
+  }
+  const auto expected = TilePayloadFromBlob(built->content->blob);
+  const auto actual = TilePayloadFromBlob(stored->blob);
+  if (!expected || !actual || *expected != *actual) {
+    Mismatch(id, "is not what its keyframes make");
+  }
+  return {};
+}
+
+Status AtlasVerifier::CheckParentExists(const TileId& id) {
+  if (id.level + 1 >= store_.identity().profile.levels) {
+    return {};
+  }
+  const auto parent = store_.ReadTile(id.Parent());
+  if (parent && !*parent) {
+    return CompareTile(id.Parent(), std::nullopt);
+  }
+  return {};  // a damaged parent is found when its own turn comes
+}
+
+// Level-0 tiles that keyframes touch but that are not stored: nothing may be seen in them.
+Status AtlasVerifier::VerifyMissingTiles() {
+  std::int64_t after = -1;
+  while (options_.rebuild) {
+    const auto page = store_.ListFootprintTiles(0, after, kPage);
+    if (!page) {
+      return page.error();
+    }
+    if (page->empty()) {
+      break;
+    }
+    for (const TileId& id : *page) {
+      ATLAS_RETURN_IF_ERROR(options_.check_stop());
+      const auto tile = store_.ReadTile(id);
+      if (tile && !*tile) {
+        ATLAS_RETURN_IF_ERROR(Note(CompareTile(id, std::nullopt)));
+      }
+    }
+    after = static_cast<std::int64_t>(page->back().Key());
+  }
+  return {};
+}
+
+}  // namespace atlas

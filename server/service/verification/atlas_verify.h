@@ -1,0 +1,62 @@
+// Reads everything back: every checksum, every blob, and if asked every tile against one rebuilt
+// from the keyframes. Changes nothing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/service/fusion/tile_builder.h"
+#include "server/store/atlas_store.h"
+
+namespace atlas {
+
+struct VerifyReport {
+  std::uint64_t checked = 0;  // keyframes and tiles
+  std::uint64_t damaged = 0;
+  std::uint64_t mismatched = 0;       // stored tile is not what its keyframes make
+  std::vector<std::string> findings;  // the first few
+  std::uint64_t revision = 0;
+};
+
+class AtlasVerifier {
+ public:
+  struct Options {
+    bool rebuild = false;
+    std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded
+    std::size_t tile_bytes = std::size_t{128} << 20;      // of the tile that is rebuilt
+    std::size_t max_findings = 20;
+    // Asked between tiles; a failed status ends the verification with it.
+    std::function<Status()> check_stop;
+  };
+
+  AtlasVerifier(AtlasStore& store, Options options);
+
+  Result<VerifyReport> Run();
+
+ private:
+  Status VerifySessions();
+  Status VerifyCompactions();
+  Status VerifyKeyframes();
+  Status VerifyTiles();
+  Status VerifyMissingTiles();
+  Status CheckKeyframe(std::int64_t id);
+  Status CheckTile(const TileId& id);
+  Status CompareTile(const TileId& id, const std::optional<StoredTile>& stored);
+  Status CheckParentExists(const TileId& id);
+  Status Note(Status problem);
+  void Mismatch(const TileId& id, const std::string& what);
+
+  AtlasStore& store_;
+  Options options_;
+  KeyframeCache keyframes_;
+  TileCache tiles_{0};  // what is verified is read
+  TileBuilder builder_;
+  std::uint64_t expected_keyframes_ = 0;  // what the sessions counted when it began
+  VerifyReport report_;
+};
+
+}  // namespace atlas

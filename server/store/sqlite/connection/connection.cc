@@ -1,0 +1,101 @@
+#include "server/store/sqlite/connection/connection.h"
+
+#include <sqlite3.h>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+int OpenFlags(ConnectionOptions::Mode mode) {
+  switch (mode) {
+    case ConnectionOptions::Mode::kCreate:
+      return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
+    case ConnectionOptions::Mode::kReadWrite:
+      return SQLite::OPEN_READWRITE;
+    case ConnectionOptions::Mode::kReadOnly:
+      break;
+  }
+  return SQLite::OPEN_READONLY;
+}
+
+}  // namespace
+
+Query::~Query() {
+  // An error of the last step was thrown by it already; reset only repeats it.
+  statement_->tryReset();
+}
+
+Query& Query::Bind(std::int64_t value) {
+  statement_->bind(++parameter_, value);
+  return *this;
+}
+
+Query& Query::Bind(std::string_view text) {
+  statement_->bind(++parameter_, std::string(text));
+  return *this;
+}
+
+Query& Query::Bind(ByteSpan bytes) {
+  statement_->bindNoCopy(++parameter_, bytes.data(), static_cast<int>(bytes.size()));
+  return *this;
+}
+
+Query& Query::BindNull() {
+  statement_->bind(++parameter_);
+  return *this;
+}
+
+std::int64_t Query::Int() {
+  return statement_->getColumn(column_++).getInt64();
+}
+
+std::string Query::Text() {
+  return statement_->getColumn(column_++).getString();
+}
+
+Bytes Query::Blob() {
+  const SQLite::Column column = statement_->getColumn(column_++);
+  const auto* data = static_cast<const std::uint8_t*>(column.getBlob());
+  return {data, data + column.getBytes()};
+}
+
+Connection::Connection(const ConnectionOptions& options)
+    : database_(options.file.string(), OpenFlags(options.mode), options.busy_timeout_ms) {
+  // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.
+  Execute(
+      StrCat("PRAGMA cache_size = -", options.cache_kib,
+             "; PRAGMA mmap_size = 0; PRAGMA synchronous = FULL; PRAGMA secure_delete = OFF;"
+             "PRAGMA temp_store = MEMORY; PRAGMA foreign_keys = OFF; PRAGMA trusted_schema = OFF;"
+             "PRAGMA journal_size_limit = 67108864;")
+          .c_str());
+}
+
+Query Connection::Prepare(const char* sql) {
+  auto& statement = statements_[sql];
+  if (!statement) {
+    statement = std::make_unique<SQLite::Statement>(database_, sql);
+  }
+  statement->clearBindings();
+  return Query(*statement);
+}
+
+std::int64_t Connection::Ask(const char* sql) {
+  return database_.execAndGet(sql).getInt64();
+}
+
+bool Connection::is_in_transaction() const {
+  return sqlite3_get_autocommit(database_.getHandle()) == 0;
+}
+
+Snapshot::~Snapshot() {
+  try {
+    if (connection_.is_in_transaction()) {
+      connection_.Execute("COMMIT");
+    }
+  } catch (const SQLite::Exception&) {
+    // A read transaction has nothing to lose; the connection is checked when it is used next.
+  }
+}
+
+}  // namespace atlas

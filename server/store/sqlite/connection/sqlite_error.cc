@@ -1,0 +1,54 @@
+#include "server/store/sqlite/connection/sqlite_error.h"
+
+#include <new>
+
+#include <SQLiteCpp/Exception.h>
+#include <sqlite3.h>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+StatusCode CodeOf(int primary) {
+  switch (primary) {
+    case SQLITE_FULL:
+      return StatusCode::kResourceExhausted;
+    case SQLITE_READONLY:
+    case SQLITE_PERM:
+    case SQLITE_AUTH:
+    case SQLITE_CANTOPEN:
+      return StatusCode::kPermissionDenied;
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+      return StatusCode::kInvalidData;
+    case SQLITE_IOERR:
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+    case SQLITE_INTERRUPT:
+    case SQLITE_NOMEM:
+      return StatusCode::kUnavailable;
+    default:
+      return StatusCode::kInternal;
+  }
+}
+
+}  // namespace
+
+Status StatusFromSqlite(const SQLite::Exception& error) {
+  const int primary = error.getErrorCode() & 0xFF;
+  return Status(CodeOf(primary),
+                StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")"));
+}
+
+Status StatusFromException(const std::exception& error) {
+  if (const auto* sqlite = dynamic_cast<const SQLite::Exception*>(&error)) {
+    return StatusFromSqlite(*sqlite);
+  }
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
+    return Status(StatusCode::kUnavailable, "store: out of memory");
+  }
+  return Status(StatusCode::kInternal, StrCat("store: ", error.what()));
+}
+
+}  // namespace atlas

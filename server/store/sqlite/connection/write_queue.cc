@@ -1,0 +1,134 @@
+#include "server/store/sqlite/connection/write_queue.h"
+
+#include <algorithm>
+#include <future>
+#include <limits>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
+
+namespace atlas {
+
+WriteQueue::WriteQueue(std::unique_ptr<Connection> connection, const Options& options)
+    : connection_(std::move(connection)), options_(options), thread_([this] { Loop(); }) {}
+
+WriteQueue::~WriteQueue() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+  }
+  has_work_.notify_all();
+  thread_.join();
+}
+
+void WriteQueue::Submit(Operation operation) {
+  if (!Enqueue(operation, options_.max_queued)) {
+    operation.finish(Status(StatusCode::kUnavailable,
+                            StrCat("store: ", options_.max_queued,
+                                   " writes are waiting or it is closing; try again later")));
+  }
+}
+
+void WriteQueue::Flush() {
+  std::promise<void> finished;
+  Operation barrier{[](Connection&) { return Status(); },
+                    [&finished](const Status&) {
+                      finished.set_value();
+                    }};
+  if (Enqueue(barrier, std::numeric_limits<std::size_t>::max())) {
+    finished.get_future().wait();
+  }
+}
+
+// False, and nothing taken, with a full queue or a stopped one.
+bool WriteQueue::Enqueue(Operation& operation, std::size_t max_queued) {
+  const std::lock_guard lock(mutex_);
+  if (is_stopping_ || queue_.size() >= max_queued) {
+    return false;
+  }
+  queue_.push_back(std::move(operation));
+  has_work_.notify_one();
+  return true;
+}
+
+void WriteQueue::Loop() {
+  for (std::vector<Operation> group = TakeGroup(); !group.empty(); group = TakeGroup()) {
+    RunGroup(group);
+    group.clear();  // what the callbacks hold must not live until the next write
+  }
+}
+
+// Empty when the queue is stopped and done.
+std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
+  std::unique_lock lock(mutex_);
+  has_work_.wait(lock, [this] { return is_stopping_ || !queue_.empty(); });
+  const std::size_t size = std::min(queue_.size(), options_.max_group);
+  const auto end = queue_.begin() + static_cast<std::ptrdiff_t>(size);
+  std::vector<Operation> group(std::make_move_iterator(queue_.begin()),
+                               std::make_move_iterator(end));
+  queue_.erase(queue_.begin(), end);
+  return group;
+}
+
+void WriteQueue::RunGroup(std::vector<Operation>& group) {
+  std::vector<Status> results(group.size());
+  Status transaction = RunInTransaction(group, results);
+  if (!transaction.ok()) {
+    std::fill(results.begin(), results.end(), transaction);
+  }
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    group[i].finish(results[i]);
+  }
+}
+
+// Not ok: nothing of the group was written.
+Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results) {
+  try {
+    if (connection_->is_in_transaction()) {
+      connection_->Execute("ROLLBACK");  // the one before could not
+    }
+    connection_->Execute("BEGIN IMMEDIATE");
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      results[i] = RunOne(group[i]);
+      if (!connection_->is_in_transaction()) {
+        return results[i];  // SQLite gave the whole transaction up
+      }
+    }
+    connection_->Execute("COMMIT");
+    return {};
+  } catch (const std::exception& error) {
+    return RollBack(StatusFromException(error));
+  }
+}
+
+Status WriteQueue::RollBack(Status failure) {
+  try {
+    if (connection_->is_in_transaction()) {
+      connection_->Execute("ROLLBACK");
+    }
+    return failure;
+  } catch (const std::exception& error) {
+    return {failure.code(), StrCat(failure.message(), "; rolling back failed too: ",
+                                   StatusFromException(error).message())};
+  }
+}
+
+Status WriteQueue::RunOne(Operation& operation) {
+  Status status;
+  try {
+    connection_->Execute("SAVEPOINT operation");
+    status = operation.run(*connection_);
+  } catch (const std::exception& error) {
+    status = StatusFromException(error);
+  }
+  if (!status.ok() && connection_->is_in_transaction()) {
+    connection_->Execute("ROLLBACK TO operation");
+  }
+  if (connection_->is_in_transaction()) {
+    connection_->Execute("RELEASE operation");
+  }
+  return status;
+}
+
+}  // namespace atlas

@@ -1,0 +1,36 @@
+// Numbers that every transaction keeps up to date, so that nobody has to count rows.
+#pragma once
+
+#include <cstdint>
+
+#include "server/store/sqlite/connection/connection.h"
+
+namespace atlas {
+
+// Frozen: row ids of table counters.
+enum class Counter : std::uint8_t {
+  kRevision = 1,
+  kBatch = 2,
+  kLastKeyframeId = 3,
+  kKeyframes = 4,
+  kKeyframeBytes = 5,
+  kTiles = 6,
+  kTileBytes = 7,
+  kCells = 8,
+  kMultilayerCells = 9,
+  kSessions = 10,
+  kHistoryHorizon = 11,  // the oldest revision that can still be read
+  kCompactions = 12,
+  kCompacted = 13,  // keyframes that they dropped
+};
+
+std::uint64_t ReadCounter(Connection& connection, Counter counter);
+// The value after adding `delta`.
+std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t delta);
+
+// The number of a change about to be committed.
+inline std::uint64_t NextRevision(Connection& connection) {
+  return AddToCounter(connection, Counter::kRevision, 1);
+}
+
+}  // namespace atlas

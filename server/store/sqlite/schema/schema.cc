@@ -1,0 +1,188 @@
+#include "server/store/sqlite/schema/schema.h"
+
+#include <algorithm>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/row_hash.h"
+
+namespace atlas {
+namespace {
+
+// Blobs stand last in their rows: the other columns are read without touching overflow pages. The
+// checksums of counters, keyframe_tiles and dirty_tiles are reserved and null.
+constexpr const char* kTables = R"sql(
+CREATE TABLE meta (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  profile BLOB NOT NULL, atlas_id BLOB NOT NULL, epoch INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE counters (
+  id INTEGER PRIMARY KEY, name TEXT NOT NULL, value INTEGER NOT NULL, checksum INTEGER);
+
+CREATE TABLE sessions (
+  id INTEGER PRIMARY KEY,
+  vehicle TEXT NOT NULL, session TEXT NOT NULL,
+  state INTEGER NOT NULL, state_reason TEXT,
+  keyframes INTEGER NOT NULL, bytes INTEGER NOT NULL,
+  first_time_ms INTEGER NOT NULL, last_time_ms INTEGER NOT NULL, last_sequence INTEGER NOT NULL,
+  compacted INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  UNIQUE (vehicle, session));
+
+CREATE TABLE keyframes (
+  id INTEGER PRIMARY KEY,
+  shard INTEGER NOT NULL,
+  session_id INTEGER NOT NULL, sequence INTEGER NOT NULL,
+  time_ms INTEGER NOT NULL, revision INTEGER NOT NULL,
+  cell_size_um INTEGER NOT NULL, radius_cells INTEGER NOT NULL,
+  level_qw INTEGER NOT NULL, level_qx INTEGER NOT NULL,
+  level_qy INTEGER NOT NULL, level_qz INTEGER NOT NULL,
+  prior_x_um INTEGER, prior_y_um INTEGER, prior_z_um INTEGER, prior_radius_mm INTEGER,
+  blob_bytes INTEGER NOT NULL, blob_hash INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  blob BLOB NOT NULL,
+  UNIQUE (session_id, sequence));
+
+CREATE TABLE poses (
+  keyframe_id INTEGER PRIMARY KEY,
+  revision INTEGER NOT NULL, batch INTEGER NOT NULL,
+  x_um INTEGER NOT NULL, y_um INTEGER NOT NULL, z_um INTEGER NOT NULL,
+  qw INTEGER NOT NULL, qx INTEGER NOT NULL, qy INTEGER NOT NULL, qz INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE pose_history (
+  id INTEGER PRIMARY KEY,
+  keyframe_id INTEGER NOT NULL,
+  revision INTEGER NOT NULL, batch INTEGER NOT NULL, author TEXT NOT NULL,
+  x_um INTEGER NOT NULL, y_um INTEGER NOT NULL, z_um INTEGER NOT NULL,
+  qw INTEGER NOT NULL, qx INTEGER NOT NULL, qy INTEGER NOT NULL, qz INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  UNIQUE (keyframe_id, revision));
+
+CREATE TABLE pose_batches (
+  id INTEGER PRIMARY KEY,
+  revision INTEGER NOT NULL, author TEXT NOT NULL, updated INTEGER NOT NULL,
+  if_revision INTEGER,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE tiles (
+  key INTEGER PRIMARY KEY,
+  shard INTEGER NOT NULL,
+  revision INTEGER NOT NULL, fused_revision INTEGER NOT NULL,
+  payload_hash INTEGER NOT NULL,
+  cells INTEGER NOT NULL, multilayer_cells INTEGER NOT NULL,
+  blob_bytes INTEGER NOT NULL, blob_hash INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  blob BLOB NOT NULL);
+CREATE INDEX tile_summaries ON tiles (key, revision, payload_hash, blob_bytes);
+
+CREATE TABLE keyframe_tiles (
+  tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,
+  revision INTEGER NOT NULL, is_current INTEGER NOT NULL,
+  checksum INTEGER,
+  PRIMARY KEY (tile_key, keyframe_id)) WITHOUT ROWID;
+CREATE INDEX tiles_of_keyframe ON keyframe_tiles (keyframe_id);
+CREATE INDEX changes_of_tile ON keyframe_tiles (tile_key, revision, keyframe_id, is_current);
+
+CREATE TABLE dirty_tiles (
+  key INTEGER PRIMARY KEY,
+  shard INTEGER NOT NULL, level INTEGER NOT NULL,
+  generation INTEGER NOT NULL, since INTEGER NOT NULL,
+  lease_owner TEXT, lease_until_ms INTEGER NOT NULL DEFAULT 0,
+  attempts INTEGER NOT NULL DEFAULT 0, retry_at_ms INTEGER NOT NULL DEFAULT 0,
+  checksum INTEGER);
+CREATE INDEX dirty_since ON dirty_tiles (since);
+
+CREATE TABLE session_states (
+  id INTEGER PRIMARY KEY,
+  session_id INTEGER NOT NULL,
+  revision INTEGER NOT NULL, state INTEGER NOT NULL,
+  author TEXT NOT NULL, reason TEXT NOT NULL,
+  checksum INTEGER NOT NULL,
+  UNIQUE (session_id, revision));
+
+CREATE TABLE compactions (
+  id INTEGER PRIMARY KEY,
+  revision INTEGER NOT NULL, before_ms INTEGER NOT NULL, author TEXT NOT NULL,
+  dropped INTEGER NOT NULL, bytes INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE tombstones (
+  session_id INTEGER NOT NULL, sequence INTEGER NOT NULL,
+  time_ms INTEGER NOT NULL,
+  blob_bytes INTEGER NOT NULL, blob_hash INTEGER NOT NULL,
+  compaction_id INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  PRIMARY KEY (session_id, sequence)) WITHOUT ROWID;
+CREATE INDEX tombstones_of_compaction ON tombstones (compaction_id);
+
+INSERT INTO counters (id, name, value) VALUES
+  (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),
+  (5, 'keyframe_bytes', 0), (6, 'tiles', 0), (7, 'tile_bytes', 0), (8, 'cells', 0),
+  (9, 'multilayer_cells', 0), (10, 'sessions', 0),
+  (11, 'history_horizon', 0), (12, 'compactions', 0), (13, 'compacted', 0);
+)sql";
+
+std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) {
+  return RowHash(RowKind::kMeta).Raw(profile).Raw(atlas_id).Unsigned(epoch).value();
+}
+
+Status CheckVersions(Connection& connection) {
+  const std::int64_t application = connection.Ask("PRAGMA application_id");
+  if (application != kStoreApplicationId) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("store: the database belongs to another program (application id ",
+                         application, ", expected ", kStoreApplicationId, ")"));
+  }
+  const std::int64_t version = connection.Ask("PRAGMA user_version");
+  if (version != kStoreSchemaVersion) {
+    return Status(StatusCode::kUnsupported, StrCat("store: schema version ", version,
+                                                   ", this build reads ", kStoreSchemaVersion));
+  }
+  return {};
+}
+
+}  // namespace
+
+void CreateSchema(Connection& connection, const AtlasIdentity& identity) {
+  connection.Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = DELETE; BEGIN IMMEDIATE;");
+  connection.Execute(kTables);
+  const Bytes profile = identity.profile.Encode();
+  connection.Prepare("INSERT INTO meta (id, profile, atlas_id, epoch, checksum) VALUES (1,?,?,?,?)")
+      .Bind(ByteSpan(profile))
+      .Bind(ByteSpan(identity.atlas_id))
+      .Bind(identity.epoch)
+      .Bind(MetaHash(profile, identity.atlas_id, identity.epoch))
+      .Run();
+  connection.Execute(StrCat("PRAGMA application_id = ", kStoreApplicationId,
+                            "; PRAGMA user_version = ", kStoreSchemaVersion, "; COMMIT;")
+                         .c_str());
+}
+
+Result<AtlasIdentity> ReadIdentity(Connection& connection) {
+  if (Status status = CheckVersions(connection); !status.ok()) {
+    return Error(std::move(status));
+  }
+  Query row =
+      connection.Prepare("SELECT profile, atlas_id, epoch, checksum FROM meta WHERE id = 1");
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData, "store: the meta row is missing");
+  }
+  const Bytes profile_bytes = row.Blob();
+  const Bytes atlas_id = row.Blob();
+  AtlasIdentity identity;
+  identity.epoch = row.Unsigned();
+  if (atlas_id.size() != identity.atlas_id.size() ||
+      row.Int() != MetaHash(profile_bytes, atlas_id, identity.epoch)) {
+    return Error(StatusCode::kInvalidData, "store: the meta row is damaged");
+  }
+  std::copy(atlas_id.begin(), atlas_id.end(), identity.atlas_id.begin());
+  auto profile = MapProfile::Decode(profile_bytes);
+  if (!profile) {
+    return Error(profile.error().WithContext("store"));
+  }
+  identity.profile = *profile;
+  return identity;
+}
+
+}  // namespace atlas

@@ -1,0 +1,20 @@
+// The tables (docs/formats/store.md), and the checks before a file is believed to be an atlas.
+#pragma once
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+inline constexpr std::int64_t kStoreApplicationId = 0x52414131;  // "RAA1"
+inline constexpr std::int64_t kStoreSchemaVersion = 3;
+
+// Makes the tables of an empty database and writes who it is, in one transaction.
+void CreateSchema(Connection& connection, const AtlasIdentity& identity);
+
+// kInvalidData on a database of another program or a damaged identity, kUnsupported on another
+// schema version.
+Result<AtlasIdentity> ReadIdentity(Connection& connection);
+
+}  // namespace atlas

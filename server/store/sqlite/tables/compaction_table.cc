@@ -1,0 +1,163 @@
+#include "server/store/sqlite/tables/compaction_table.h"
+
+#include <string_view>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/row_hash.h"
+
+namespace atlas {
+namespace {
+
+std::int64_t HashOf(const CompactionRow& row) {
+  return RowHash(RowKind::kCompaction)
+      .Int(row.id)
+      .Unsigned(row.revision)
+      .Int(row.before_ms)
+      .Text(row.author)
+      .Unsigned(row.dropped)
+      .Unsigned(row.bytes)
+      .value();
+}
+
+std::int64_t HashOf(const TombstoneRow& row) {
+  return RowHash(RowKind::kTombstone)
+      .Int(row.session_id)
+      .Int(row.sequence)
+      .Int(row.time_ms)
+      .Int(row.blob_bytes)
+      .Unsigned(row.blob_hash)
+      .Int(row.compaction_id)
+      .value();
+}
+
+// Columns: id, revision, before_ms, author, dropped, bytes, checksum.
+Result<CompactionRow> ReadCompaction(Query& row) {
+  row.Rewind();
+  CompactionRow result;
+  result.id = row.Int();
+  result.revision = row.Unsigned();
+  result.before_ms = row.Int();
+  result.author = row.Text();
+  result.dropped = row.Unsigned();
+  result.bytes = row.Unsigned();
+  if (row.Int() != HashOf(result)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of compaction ", result.id, " is damaged: wrong checksum"));
+  }
+  return result;
+}
+
+// Columns: session_id, sequence, time_ms, blob_bytes, blob_hash, compaction_id, checksum.
+Result<TombstoneRow> ReadTombstone(Query& row) {
+  row.Rewind();
+  TombstoneRow result;
+  result.session_id = row.Int();
+  result.sequence = row.Unsigned32();
+  result.time_ms = row.Int();
+  result.blob_bytes = row.Unsigned32();
+  result.blob_hash = row.Unsigned();
+  result.compaction_id = row.Int();
+  if (row.Int() != HashOf(result)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the tombstone of keyframe ", result.sequence, " of session ",
+                        result.session_id, " is damaged: wrong checksum"));
+  }
+  return result;
+}
+
+std::uint64_t CountTombstones(Connection& connection, std::int64_t compaction_id) {
+  Query row = connection.Prepare("SELECT count(*) FROM tombstones WHERE compaction_id = ?");
+  row.Bind(compaction_id);
+  return row.Step() ? row.Unsigned() : 0;
+}
+
+}  // namespace
+
+void WriteCompaction(Connection& connection, const CompactionRow& row) {
+  connection
+      .Prepare(
+          "INSERT INTO compactions (id, revision, before_ms, author, dropped, bytes, checksum) "
+          "VALUES (?,?,?,?,?,?,?)")
+      .Bind(row.id)
+      .Bind(row.revision)
+      .Bind(row.before_ms)
+      .Bind(std::string_view(row.author))
+      .Bind(row.dropped)
+      .Bind(row.bytes)
+      .Bind(HashOf(row))
+      .Run();
+}
+
+void WriteTombstone(Connection& connection, const TombstoneRow& row) {
+  connection
+      .Prepare(
+          "INSERT INTO tombstones (session_id, sequence, time_ms, blob_bytes, blob_hash, "
+          "compaction_id, checksum) VALUES (?,?,?,?,?,?,?)")
+      .Bind(row.session_id)
+      .Bind(row.sequence)
+      .Bind(row.time_ms)
+      .Bind(row.blob_bytes)
+      .Bind(row.blob_hash)
+      .Bind(row.compaction_id)
+      .Bind(HashOf(row))
+      .Run();
+}
+
+Result<std::optional<TombstoneRow>> FindTombstone(Connection& connection,
+                                                  std::int64_t session_id,
+                                                  std::uint32_t sequence) {
+  Query row = connection.Prepare(
+      "SELECT session_id, sequence, time_ms, blob_bytes, blob_hash, compaction_id, checksum "
+      "FROM tombstones WHERE session_id = ? AND sequence = ?");
+  row.Bind(session_id).Bind(sequence);
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  auto tombstone = ReadTombstone(row);
+  if (!tombstone) {
+    return Error(tombstone.error());
+  }
+  return *tombstone;
+}
+
+Status CheckTombstones(Connection& connection, std::int64_t session_id, std::uint64_t expected) {
+  Query row = connection.Prepare(
+      "SELECT session_id, sequence, time_ms, blob_bytes, blob_hash, compaction_id, checksum "
+      "FROM tombstones WHERE session_id = ? ORDER BY sequence");
+  row.Bind(session_id);
+  std::uint64_t found = 0;
+  while (row.Step()) {
+    const auto tombstone = ReadTombstone(row);
+    if (!tombstone) {
+      return tombstone.error();
+    }
+    ++found;
+  }
+  return found == expected
+             ? Status()
+             : Status(StatusCode::kInvalidData,
+                      StrCat("store: session ", session_id, " counts ", expected,
+                             " dropped keyframes, and ", found, " tombstones are there"));
+}
+
+Status CheckCompactionRows(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, before_ms, author, dropped, bytes, checksum FROM compactions "
+      "ORDER BY id");
+  while (row.Step()) {
+    const auto compaction = ReadCompaction(row);
+    if (!compaction) {
+      return compaction.error();
+    }
+    const std::uint64_t tombstones = CountTombstones(connection, compaction->id);
+    if (tombstones != compaction->dropped) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("store: compaction ", compaction->id, " dropped ", compaction->dropped,
+                           " keyframes, and ", tombstones, " tombstones are there"));
+    }
+  }
+  return {};
+}
+
+}  // namespace atlas

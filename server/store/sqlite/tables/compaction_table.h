@@ -1,0 +1,46 @@
+// Tables compactions and tombstones: what was dropped for good, and enough of each dropped keyframe
+// to answer whoever sends it again.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/base/status.h"
+#include "core/geometry/keyframe_key.h"
+#include "server/store/sqlite/connection/connection.h"
+
+namespace atlas {
+
+struct CompactionRow {
+  std::int64_t id = 0;
+  std::uint64_t revision = 0;
+  std::int64_t before_ms = 0;
+  std::string author;
+  std::uint64_t dropped = 0;  // keyframes
+  std::uint64_t bytes = 0;    // of their blobs
+};
+void WriteCompaction(Connection& connection, const CompactionRow& row);
+
+// A keyframe that was dropped.
+struct TombstoneRow {
+  std::int64_t session_id = 0;
+  std::uint32_t sequence = 0;
+  std::int64_t time_ms = 0;
+  std::uint32_t blob_bytes = 0;
+  std::uint64_t blob_hash = 0;
+  std::int64_t compaction_id = 0;
+};
+void WriteTombstone(Connection& connection, const TombstoneRow& row);
+
+// nullopt: there is none. kInvalidData: its row is damaged.
+Result<std::optional<TombstoneRow>> FindTombstone(Connection& connection,
+                                                  std::int64_t session_id,
+                                                  std::uint32_t sequence);
+
+// kInvalidData when a tombstone of the session is damaged, or there are not as many as `expected`.
+Status CheckTombstones(Connection& connection, std::int64_t session_id, std::uint64_t expected);
+// kInvalidData when a compaction's row is damaged, or there are not as many tombstones as it says.
+Status CheckCompactionRows(Connection& connection);
+
+}  // namespace atlas

@@ -1,0 +1,29 @@
+// Table dirty_tiles: what has to be built, who is building it, and since when it is owed.
+#pragma once
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+// `generation`: the revision of the change that marks; `since`: the first revision that the tile
+// will not reflect until it is built.
+void MarkTile(Connection& connection,
+              const TileId& id,
+              std::uint64_t generation,
+              std::uint64_t since);
+
+ClaimResult ClaimTiles(Connection& connection, const ClaimRequest& request);
+// kConflict when the claim is no longer held.
+Status CheckClaim(Connection& connection, const TileClaim& claim);
+// Clears the mark if nothing marked the tile since it was claimed; else gives the lease back.
+void SettleClaim(Connection& connection, const TileClaim& claim);
+// Gives the lease back. A tile that was marked again since it was claimed is free at once.
+void PostponeClaim(Connection& connection, const TileClaim& claim, std::int64_t retry_at_ms);
+// Leases of a process that is gone.
+void DropAllLeases(Connection& connection);
+
+DirtyState ReadDirty(Connection& connection);
+
+}  // namespace atlas

@@ -1,0 +1,216 @@
+#include "server/store/sqlite/tables/keyframe_table.h"
+
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/pose_table.h"
+#include "server/store/sqlite/tables/session_state_table.h"
+#include "server/store/sqlite/tables/session_table.h"
+#include "server/store/tile_ranges.h"
+
+namespace atlas {
+namespace {
+
+std::int64_t HashOf(const KeyframeRow& row) {
+  RowHash hash(RowKind::kKeyframe);
+  hash.Int(row.record.id).Int(row.session_id).Int(row.record.key.sequence).Int(row.record.time_ms);
+  hash.Int(row.record.grid.cell_size_um).Int(row.record.grid.radius_cells);
+  for (const std::int32_t part : row.record.level_quaternion) {
+    hash.Int(part);
+  }
+  return hash.Int(row.blob_bytes).Unsigned(row.blob_hash).value();
+}
+
+// Columns: id, session_id, sequence, time_ms, cell_size_um, radius_cells, level quaternion,
+// blob_bytes, blob_hash, checksum.
+Result<KeyframeRow> ReadRow(Query& row) {
+  KeyframeRow result;
+  KeyframeRecord& r = result.record;
+  r.id = row.Int();
+  result.session_id = row.Int();
+  r.key.sequence = row.Unsigned32();
+  r.time_ms = row.Int();
+  r.grid.cell_size_um = row.Unsigned32();
+  r.grid.radius_cells = row.Int32();
+  for (std::int32_t& part : r.level_quaternion) {
+    part = row.Int32();
+  }
+  result.blob_bytes = row.Unsigned32();
+  result.blob_hash = row.Unsigned();
+  if (row.Int() != HashOf(result)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of keyframe ", r.id, " is damaged: wrong checksum"));
+  }
+  return result;
+}
+
+void BindPrior(Query& query, const std::optional<PositionPrior>& prior) {
+  if (prior) {
+    query.Bind(prior->x_um).Bind(prior->y_um).Bind(prior->z_um).Bind(prior->radius_mm);
+  } else {
+    query.BindNull().BindNull().BindNull().BindNull();
+  }
+}
+
+}  // namespace
+
+Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
+                                                   std::int64_t session_id,
+                                                   std::uint32_t sequence) {
+  Query row = connection.Prepare(
+      "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
+      "level_qy, level_qz, blob_bytes, blob_hash, checksum FROM keyframes "
+      "WHERE session_id = ? AND sequence = ?");
+  row.Bind(session_id).Bind(sequence);
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  auto result = ReadRow(row);
+  if (!result) {
+    return Error(result.error());
+  }
+  return std::move(*result);
+}
+
+Result<KeyframeRow> ReadKeyframeRow(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
+      "level_qy, level_qz, blob_bytes, blob_hash, checksum FROM keyframes WHERE id = ?");
+  row.Bind(id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of keyframe ", id, " is missing"));
+  }
+  return ReadRow(row);
+}
+
+Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t id) {
+  auto row = ReadKeyframeRow(connection, id);
+  if (!row) {
+    return Error(row.error());
+  }
+  const auto session = ReadSession(connection, row->session_id);
+  if (!session) {
+    return Error(session.error());
+  }
+  const auto pose = ReadPose(connection, id);
+  if (!pose) {
+    return Error(pose.error());
+  }
+  row->record.key.session = session->record.key;
+  row->record.pose = *pose;
+  row->record.session_state = session->record.state;
+  return std::move(row->record);
+}
+
+Result<KeyframeRecord> VerifyKeyframeRecord(Connection& connection, std::int64_t id) {
+  auto record = ReadKeyframeRecord(connection, id);
+  if (record) {
+    if (Status status = CheckPoseHistory(connection, id, record->pose); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return record;
+}
+
+Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connection,
+                                                           std::int64_t id,
+                                                           std::uint64_t revision) {
+  const auto pose = ReadPoseAt(connection, id, revision);
+  if (!pose) {
+    return Error(pose.error());
+  }
+  if (!*pose) {
+    return std::nullopt;
+  }
+  auto row = ReadKeyframeRow(connection, id);
+  if (!row) {
+    return Error(row.error());
+  }
+  const auto session = ReadSession(connection, row->session_id);
+  if (!session) {
+    return Error(session.error());
+  }
+  const auto state = ReadSessionStateAt(connection, row->session_id, revision);
+  if (!state) {
+    return Error(state.error());
+  }
+  row->record.key.session = session->record.key;
+  row->record.pose = **pose;
+  row->record.session_state = *state;
+  return std::move(row->record);
+}
+
+Result<std::optional<KeyframeRecord>> FindKeyframeRecord(Connection& connection,
+                                                         const KeyframeKey& key) {
+  const auto session = FindSession(connection, key.session);
+  if (!session) {
+    return Error(session.error());
+  }
+  const Status unknown(StatusCode::kNotFound, StrCat("keyframe ", key, " is not in the atlas"));
+  if (!*session) {
+    return Error(unknown);
+  }
+  const auto row = FindKeyframeRow(connection, (*session)->id, key.sequence);
+  if (!row) {
+    return Error(row.error());
+  }
+  if (*row) {
+    return ReadKeyframeRecord(connection, (*row)->record.id);
+  }
+  const auto tombstone = FindTombstone(connection, (*session)->id, key.sequence);
+  if (!tombstone) {
+    return Error(tombstone.error());
+  }
+  return *tombstone ? Result<std::optional<KeyframeRecord>>(std::nullopt) : Error(unknown);
+}
+
+Result<Bytes> ReadBlob(Connection& connection, std::int64_t id) {
+  const auto row = ReadKeyframeRow(connection, id);
+  if (!row) {
+    return Error(row.error());
+  }
+  Query query = connection.Prepare("SELECT blob FROM keyframes WHERE id = ?");
+  query.Bind(id);
+  Bytes blob = query.Step() ? query.Blob() : Bytes();
+  if (blob.size() != row->blob_bytes || Hash64(blob) != row->blob_hash) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the blob of keyframe ", id, " is damaged: wrong checksum"));
+  }
+  return blob;
+}
+
+void InsertKeyframe(Connection& connection,
+                    const NewKeyframe& keyframe,
+                    std::int64_t id,
+                    std::int64_t session_id,
+                    std::uint64_t revision) {
+  KeyframeRow row;
+  row.record = {id, keyframe.key, keyframe.time_ms, keyframe.grid, keyframe.level_quaternion, {},
+                {}};
+  row.session_id = session_id;
+  row.blob_hash = Hash64(keyframe.blob);
+  row.blob_bytes = static_cast<std::uint32_t>(keyframe.blob.size());
+  Query query = connection.Prepare(
+      "INSERT INTO keyframes (id, shard, session_id, sequence, time_ms, revision, cell_size_um, "
+      "radius_cells, level_qw, level_qx, level_qy, level_qz, prior_x_um, prior_y_um, prior_z_um, "
+      "prior_radius_mm, blob_bytes, blob_hash, checksum, blob) "
+      "VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+  query.Bind(id).Bind(keyframe.footprint.empty() ? 0 : ShardOf(keyframe.footprint.front()));
+  query.Bind(session_id).Bind(keyframe.key.sequence).Bind(keyframe.time_ms).Bind(revision);
+  query.Bind(keyframe.grid.cell_size_um).Bind(keyframe.grid.radius_cells);
+  for (const std::int32_t part : keyframe.level_quaternion) {
+    query.Bind(part);
+  }
+  BindPrior(query, keyframe.prior);
+  query.Bind(row.blob_bytes).Bind(row.blob_hash).Bind(HashOf(row)).Bind(ByteSpan(keyframe.blob));
+  query.Run();
+}
+
+void DeleteKeyframe(Connection& connection, std::int64_t id) {
+  connection.Prepare("DELETE FROM keyframes WHERE id = ?").Bind(id).Run();
+}
+
+}  // namespace atlas

@@ -1,0 +1,47 @@
+// Table keyframes: what was uploaded, unchanged.
+#pragma once
+
+#include <optional>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+// A row without its blob, checksum verified; the pose is not part of it.
+struct KeyframeRow {
+  KeyframeRecord record;  // the session key and the pose are left empty
+  std::int64_t session_id = 0;
+  std::uint64_t blob_hash = 0;
+  std::uint32_t blob_bytes = 0;
+};
+
+Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
+                                                   std::int64_t session_id,
+                                                   std::uint32_t sequence);
+// kInvalidData when there is none, or it is damaged.
+Result<KeyframeRow> ReadKeyframeRow(Connection& connection, std::int64_t id);
+// Row, session and pose. kNotFound, or kInvalidData when any of them is damaged.
+Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t id);
+// The same, and kInvalidData when a line of its poses' history is damaged.
+Result<KeyframeRecord> VerifyKeyframeRecord(Connection& connection, std::int64_t id);
+// With the pose and the session's state of that revision; nullopt: it was not there yet.
+Result<std::optional<KeyframeRecord>> ReadKeyframeRecordAt(Connection& connection,
+                                                           std::int64_t id,
+                                                           std::uint64_t revision);
+// nullopt: it was there and a compaction dropped it. kNotFound: it never was.
+Result<std::optional<KeyframeRecord>> FindKeyframeRecord(Connection& connection,
+                                                         const KeyframeKey& key);
+// The blob, its hash verified.
+Result<Bytes> ReadBlob(Connection& connection, std::int64_t id);
+
+void InsertKeyframe(Connection& connection,
+                    const NewKeyframe& keyframe,
+                    std::int64_t id,
+                    std::int64_t session_id,
+                    std::uint64_t revision);
+// The row and its blob.
+void DeleteKeyframe(Connection& connection, std::int64_t id);
+
+}  // namespace atlas

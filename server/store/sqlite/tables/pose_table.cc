@@ -1,0 +1,169 @@
+#include "server/store/sqlite/tables/pose_table.h"
+
+#include <array>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/row_hash.h"
+
+namespace atlas {
+namespace {
+
+RowHash& AddPose(RowHash& hash, const QuantizedPose& pose) {
+  hash.Int(pose.x_um).Int(pose.y_um).Int(pose.z_um);
+  for (const std::int32_t part : pose.quaternion) {
+    hash.Int(part);
+  }
+  return hash;
+}
+
+Query& BindPose(Query& query, const QuantizedPose& pose) {
+  query.Bind(pose.x_um).Bind(pose.y_um).Bind(pose.z_um);
+  for (const std::int32_t part : pose.quaternion) {
+    query.Bind(part);
+  }
+  return query;
+}
+
+void ReadPoseColumns(Query& row, QuantizedPose& pose) {
+  pose.x_um = row.Int();
+  pose.y_um = row.Int();
+  pose.z_um = row.Int();
+  for (std::int32_t& part : pose.quaternion) {
+    part = row.Int32();
+  }
+}
+
+std::int64_t CurrentHash(const PoseChange& change) {
+  RowHash hash(RowKind::kPose);
+  hash.Int(change.keyframe_id).Unsigned(change.revision).Unsigned(change.batch);
+  return AddPose(hash, change.pose).value();
+}
+
+std::int64_t HistoryHash(const PoseChange& change) {
+  RowHash hash(RowKind::kPoseHistory);
+  hash.Int(change.keyframe_id).Unsigned(change.revision).Unsigned(change.batch);
+  return AddPose(hash.Text(change.author), change.pose).value();
+}
+
+// Columns: keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum.
+Result<PoseChange> ReadHistoryRow(Query& row) {
+  row.Rewind();
+  PoseChange stored;
+  stored.keyframe_id = row.Int();
+  stored.revision = row.Unsigned();
+  stored.batch = row.Unsigned();
+  stored.author = row.Text();
+  ReadPoseColumns(row, stored.pose);
+  if (row.Int() != HistoryHash(stored)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the pose of keyframe ", stored.keyframe_id, " at revision ",
+                        stored.revision, " is damaged: wrong checksum"));
+  }
+  return stored;
+}
+
+}  // namespace
+
+Result<QuantizedPose> ReadPose(Connection& connection, std::int64_t keyframe_id) {
+  Query row = connection.Prepare(
+      "SELECT revision, batch, x_um, y_um, z_um, qw, qx, qy, qz, checksum FROM poses "
+      "WHERE keyframe_id = ?");
+  row.Bind(keyframe_id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the pose of keyframe ", keyframe_id, " is missing"));
+  }
+  PoseChange stored;
+  stored.keyframe_id = keyframe_id;
+  stored.revision = row.Unsigned();
+  stored.batch = row.Unsigned();
+  ReadPoseColumns(row, stored.pose);
+  if (row.Int() != CurrentHash(stored)) {
+    return Error(StatusCode::kInvalidData, StrCat("store: the pose of keyframe ", keyframe_id,
+                                                  " is damaged: wrong checksum"));
+  }
+  return stored.pose;
+}
+
+Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
+                                                std::int64_t keyframe_id,
+                                                std::uint64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "
+      "FROM pose_history WHERE keyframe_id = ? AND revision <= ? ORDER BY revision DESC LIMIT 1");
+  row.Bind(keyframe_id).Bind(revision);
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  const auto stored = ReadHistoryRow(row);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  return stored->pose;
+}
+
+std::vector<Result<PoseChange>> ReadPoseHistory(Connection& connection, std::int64_t keyframe_id) {
+  Query row = connection.Prepare(
+      "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "
+      "FROM pose_history WHERE keyframe_id = ? ORDER BY revision");
+  row.Bind(keyframe_id);
+  std::vector<Result<PoseChange>> history;
+  while (row.Step()) {
+    history.push_back(ReadHistoryRow(row));
+  }
+  return history;
+}
+
+Status CheckPoseHistory(Connection& connection,
+                        std::int64_t keyframe_id,
+                        const QuantizedPose& current) {
+  const auto history = ReadPoseHistory(connection, keyframe_id);
+  for (const auto& line : history) {
+    if (!line) {
+      return line.error();
+    }
+  }
+  if (history.empty() || history.back()->pose != current) {
+    return Status(StatusCode::kInvalidData, StrCat("store: the history of keyframe ", keyframe_id,
+                                                   " does not end with its pose"));
+  }
+  return {};
+}
+
+void WritePose(Connection& connection, const PoseChange& change) {
+  Query current = connection.Prepare(
+      "INSERT OR REPLACE INTO poses (keyframe_id, revision, batch, x_um, y_um, z_um, "
+      "qw, qx, qy, qz, checksum) VALUES (?,?,?,?,?,?,?,?,?,?,?)");
+  current.Bind(change.keyframe_id).Bind(change.revision).Bind(change.batch);
+  BindPose(current, change.pose).Bind(CurrentHash(change)).Run();
+  Query history = connection.Prepare(
+      "INSERT INTO pose_history (keyframe_id, revision, batch, author, x_um, y_um, z_um, "
+      "qw, qx, qy, qz, checksum) VALUES (?,?,?,?,?,?,?,?,?,?,?,?)");
+  history.Bind(change.keyframe_id).Bind(change.revision).Bind(change.batch);
+  history.Bind(std::string_view(change.author));
+  BindPose(history, change.pose).Bind(HistoryHash(change)).Run();
+}
+
+void DeletePoses(Connection& connection, std::int64_t keyframe_id) {
+  connection.Prepare("DELETE FROM poses WHERE keyframe_id = ?").Bind(keyframe_id).Run();
+  connection.Prepare("DELETE FROM pose_history WHERE keyframe_id = ?").Bind(keyframe_id).Run();
+}
+
+void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result) {
+  RowHash hash(RowKind::kPoseBatch);
+  hash.Unsigned(result.batch).Unsigned(result.revision).Text(batch.author);
+  hash.Unsigned(result.updated).Unsigned(batch.if_revision);
+  connection
+      .Prepare(
+          "INSERT INTO pose_batches (id, revision, author, updated, if_revision, checksum) "
+          "VALUES (?,?,?,?,?,?)")
+      .Bind(result.batch)
+      .Bind(result.revision)
+      .Bind(std::string_view(batch.author))
+      .Bind(result.updated)
+      .Bind(batch.if_revision)
+      .Bind(hash.value())
+      .Run();
+}
+
+}  // namespace atlas

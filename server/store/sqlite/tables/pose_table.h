@@ -1,0 +1,44 @@
+// Tables poses, pose_history and pose_batches: where each keyframe stands now, and ever stood.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+// kInvalidData when the row is missing or damaged.
+Result<QuantizedPose> ReadPose(Connection& connection, std::int64_t keyframe_id);
+// The pose that the keyframe had at a revision; nullopt: it was not there yet. kInvalidData when
+// the line that tells is damaged.
+Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
+                                                std::int64_t keyframe_id,
+                                                std::uint64_t revision);
+
+struct PoseChange {
+  std::int64_t keyframe_id = 0;
+  QuantizedPose pose;
+  std::uint64_t revision = 0;
+  std::uint64_t batch = 0;  // 0: the pose it was uploaded with
+  std::string author;
+};
+// Every line of a keyframe's history, oldest first; an error for each that is damaged.
+std::vector<Result<PoseChange>> ReadPoseHistory(Connection& connection, std::int64_t keyframe_id);
+// kInvalidData when a line of the history is damaged, or the last is not the current pose.
+Status CheckPoseHistory(Connection& connection,
+                        std::int64_t keyframe_id,
+                        const QuantizedPose& current);
+
+// The current pose and its line in the history.
+void WritePose(Connection& connection, const PoseChange& change);
+
+// The current pose and the whole history.
+void DeletePoses(Connection& connection, std::int64_t keyframe_id);
+
+void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
+
+}  // namespace atlas

@@ -1,0 +1,105 @@
+#include "server/store/sqlite/tables/session_state_table.h"
+
+#include <optional>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/row_hash.h"
+
+namespace atlas {
+namespace {
+
+std::int64_t HashOf(const SessionStateRow& row) {
+  return RowHash(RowKind::kSessionState)
+      .Int(row.session_id)
+      .Unsigned(row.revision)
+      .Int(static_cast<std::int64_t>(row.state))
+      .Text(row.author)
+      .Text(row.reason)
+      .value();
+}
+
+// Columns: session_id, revision, state, author, reason, checksum.
+Result<SessionStateRow> ReadRow(Query& row) {
+  row.Rewind();
+  SessionStateRow result;
+  result.session_id = row.Int();
+  result.revision = row.Unsigned();
+  result.state = static_cast<SessionState>(row.Int());
+  result.author = row.Text();
+  result.reason = row.Text();
+  if (row.Int() != HashOf(result)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the state of session ", result.session_id, " at revision ",
+                        result.revision, " is damaged: wrong checksum"));
+  }
+  return result;
+}
+
+Status Missing(std::int64_t session_id) {
+  return Status(StatusCode::kInvalidData,
+                StrCat("store: the history of session ", session_id, " is not whole"));
+}
+
+// The state of the only row of a query.
+Result<SessionState> ReadState(Query& row, std::int64_t session_id) {
+  if (!row.Step()) {
+    return Error(Missing(session_id));
+  }
+  const auto stored = ReadRow(row);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  return stored->state;
+}
+
+}  // namespace
+
+void WriteSessionState(Connection& connection, const SessionStateRow& row) {
+  connection
+      .Prepare(
+          "INSERT INTO session_states (session_id, revision, state, author, reason, checksum) "
+          "VALUES (?,?,?,?,?,?)")
+      .Bind(row.session_id)
+      .Bind(row.revision)
+      .Bind(static_cast<std::int64_t>(row.state))
+      .Bind(std::string_view(row.author))
+      .Bind(std::string_view(row.reason))
+      .Bind(HashOf(row))
+      .Run();
+}
+
+Result<SessionState> ReadSessionStateAt(Connection& connection,
+                                        std::int64_t session_id,
+                                        std::uint64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
+      "WHERE session_id = ? AND revision <= ? ORDER BY revision DESC LIMIT 1");
+  row.Bind(session_id).Bind(revision);
+  return ReadState(row, session_id);
+}
+
+Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
+      "WHERE session_id = ? AND state <> ? ORDER BY revision DESC LIMIT 1");
+  row.Bind(session_id).Bind(static_cast<std::int64_t>(SessionState::kRetracted));
+  return ReadState(row, session_id);
+}
+
+Status CheckSessionStates(Connection& connection, std::int64_t session_id, SessionState current) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
+      "WHERE session_id = ? ORDER BY revision");
+  row.Bind(session_id);
+  std::optional<SessionState> last;
+  while (row.Step()) {
+    const auto stored = ReadRow(row);
+    if (!stored) {
+      return stored.error();
+    }
+    last = stored->state;
+  }
+  return last == current ? Status() : Missing(session_id);
+}
+
+}  // namespace atlas

@@ -1,0 +1,32 @@
+// Table session_states: every state that each session was ever in, from its first keyframe on.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/status.h"
+#include "server/store/session_types.h"
+#include "server/store/sqlite/connection/connection.h"
+
+namespace atlas {
+
+struct SessionStateRow {
+  std::int64_t session_id = 0;
+  std::uint64_t revision = 0;
+  SessionState state = SessionState::kLive;
+  std::string author;
+  std::string reason;
+};
+
+void WriteSessionState(Connection& connection, const SessionStateRow& row);
+
+// kInvalidData when the line that tells is damaged or missing.
+Result<SessionState> ReadSessionStateAt(Connection& connection,
+                                        std::int64_t session_id,
+                                        std::uint64_t revision);
+// What a retracted session was before.
+Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id);
+// kInvalidData when a line is damaged or the last is not the current state.
+Status CheckSessionStates(Connection& connection, std::int64_t session_id, SessionState current);
+
+}  // namespace atlas

@@ -1,0 +1,157 @@
+#include "server/store/sqlite/tables/session_table.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/session_state_table.h"
+
+namespace atlas {
+namespace {
+
+std::int64_t HashOf(const SessionRow& row) {
+  const SessionRecord& r = row.record;
+  return RowHash(RowKind::kSession)
+      .Int(row.id)
+      .Text(r.key.vehicle)
+      .Text(r.key.session)
+      .Int(static_cast<std::int64_t>(r.state))
+      .Unsigned(r.keyframes)
+      .Unsigned(r.bytes)
+      .Int(r.first_time_ms)
+      .Int(r.last_time_ms)
+      .Int(r.last_sequence)
+      .Unsigned(r.compacted)
+      .value();
+}
+
+// Columns: id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms,
+// last_sequence, compacted, checksum.
+Result<SessionRow> ReadRow(Query& row) {
+  row.Rewind();
+  SessionRow result;
+  result.id = row.Int();
+  SessionRecord& r = result.record;
+  r.key.vehicle = row.Text();
+  r.key.session = row.Text();
+  r.state = static_cast<SessionState>(row.Int());
+  r.keyframes = row.Unsigned();
+  r.bytes = row.Unsigned();
+  r.first_time_ms = row.Int();
+  r.last_time_ms = row.Int();
+  r.last_sequence = row.Unsigned32();
+  r.compacted = row.Unsigned();
+  if (row.Int() != HashOf(result)) {
+    return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", result.id, " (",
+                                                  r.key, ") is damaged: wrong checksum"));
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key) {
+  Query row = connection.Prepare(
+      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? AND session = ?");
+  row.Bind(std::string_view(key.vehicle)).Bind(std::string_view(key.session));
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  auto session = ReadRow(row);
+  if (!session) {
+    return Error(session.error());
+  }
+  return std::move(*session);
+}
+
+Result<SessionRow> ReadSession(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+      "last_sequence, compacted, checksum FROM sessions WHERE id = ?");
+  row.Bind(id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", id, " is missing"));
+  }
+  return ReadRow(row);
+}
+
+Result<std::vector<SessionRecord>> ReadSessions(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+      "last_sequence, compacted, checksum FROM sessions ORDER BY vehicle, session");
+  std::vector<SessionRecord> sessions;
+  while (row.Step()) {
+    auto session = ReadRow(row);
+    if (!session) {
+      return Error(session.error());
+    }
+    sessions.push_back(std::move(session->record));
+  }
+  return sessions;
+}
+
+Status CheckSessionHistory(Connection& connection, const SessionKey& key) {
+  const auto session = FindSession(connection, key);
+  if (!session) {
+    return session.error();
+  }
+  if (!*session) {
+    return {};
+  }
+  const auto& [id, record] = **session;
+  ATLAS_RETURN_IF_ERROR(CheckSessionStates(connection, id, record.state));
+  return CheckTombstones(connection, id, record.compacted);
+}
+
+void WriteSession(Connection& connection, const SessionRow& row) {
+  const SessionRecord& r = row.record;
+  connection
+      .Prepare(
+          "INSERT OR REPLACE INTO sessions (id, vehicle, session, state, keyframes, bytes, "
+          "first_time_ms, last_time_ms, last_sequence, compacted, checksum) "
+          "VALUES (?,?,?,?,?,?,?,?,?,?,?)")
+      .Bind(row.id)
+      .Bind(std::string_view(r.key.vehicle))
+      .Bind(std::string_view(r.key.session))
+      .Bind(static_cast<std::int64_t>(r.state))
+      .Bind(r.keyframes)
+      .Bind(r.bytes)
+      .Bind(r.first_time_ms)
+      .Bind(r.last_time_ms)
+      .Bind(r.last_sequence)
+      .Bind(r.compacted)
+      .Bind(HashOf(row))
+      .Run();
+}
+
+Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key) {
+  auto found = FindSession(connection, key);
+  if (!found) {
+    return Error(found.error());
+  }
+  if (*found) {
+    return std::move(**found);
+  }
+  SessionRow row;
+  row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));
+  row.record.key = key;
+  WriteSession(connection, row);
+  return row;
+}
+
+void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe) {
+  SessionRecord& r = session.record;
+  const bool is_first = HasNoneYet(r);
+  r.first_time_ms = is_first ? keyframe.time_ms : std::min(r.first_time_ms, keyframe.time_ms);
+  r.last_time_ms = is_first ? keyframe.time_ms : std::max(r.last_time_ms, keyframe.time_ms);
+  r.last_sequence = std::max(r.last_sequence, keyframe.key.sequence);
+  ++r.keyframes;
+  r.bytes += keyframe.blob.size();
+  WriteSession(connection, session);
+}
+
+}  // namespace atlas

@@ -1,0 +1,31 @@
+// Table sessions: what each drive of a vehicle has contributed.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+struct SessionRow {
+  std::int64_t id = 0;
+  SessionRecord record;
+};
+
+// nullopt: unknown. kInvalidData: its row is damaged.
+Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
+Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
+Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
+// kInvalidData when its row, a line of its history or a tombstone of its keyframes is damaged.
+Status CheckSessionHistory(Connection& connection, const SessionKey& key);
+
+// The live session `key`, made if it is new.
+Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key);
+void WriteSession(Connection& connection, const SessionRow& row);
+// Counts one more keyframe in.
+void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);
+
+}  // namespace atlas

@@ -1,0 +1,219 @@
+#include "server/store/sqlite/tables/tile_table.h"
+
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/tile_ranges.h"
+
+namespace atlas {
+namespace {
+
+constexpr std::size_t kMaxRanges = 64;
+
+struct TileRow {
+  std::uint64_t key = 0;
+  std::uint64_t revision = 0;
+  std::uint64_t fused_revision = 0;
+  std::uint64_t payload_hash = 0;
+  std::uint32_t cells = 0;
+  std::uint32_t multilayer_cells = 0;
+  std::uint32_t blob_bytes = 0;
+  std::uint64_t blob_hash = 0;
+  std::int64_t checksum = 0;
+  Bytes blob;
+
+  std::int64_t ExpectedChecksum() const {
+    return RowHash(RowKind::kTile)
+        .Unsigned(key)
+        .Unsigned(revision)
+        .Unsigned(fused_revision)
+        .Unsigned(payload_hash)
+        .Unsigned(cells)
+        .Unsigned(multilayer_cells)
+        .Unsigned(blob_bytes)
+        .Unsigned(blob_hash)
+        .value();
+  }
+  bool is_intact() const {
+    return checksum == ExpectedChecksum() && blob.size() == blob_bytes && Hash64(blob) == blob_hash;
+  }
+};
+
+std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
+  Query query = connection.Prepare(
+      "SELECT revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
+      "blob_hash, checksum, blob FROM tiles WHERE key = ?");
+  query.Bind(id.Key());
+  if (!query.Step()) {
+    return std::nullopt;
+  }
+  TileRow row;
+  row.key = id.Key();
+  row.revision = query.Unsigned();
+  row.fused_revision = query.Unsigned();
+  row.payload_hash = query.Unsigned();
+  row.cells = query.Unsigned32();
+  row.multilayer_cells = query.Unsigned32();
+  row.blob_bytes = query.Unsigned32();
+  row.blob_hash = query.Unsigned();
+  row.checksum = query.Int();
+  row.blob = query.Blob();
+  return row;
+}
+
+// Adds (sign 1) or takes away (sign -1) what the row counts for.
+void Count(Connection& connection, const TileId& id, const TileRow& row, int sign) {
+  AddToCounter(connection, Counter::kTiles, sign);
+  AddToCounter(connection, Counter::kTileBytes, std::int64_t{row.blob_bytes} * sign);
+  if (id.level == 0) {
+    AddToCounter(connection, Counter::kCells, std::int64_t{row.cells} * sign);
+    AddToCounter(connection, Counter::kMultilayerCells, std::int64_t{row.multilayer_cells} * sign);
+  }
+}
+
+void InsertRow(Connection& connection, const TileId& id, const TileRow& row) {
+  connection
+      .Prepare(
+          "INSERT INTO tiles (key, shard, revision, fused_revision, payload_hash, cells, "
+          "multilayer_cells, blob_bytes, blob_hash, checksum, blob) "
+          "VALUES (?,?,?,?,?,?,?,?,?,?,?)")
+      .Bind(row.key)
+      .Bind(ShardOf(id))
+      .Bind(row.revision)
+      .Bind(row.fused_revision)
+      .Bind(row.payload_hash)
+      .Bind(row.cells)
+      .Bind(row.multilayer_cells)
+      .Bind(row.blob_bytes)
+      .Bind(row.blob_hash)
+      .Bind(row.ExpectedChecksum())
+      .Bind(ByteSpan(row.blob))
+      .Run();
+}
+
+void DeleteRow(Connection& connection, const TileId& id) {
+  connection.Prepare("DELETE FROM tiles WHERE key = ? AND shard = ?")
+      .Bind(id.Key())
+      .Bind(ShardOf(id))
+      .Run();
+}
+
+// After a damaged row went, whose numbers nobody can take away from the counters.
+void Recount(Connection& connection) {
+  connection.Execute(
+      "UPDATE counters SET value = (SELECT count(*) FROM tiles) WHERE id = 6;"
+      "UPDATE counters SET value = (SELECT coalesce(sum(blob_bytes), 0) FROM tiles) WHERE id = 7;"
+      "UPDATE counters SET value = (SELECT coalesce(sum(cells), 0) FROM tiles "
+      "WHERE key < 1 << 58) WHERE id = 8;"
+      "UPDATE counters SET value = (SELECT coalesce(sum(multilayer_cells), 0) FROM tiles "
+      "WHERE key < 1 << 58) WHERE id = 9;");
+}
+
+TileRow NewRow(const TileId& id, const TileContent& content) {
+  TileRow row;
+  row.key = id.Key();
+  row.payload_hash = content.payload_hash;
+  row.cells = content.cells;
+  row.multilayer_cells = content.multilayer_cells;
+  row.blob_bytes = static_cast<std::uint32_t>(content.blob.size());
+  row.blob_hash = Hash64(content.blob);
+  row.blob = content.blob;
+  return row;
+}
+
+// Columns: key, revision, payload_hash, blob_bytes. A key that no tile has is left out: its row
+// fails its checksum when it is read.
+std::optional<TileSummary> ReadSummary(Query& row) {
+  row.Rewind();
+  const auto id = TileId::FromKey(row.Unsigned());
+  if (!id) {
+    return std::nullopt;
+  }
+  TileSummary summary;
+  summary.id = *id;
+  summary.revision = row.Unsigned();
+  summary.payload_hash = row.Unsigned();
+  summary.blob_bytes = row.Unsigned32();
+  return summary;
+}
+
+}  // namespace
+
+Result<std::optional<StoredTile>> ReadTileRow(Connection& connection, const TileId& id) {
+  std::optional<TileRow> row = ReadRow(connection, id);
+  if (!row) {
+    return std::nullopt;
+  }
+  if (!row->is_intact()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: tile ", id, " is damaged: wrong checksum"));
+  }
+  return StoredTile{id, row->revision, row->payload_hash, std::move(row->blob)};
+}
+
+bool StoreTile(Connection& connection,
+               const TileId& id,
+               const std::optional<TileContent>& content,
+               std::uint64_t fused_revision) {
+  const std::optional<TileRow> old = ReadRow(connection, id);
+  if (!old && !content) {
+    return false;
+  }
+  const bool is_damaged = old && !old->is_intact();
+  if (old && content && !is_damaged && old->payload_hash == content->payload_hash) {
+    return false;
+  }
+  if (old) {
+    Count(connection, id, *old, -1);
+    DeleteRow(connection, id);
+  }
+  const std::uint64_t revision = NextRevision(connection);
+  if (content) {
+    TileRow row = NewRow(id, *content);
+    row.revision = revision;
+    row.fused_revision = fused_revision;
+    InsertRow(connection, id, row);
+    Count(connection, id, row, 1);
+  }
+  if (is_damaged) {
+    Recount(connection);
+  }
+  return true;
+}
+
+void ScanTileRows(Connection& connection,
+                  const TileRect& rect,
+                  const std::function<void(const TileSummary&)>& visit) {
+  for (const KeyRange& range : CoverRect(rect, kMaxRanges)) {
+    Query row = connection.Prepare(
+        "SELECT key, revision, payload_hash, blob_bytes FROM tiles INDEXED BY tile_summaries "
+        "WHERE key BETWEEN ? AND ? ORDER BY key");
+    row.Bind(range.first).Bind(range.last);
+    while (row.Step()) {
+      const auto summary = ReadSummary(row);
+      if (summary && rect.Contains(summary->id)) {
+        visit(*summary);
+      }
+    }
+  }
+}
+
+std::vector<TileSummary> ListTileRows(Connection& connection,
+                                      std::int64_t after_key,
+                                      std::uint32_t limit) {
+  Query row = connection.Prepare(
+      "SELECT key, revision, payload_hash, blob_bytes FROM tiles INDEXED BY tile_summaries "
+      "WHERE key > ? ORDER BY key LIMIT ?");
+  row.Bind(after_key).Bind(limit);
+  std::vector<TileSummary> tiles;
+  while (row.Step()) {
+    if (const auto summary = ReadSummary(row)) {
+      tiles.push_back(*summary);
+    }
+  }
+  return tiles;
+}
+
+}  // namespace atlas

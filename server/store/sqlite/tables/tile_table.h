@@ -1,0 +1,31 @@
+// Table tiles: the blobs that workers made, their revisions, and what they hold in numbers.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+// nullopt: no such tile. kInvalidData: the row or its blob is damaged.
+Result<std::optional<StoredTile>> ReadTileRow(Connection& connection, const TileId& id);
+
+// Makes the table hold `content` for `id`; none: no row. True when that was a change: then the row
+// has a revision of its own, NextRevision().
+bool StoreTile(Connection& connection,
+               const TileId& id,
+               const std::optional<TileContent>& content,
+               std::uint64_t fused_revision);
+
+void ScanTileRows(Connection& connection,
+                  const TileRect& rect,
+                  const std::function<void(const TileSummary&)>& visit);
+std::vector<TileSummary> ListTileRows(Connection& connection,
+                                      std::int64_t after_key,
+                                      std::uint32_t limit);
+
+}  // namespace atlas

@@ -1,0 +1,107 @@
+#include "server/store/sqlite/transactions/compaction_transactions.h"
+
+#include <map>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/keyframe_table.h"
+#include "server/store/sqlite/tables/pose_table.h"
+#include "server/store/sqlite/tables/session_table.h"
+
+namespace atlas {
+namespace {
+
+// What a session loses.
+struct Loss {
+  std::uint64_t keyframes = 0;
+  std::uint64_t bytes = 0;
+};
+
+// Leaves a tombstone in the place of a keyframe.
+Result<TombstoneRow> DropKeyframe(Connection& connection,
+                                  std::int64_t id,
+                                  std::int64_t compaction_id) {
+  const auto row = ReadKeyframeRow(connection, id);
+  if (!row) {
+    return Error(row.error());
+  }
+  const TombstoneRow tombstone{row->session_id, row->record.key.sequence, row->record.time_ms,
+                               row->blob_bytes, row->blob_hash,           compaction_id};
+  DeleteFootprint(connection, id);
+  DeletePoses(connection, id);
+  DeleteKeyframe(connection, id);
+  WriteTombstone(connection, tombstone);
+  return tombstone;
+}
+
+Status CountOut(Connection& connection, std::int64_t session_id, const Loss& loss) {
+  auto session = ReadSession(connection, session_id);
+  if (!session) {
+    return session.error();
+  }
+  session->record.keyframes -= loss.keyframes;
+  session->record.bytes -= loss.bytes;
+  session->record.compacted += loss.keyframes;
+  WriteSession(connection, *session);
+  return {};
+}
+
+Status CheckRevisionIs(Connection& connection, std::uint64_t expected) {
+  const std::uint64_t revision = ReadCounter(connection, Counter::kRevision);
+  return revision == expected
+             ? Status()
+             : Status(StatusCode::kConflict, StrCat("compaction: the atlas is at revision ",
+                                                    revision, ", expected ", expected));
+}
+
+// Returns the atlas' revision, which is the oldest that can be read from here on.
+std::uint64_t MoveHorizon(Connection& connection) {
+  const std::uint64_t revision = NextRevision(connection);
+  const std::uint64_t before = ReadCounter(connection, Counter::kHistoryHorizon);
+  return AddToCounter(connection, Counter::kHistoryHorizon,
+                      static_cast<std::int64_t>(revision - before));
+}
+
+}  // namespace
+
+Result<CompactionResult> CompactInStore(Connection& connection, const Compaction& compaction) {
+  if (Status status = CheckRevisionIs(connection, compaction.at_revision); !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (compaction.dropped.empty()) {
+    return CompactionResult{0, 0, ReadCounter(connection, Counter::kHistoryHorizon),
+                            compaction.at_revision};
+  }
+  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kCompactions, 1));
+  CompactionResult result{compaction.dropped.size(), 0, 0, 0};
+  std::map<std::int64_t, Loss> losses;  // by session
+  for (const std::int64_t keyframe : compaction.dropped) {
+    const auto tombstone = DropKeyframe(connection, keyframe, id);
+    if (!tombstone) {
+      return Error(tombstone.error());
+    }
+    Loss& loss = losses[tombstone->session_id];
+    ++loss.keyframes;
+    loss.bytes += tombstone->blob_bytes;
+    result.bytes += tombstone->blob_bytes;
+  }
+  for (const auto& [session_id, loss] : losses) {
+    if (Status status = CountOut(connection, session_id, loss); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  const auto dropped = static_cast<std::int64_t>(result.dropped);
+  AddToCounter(connection, Counter::kKeyframes, -dropped);
+  AddToCounter(connection, Counter::kKeyframeBytes, -static_cast<std::int64_t>(result.bytes));
+  AddToCounter(connection, Counter::kCompacted, dropped);
+  result.revision = MoveHorizon(connection);
+  result.horizon = result.revision;
+  WriteCompaction(connection, {id, result.revision, compaction.before_ms, compaction.author,
+                               result.dropped, result.bytes});
+  return result;
+}
+
+}  // namespace atlas

@@ -1,0 +1,70 @@
+#include "server/store/sqlite/transactions/session_transactions.h"
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/session_state_table.h"
+#include "server/store/sqlite/tables/session_table.h"
+
+namespace atlas {
+namespace {
+
+Result<SessionState> StateAfter(Connection& connection,
+                                const SessionRow& session,
+                                SessionAction action) {
+  if (action == SessionAction::kRetract) {
+    return SessionState::kRetracted;
+  }
+  return session.record.state == SessionState::kRetracted
+             ? ReadStateBeforeRetraction(connection, session.id)
+             : session.record.state;
+}
+
+std::uint32_t MarkSession(Connection& connection, std::int64_t session_id, std::uint64_t revision) {
+  const std::vector<TileId> tiles = ReadSessionFootprint(connection, session_id);
+  for (const TileId& tile : tiles) {
+    MarkTile(connection, tile, revision, revision);
+  }
+  TouchSessionFootprint(connection, session_id, revision);
+  return static_cast<std::uint32_t>(tiles.size());
+}
+
+SessionChangeResult EnterState(Connection& connection,
+                               SessionRow session,
+                               SessionState state,
+                               const SessionChange& change) {
+  const bool was_in_map = IsInMap(session.record.state);
+  SessionChangeResult result{state, true};
+  result.revision = NextRevision(connection);
+  session.record.state = state;
+  WriteSession(connection, session);
+  WriteSessionState(connection, {session.id, result.revision, state, change.author, change.reason});
+  if (was_in_map != IsInMap(state)) {
+    result.tiles_marked = MarkSession(connection, session.id, result.revision);
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<SessionChangeResult> ChangeSessionInStore(Connection& connection,
+                                                 const SessionChange& change) {
+  const auto session = FindSession(connection, change.key);
+  if (!session) {
+    return Error(session.error());
+  }
+  if (!*session) {
+    return Error(StatusCode::kNotFound, StrCat("session ", change.key, " is not in the atlas"));
+  }
+  const auto state = StateAfter(connection, **session, change.action);
+  if (!state) {
+    return Error(state.error());
+  }
+  if (*state == (*session)->record.state) {
+    return SessionChangeResult{*state, false, 0, ReadCounter(connection, Counter::kRevision)};
+  }
+  return EnterState(connection, **session, *state, change);
+}
+
+}  // namespace atlas

@@ -1,0 +1,203 @@
+#include "server/store/sqlite/transactions/transactions.h"
+
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/keyframe_table.h"
+#include "server/store/sqlite/tables/pose_table.h"
+#include "server/store/sqlite/tables/session_state_table.h"
+#include "server/store/sqlite/tables/session_table.h"
+#include "server/store/sqlite/tables/tile_table.h"
+
+namespace atlas {
+namespace {
+
+// What was uploaded under a key.
+struct StoredUpload {
+  std::int64_t time_ms = 0;
+  std::uint64_t blob_hash = 0;
+  std::uint32_t blob_bytes = 0;
+};
+
+// Of a keyframe that is there, or was until a compaction dropped it.
+Result<std::optional<StoredUpload>> FindUpload(Connection& connection,
+                                               std::int64_t session_id,
+                                               std::uint32_t sequence) {
+  const auto row = FindKeyframeRow(connection, session_id, sequence);
+  if (!row) {
+    return Error(row.error());
+  }
+  if (*row) {
+    return StoredUpload{(*row)->record.time_ms, (*row)->blob_hash, (*row)->blob_bytes};
+  }
+  const auto tombstone = FindTombstone(connection, session_id, sequence);
+  if (!tombstone) {
+    return Error(tombstone.error());
+  }
+  if (*tombstone) {
+    return StoredUpload{(*tombstone)->time_ms, (*tombstone)->blob_hash, (*tombstone)->blob_bytes};
+  }
+  return std::nullopt;
+}
+
+bool IsSameUpload(const StoredUpload& stored, const NewKeyframe& keyframe) {
+  return stored.blob_bytes == keyframe.blob.size() && stored.blob_hash == Hash64(keyframe.blob) &&
+         stored.time_ms == keyframe.time_ms;
+}
+
+template <typename Tiles>
+void MarkTiles(Connection& connection, const Tiles& tiles, std::uint64_t revision) {
+  for (const TileId& tile : tiles) {
+    MarkTile(connection, tile, revision, revision);
+  }
+}
+
+PutKeyframeResult AddKeyframe(Connection& connection,
+                              const NewKeyframe& keyframe,
+                              const SessionRow& session) {
+  const std::uint64_t revision = NextRevision(connection);
+  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kLastKeyframeId, 1));
+  InsertKeyframe(connection, keyframe, id, session.id, revision);
+  const std::string& author = keyframe.key.session.vehicle;
+  WritePose(connection, {id, keyframe.pose, revision, 0, author});
+  WriteFootprint(connection, id, keyframe.footprint, revision);
+  if (HasNoneYet(session.record)) {
+    WriteSessionState(connection, {session.id, revision, session.record.state, author, ""});
+  }
+  const bool is_in_map = IsInMap(session.record.state);
+  if (is_in_map) {
+    MarkTiles(connection, keyframe.footprint, revision);
+  }
+  CountKeyframe(connection, session, keyframe);
+  AddToCounter(connection, Counter::kKeyframes, 1);
+  AddToCounter(connection, Counter::kKeyframeBytes,
+               static_cast<std::int64_t>(keyframe.blob.size()));
+  return {false, revision, is_in_map ? static_cast<std::uint32_t>(keyframe.footprint.size()) : 0u};
+}
+
+// What one pose of a batch comes to.
+struct PoseMove {
+  bool is_changed = false;
+  std::vector<TileId> tiles;  // to be marked
+};
+
+Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const PoseChange& change) {
+  const auto stored = FindKeyframeRecord(connection, update.key);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  if (!*stored || (*stored)->pose == update.pose) {
+    return PoseMove{};
+  }
+  const KeyframeRecord& keyframe = **stored;
+  PoseChange numbered = change;
+  numbered.keyframe_id = keyframe.id;
+  numbered.pose = update.pose;
+  WritePose(connection, numbered);
+  PoseMove move{true, {}};
+  if (IsInMap(keyframe.session_state)) {
+    move.tiles = ReadFootprint(connection, keyframe.id);
+    move.tiles.insert(move.tiles.end(), update.footprint.begin(), update.footprint.end());
+  }
+  WriteFootprint(connection, keyframe.id, update.footprint, change.revision);
+  return move;
+}
+
+Status CheckKeysDiffer(const PoseBatch& batch) {
+  std::set<KeyframeKey> seen;
+  for (const NewPose& update : batch.poses) {
+    if (!seen.insert(update.key).second) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("pose batch: keyframe ", update.key, " is in it twice"));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKeyframe& keyframe) {
+  const auto session = FindOrAddSession(connection, keyframe.key.session);
+  if (!session) {
+    return Error(session.error());
+  }
+  const auto stored = FindUpload(connection, session->id, keyframe.key.sequence);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  if (!*stored) {
+    return AddKeyframe(connection, keyframe, *session);
+  }
+  if (!IsSameUpload(**stored, keyframe)) {
+    return Error(
+        StatusCode::kConflict,
+        StrCat("keyframe ", keyframe.key,
+               " is in the atlas with other content: another scan, time (--start), sensor height, "
+               "range, number of rings or --deskew"));
+  }
+  return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
+}
+
+Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBatch& batch) {
+  if (Status status = CheckKeysDiffer(batch); !status.ok()) {
+    return Error(std::move(status));
+  }
+  PoseBatchResult result;
+  PoseChange change;
+  change.revision = ReadCounter(connection, Counter::kRevision) + 1;
+  change.batch = ReadCounter(connection, Counter::kBatch) + 1;
+  change.author = batch.author;
+  std::set<TileId> marked;
+  for (const NewPose& update : batch.poses) {
+    const auto move = MovePose(connection, update, change);
+    if (!move) {
+      return Error(move.error());
+    }
+    result.updated += move->is_changed ? 1u : 0u;
+    marked.insert(move->tiles.begin(), move->tiles.end());
+  }
+  if (result.updated == 0) {
+    result.revision = change.revision - 1;
+    return result;
+  }
+  result.revision = NextRevision(connection);
+  result.batch = AddToCounter(connection, Counter::kBatch, 1);
+  result.tiles_marked = static_cast<std::uint32_t>(marked.size());
+  MarkTiles(connection, marked, result.revision);
+  WritePoseBatch(connection, batch, result);
+  return result;
+}
+
+Result<FinishResult> FinishTileInStore(Connection& connection,
+                                       const FinishedTile& tile,
+                                       std::uint8_t levels) {
+  if (Status status = CheckClaim(connection, tile.claim); !status.ok()) {
+    return Error(std::move(status));
+  }
+  FinishResult result;
+  const TileId& id = tile.claim.id;
+  result.is_changed = StoreTile(connection, id, tile.content, tile.fused_revision);
+  if (result.is_changed) {
+    result.revision = ReadCounter(connection, Counter::kRevision);
+    if (id.level + 1 < levels) {
+      MarkTile(connection, id.Parent(), result.revision, tile.claim.since);
+    }
+  }
+  SettleClaim(connection, tile.claim);
+  return result;
+}
+
+std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids) {
+  const std::uint64_t revision = NextRevision(connection);
+  MarkTiles(connection, ids, revision);
+  return static_cast<std::uint32_t>(ids.size());
+}
+
+}  // namespace atlas
