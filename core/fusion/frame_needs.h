@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "core/fusion/tile_fusion.h"
+#include "core/fusion/observation/frame_on_map.h"
 
 namespace atlas {
 

@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/observation/keyframe_placement.h"
-#include "core/fusion/tile_fusion.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/map_profile.h"
 #include "core/geometry/tile_id.h"

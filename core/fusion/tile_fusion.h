@@ -3,29 +3,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 
 #include "core/base/status.h"
-#include "core/fusion/observation/keyframe_placement.h"
-#include "core/geometry/keyframe_key.h"
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/keyframe/keyframe.h"
 #include "core/tile/tile.h"
 
 namespace atlas {
-
-// A keyframe on the map, without its cells.
-struct FrameOnMap {
-  KeyframeKey key;
-  std::int64_t time_ms = 0;
-  KeyframePlacement placement;
-  GridGeometry grid;
-  std::uint64_t content = 0;  // names the cells: equal for equal keys means the same keyframe
-};
-
-// The cells of frame `index`, whose grid is what the frame says; asked for one at a time.
-using KeyframeSource = std::function<Result<std::shared_ptr<const Keyframe>>(std::size_t index)>;
 
 // The tile `id` (level 0) from the frames whose footprints touch it, in any order: the result does
 // not depend on it. Frames that do not reach the tile are ignored; without an observed cell the

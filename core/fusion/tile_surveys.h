@@ -18,11 +18,11 @@
 #include "core/fusion/combination/bounded_choice.h"
 #include "core/fusion/combination/cell_combiner.h"
 #include "core/fusion/fusion_context.h"
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/stretch_plan.h"
 #include "core/fusion/survey/cell_set.h"
 #include "core/fusion/survey/settled_segments.h"
 #include "core/fusion/survey/stretch_survey.h"
-#include "core/fusion/tile_fusion.h"
 
 namespace atlas {
 

@@ -83,7 +83,8 @@ class WindowPass {
   }
 
   // Asked of the best plane of all: a wall's that beats the ground's says that most returns are the
-  // wall's. To fit none but planes that may be ground lost up to 0.6 points of F1 beside parked cars.
+  // wall's. To fit none but planes that may be ground lost up to 0.6 points of F1 beside parked
+  // cars.
   bool IsGround(const Plane& plane) const {
     const float along_up = plane.normal.dot(up_);
     if (std::abs(along_up) < std::cos(options_.max_slope_rad)) {

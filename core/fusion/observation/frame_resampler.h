@@ -9,9 +9,9 @@
 
 #include "core/base/integer_math.h"
 #include "core/fusion/observation/disc.h"
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/observation/observation.h"
 #include "core/fusion/observation/sigma_table.h"
-#include "core/fusion/tile_fusion.h"
 #include "core/keyframe/keyframe.h"
 
 namespace atlas {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "core/fusion/fusion_context.h"
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/segment/segment_view.h"
 #include "core/fusion/survey/fusion_stretch.h"
 #include "core/fusion/survey/stretch_survey.h"
-#include "core/fusion/tile_fusion.h"
 
 namespace atlas {
 

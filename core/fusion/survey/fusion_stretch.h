@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/fusion/tile_fusion.h"
+#include "core/fusion/observation/frame_on_map.h"
 
 namespace atlas {
 

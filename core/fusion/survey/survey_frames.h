@@ -5,8 +5,8 @@
 #include <span>
 
 #include "core/fusion/fusion_context.h"
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/survey/stretch_survey.h"
-#include "core/fusion/tile_fusion.h"
 
 namespace atlas {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "core/fusion/tile_fusion.h"
+#include "core/fusion/observation/frame_on_map.h"
 #include "core/keyframe/keyframe.h"
 #include "server/service/fusion/lru_cache.h"
 #include "server/store/atlas_store.h"
