@@ -10,6 +10,7 @@ namespace atlas {
 namespace {
 
 constexpr int kMaskBits = 64;
+constexpr std::int32_t kBlockCells = 16;
 
 struct Corner {
   std::int64_t x;
@@ -51,6 +52,7 @@ MapWindow::MapWindow(const MapProfile& profile,
   for (const Tile* tile : tiles) {
     AddTile(profile, *tile, options);
   }
+  IndexBlocks();
   IndexSurfaces();
   FitGradients(options);
   FitLines(options);
@@ -98,6 +100,21 @@ void MapWindow::AddTile(const MapProfile& profile,
       }
     }
   }
+}
+
+void MapWindow::IndexBlocks() {
+  side_blocks_ = side_ / kBlockCells + 1;
+  near_masks_.assign(
+      static_cast<std::size_t>(side_blocks_) * static_cast<std::size_t>(side_blocks_), 0);
+  ForEachOccupiedCell([&](CellRef cell, std::uint64_t mask) {
+    const std::int32_t x = cell.x / kBlockCells;
+    const std::int32_t y = cell.y / kBlockCells;
+    for (std::int32_t j = std::max(0, y - 1); j <= std::min(side_blocks_ - 1, y + 1); ++j) {
+      for (std::int32_t i = std::max(0, x - 1); i <= std::min(side_blocks_ - 1, x + 1); ++i) {
+        near_masks_[static_cast<std::size_t>(j * side_blocks_ + i)] |= mask;
+      }
+    }
+  });
 }
 
 void MapWindow::IndexSurfaces() {
@@ -221,6 +238,9 @@ const ColumnLine* MapWindow::NearestLine(const Eigen::Vector3f& p, float radius_
   const CellRef cell = CellAt(p.x(), p.y());
   const auto reach = static_cast<std::int32_t>(std::ceil(radius_m / cell_size_m_));
   const std::uint64_t bit = std::uint64_t{1} << segment;
+  if (reach <= kBlockCells && Contains(cell) && (NearMask(cell) & bit) == 0) {
+    return nullptr;
+  }
   float best = radius_m * radius_m;
   std::size_t best_cell = masks_.size();
   for (std::int32_t y = std::max(0, cell.y - reach); y <= std::min(side_ - 1, cell.y + reach);
@@ -305,6 +325,11 @@ bool MapWindow::Contains(CellRef cell) const {
 std::size_t MapWindow::Index(CellRef cell) const {
   return static_cast<std::size_t>(cell.y) * static_cast<std::size_t>(side_) +
          static_cast<std::size_t>(cell.x);
+}
+
+std::uint64_t MapWindow::NearMask(CellRef cell) const {
+  return near_masks_[static_cast<std::size_t>((cell.y / kBlockCells) * side_blocks_ +
+                                              cell.x / kBlockCells)];
 }
 
 Eigen::Vector2f MapWindow::CellCenter(CellRef cell) const {

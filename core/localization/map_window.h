@@ -78,13 +78,7 @@ class MapWindow {
   // heights [k, k + 1) segment_height_m().
   template <typename Visit>
   void ForEachOccupied(Visit&& visit) const {
-    for (std::int32_t y = 0; y < side_; ++y) {
-      for (std::int32_t x = 0; x < side_; ++x) {
-        if (const std::uint64_t mask = masks_[Index({x, y})]; mask != 0) {
-          visit(CellCenter({x, y}), mask);
-        }
-      }
-    }
+    ForEachOccupiedCell([&](CellRef cell, std::uint64_t mask) { visit(CellCenter(cell), mask); });
   }
 
  private:
@@ -93,8 +87,20 @@ class MapWindow {
     std::int32_t y;
   };
 
+  template <typename Visit>
+  void ForEachOccupiedCell(Visit&& visit) const {
+    for (std::int32_t y = 0; y < side_; ++y) {
+      for (std::int32_t x = 0; x < side_; ++x) {
+        if (const std::uint64_t mask = masks_[Index({x, y})]; mask != 0) {
+          visit(CellRef{x, y}, mask);
+        }
+      }
+    }
+  }
+
   void AddTile(const MapProfile& profile, const Tile& tile, const MapWindowOptions& options);
   void IndexSurfaces();
+  void IndexBlocks();
   void FitGradients(const MapWindowOptions& options);
   void FitLines(const MapWindowOptions& options);
   ColumnLine FitLine(CellRef cell, int segment, const MapWindowOptions& options) const;
@@ -105,6 +111,7 @@ class MapWindow {
   CellRef CellAt(float x_m, float y_m) const;
   bool Contains(CellRef cell) const;
   std::size_t Index(CellRef cell) const;
+  std::uint64_t NearMask(CellRef cell) const;
   Eigen::Vector2f CellCenter(CellRef cell) const;
   // Bit of the segment at height z in the masks; negative outside.
   int SegmentAt(float z_m) const;
@@ -121,6 +128,10 @@ class MapWindow {
 
   std::vector<std::uint64_t> masks_;       // occupied segments, by cell
   std::vector<std::uint64_t> free_masks_;  // free ones
+  // Occupied segments of a block of cells and its eight neighbours: most of what is looked for
+  // stands nowhere near.
+  std::vector<std::uint64_t> near_masks_;
+  std::int32_t side_blocks_ = 0;
   std::vector<std::uint32_t> first_line_;  // by cell: index of its lowest occupied segment's line
   std::vector<ColumnLine> lines_;
   std::vector<std::uint32_t> surface_begin_;                       // by cell, plus one
