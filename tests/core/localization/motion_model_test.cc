@@ -1,6 +1,7 @@
 // Vehicles on known courses, seen well, badly or not at all.
 #include "core/localization/motion_model.h"
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -91,6 +92,23 @@ TEST(MotionModelTest, ADirectionThatIsNoLongerSeenKeepsItsSpeed) {
   const HorizontalSpread spread = SpreadOf(model.covariance());
   EXPECT_GT(spread.along_m, 1.0);
   EXPECT_LT(spread.beside_m, 0.05);
+}
+
+TEST(MotionModelTest, AnHourOfScansWearsNothingOut) {
+  MotionModel model({});
+  model.Start(OnCircle(0));
+  const std::array<Eigen::Matrix4d, 3> seen{kSeenWell, kCorridor, kUnseen};
+  for (int i = 1; i <= 36000; ++i) {
+    model.Predict();
+    // Ten minutes of each in turn.
+    model.Correct(model.T_world_sensor(), seen[static_cast<std::size_t>(i / 6000 % 3)]);
+  }
+  ExpectIsCovariance(model.covariance());
+  EXPECT_TRUE(model.T_world_sensor().matrix().allFinite());
+  model.Predict();
+  model.Correct(OnCircle(0), kSeenWell);
+  ExpectIsCovariance(model.covariance());
+  EXPECT_LT(SpreadOf(model.covariance()).along_m, 0.02);
 }
 
 TEST(MotionModelTest, ATurnIsTakenUpAtOnce) {
