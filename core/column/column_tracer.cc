@@ -12,6 +12,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::uint64_t kLowBits = 0x1111'1111'1111'1111;  // of each nibble
+
 // What a scan says about the half segments above each cell of the grid.
 struct CellMasks {
   explicit CellMasks(std::size_t cells) : passed(cells), hit(cells) {}
@@ -79,6 +81,22 @@ std::size_t BlockOf(std::int32_t row,
   return static_cast<std::size_t>(row / block_cells * blocks + column / block_cells);
 }
 
+// Calls visit(block, cell) for all cells of block after block, without a division a cell.
+template <typename Visit>
+void ForEachCellByBlock(const GridGeometry& grid, std::int32_t block_cells, Visit&& visit) {
+  const std::int32_t side = grid.side();
+  std::size_t block = 0;
+  for (std::int32_t top = 0; top < side; top += block_cells) {
+    for (std::int32_t left = 0; left < side; left += block_cells, ++block) {
+      for (std::int32_t row = top; row < std::min(side, top + block_cells); ++row) {
+        for (std::int32_t column = left; column < std::min(side, left + block_cells); ++column) {
+          visit(block, static_cast<std::size_t>(row * side + column));
+        }
+      }
+    }
+  }
+}
+
 std::vector<std::int16_t> PlaceAnchors(const GridGeometry& grid,
                                        std::span<const KeyframeCell> cells,
                                        const ColumnOptions& options) {
@@ -86,15 +104,11 @@ std::vector<std::int16_t> PlaceAnchors(const GridGeometry& grid,
   const std::int32_t blocks = (side + options.block_cells - 1) / options.block_cells;
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
   std::vector<std::int32_t> lowest_mm(static_cast<std::size_t>(blocks * blocks), kNone);
-  for (std::int32_t row = 0; row < side; ++row) {
-    for (std::int32_t column = 0; column < side; ++column) {
-      const KeyframeCell& cell = cells[static_cast<std::size_t>(row * side + column)];
-      if (cell.source != AltitudeSource::kNone) {
-        std::int32_t& lowest = lowest_mm[BlockOf(row, column, grid, options.block_cells)];
-        lowest = std::min<std::int32_t>(lowest, cell.altitude_mm);
-      }
+  ForEachCellByBlock(grid, options.block_cells, [&](std::size_t block, std::size_t cell) {
+    if (cells[cell].source != AltitudeSource::kNone) {
+      lowest_mm[block] = std::min<std::int32_t>(lowest_mm[block], cells[cell].altitude_mm);
     }
-  }
+  });
   const auto segment_mm =
       static_cast<std::int64_t>(std::lround(options.segment_height_m * 1000.0F));
   std::vector<std::int16_t> anchors(lowest_mm.size(), 0);
@@ -106,13 +120,13 @@ std::vector<std::int16_t> PlaceAnchors(const GridGeometry& grid,
   return anchors;
 }
 
-// The lower halves' bits of 16 segments, each moved to the low bit of its own nibble.
-std::uint64_t SpreadToNibbles(std::uint64_t lower_halves) {
-  std::uint64_t bits = lower_halves & 0x5555'5555ULL;
+// The two bits of 16 segments, each moved to the low bits of its own nibble.
+std::uint64_t SpreadToNibbles(std::uint64_t pairs) {
+  std::uint64_t bits = pairs & 0xFFFF'FFFFULL;
   bits = (bits | (bits << 16)) & 0x0000'FFFF'0000'FFFFULL;
   bits = (bits | (bits << 8)) & 0x00FF'00FF'00FF'00FFULL;
   bits = (bits | (bits << 4)) & 0x0F0F'0F0F'0F0F'0F0FULL;
-  return (bits | (bits << 2)) & 0x1111'1111'1111'1111ULL;
+  return (bits | (bits << 2)) & 0x3333'3333'3333'3333ULL;
 }
 
 // The segments, as their lower halves, that rays say are free: those that rays passed in both
@@ -130,8 +144,9 @@ std::uint64_t LowNibbles(std::uint64_t nibbles, int segments) {
 std::uint64_t ColumnFromMasks(
     HalfMask passed, HalfMask hit, float ground_m, int anchor, const HalfSegments& halves) {
   const HalfMask missed = Missed(passed, halves.SegmentAt(ground_m));
-  return SpreadToNibbles(halves.From(anchor, hit)) * kNibbleHit +
-         SpreadToNibbles(halves.From(anchor, missed)) * kNibbleMiss;
+  const std::uint64_t states =
+      SpreadToNibbles(halves.From(anchor, (hit & kLowerHalves) | (missed << 1)));
+  return (states & kLowBits) * kNibbleHit + ((states >> 1) & kLowBits) * kNibbleMiss;
 }
 
 // The vehicle's own cells: free from the ground to the sensor, whatever was traced there.
@@ -145,7 +160,8 @@ void MarkBody(const GridGeometry& grid,
     if (cells[cell].source != AltitudeSource::kNone) {
       const int anchor = result.anchors[BlockOf(iy + grid.radius_cells, ix + grid.radius_cells,
                                                 grid, options.block_cells)];
-      const std::uint64_t body = SpreadToNibbles(halves.From(anchor, halves.BelowSensor()));
+      const std::uint64_t body =
+          SpreadToNibbles(halves.From(anchor, halves.BelowSensor())) & kLowBits;
       result.columns[cell] =
           LowNibbles((result.columns[cell] & ~(body * 15)) | body * kNibbleFree, options.segments);
     }
@@ -182,18 +198,15 @@ LocalColumns TraceColumns(const LeveledScan& scan,
   LocalColumns result;
   result.anchors = PlaceAnchors(grid, cells, options);
   result.columns.resize(cells.size());
-  for (std::int32_t row = 0; row < grid.side(); ++row) {
-    for (std::int32_t column = 0; column < grid.side(); ++column) {
-      const auto cell = static_cast<std::size_t>(row * grid.side() + column);
-      if (cells[cell].source != AltitudeSource::kNone) {
-        const int anchor = result.anchors[BlockOf(row, column, grid, options.block_cells)];
-        result.columns[cell] =
-            LowNibbles(ColumnFromMasks(masks.passed[cell], masks.hit[cell],
-                                       GroundHeight(cells[cell]), anchor, halves),
-                       options.segments);
-      }
+  ForEachCellByBlock(grid, options.block_cells, [&](std::size_t block, std::size_t cell) {
+    if (cells[cell].source != AltitudeSource::kNone &&
+        (masks.passed[cell] | masks.hit[cell]) != 0) {
+      result.columns[cell] =
+          LowNibbles(ColumnFromMasks(masks.passed[cell], masks.hit[cell], GroundHeight(cells[cell]),
+                                     result.anchors[block], halves),
+                     options.segments);
     }
-  }
+  });
   MarkBody(grid, options, halves, cells, result);
   return result;
 }

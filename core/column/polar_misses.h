@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -49,26 +48,7 @@ class PolarMisses {
   }
 
  private:
-  // The ray rises (or falls) through one half segment after the other.
-  void Fill(HalfMask* masks, int end, float slope) const {
-    const float halves_per_step = std::abs(slope) * rays_.step_m() / halves_.half_height_m();
-    const float steps_per_half = halves_per_step > 1e-6F ? 1.0F / halves_per_step : 1e9F;
-    const int direction = slope < 0.0F ? -1 : 1;
-    int half = slope < 0.0F ? -1 : 0;  // the sensor is on the border between these two
-    float border = steps_per_half;     // in steps from the sensor
-    for (int begin = 0; begin < end; half += direction) {
-      if (halves_.IsPast(half, direction)) {
-        return;
-      }
-      const HalfMask bit = halves_.Bit(half);
-      const int stop = border < static_cast<float>(end) ? static_cast<int>(border) : end;
-      for (int step = begin; step < stop; ++step) {
-        masks[step] |= bit;
-      }
-      begin = stop;
-      border += steps_per_half;
-    }
-  }
+  void Fill(HalfMask* masks, int end, float slope) const;
 
   const RayTable& rays_;
   HalfSegments halves_;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include "core/base/small_sort.h"
 
 namespace atlas {
 namespace {
@@ -11,8 +14,20 @@ namespace {
 // not extended into slope.
 constexpr float kSlopeBase = 0.5F;
 
+using GroundSamples = std::span<const GroundSample>;
+
+// Height of the ground at `range_m`, of which `after` is the first sample beyond.
+float HeightBefore(GroundSamples ground, GroundSamples::iterator after, float range_m) {
+  if (after == ground.end()) {
+    return ground.back().z_m;
+  }
+  const GroundSample& before = *std::prev(after);  // the first sample is at range 0
+  const float t = (range_m - before.range_m) / (after->range_m - before.range_m);
+  return before.z_m + t * (after->z_m - before.z_m);
+}
+
 // Height at `range_m` on the line that the ground followed until its last sample.
-float Extend(std::span<const GroundSample> ground, float range_m) {
+float Extend(GroundSamples ground, float range_m) {
   const GroundSample& last = ground.back();
   const float gap_m = range_m - last.range_m;
   std::size_t first = ground.size() - 1;
@@ -27,15 +42,12 @@ float Extend(std::span<const GroundSample> ground, float range_m) {
 }  // namespace
 
 float RayProfile::GroundAt(float range_m) const {
-  const auto after = std::upper_bound(
-      ground.begin(), ground.end(), range_m,
-      [](float range, const GroundSample& sample) { return range < sample.range_m; });
-  if (after == ground.end()) {
-    return ground.back().z_m;
-  }
-  const GroundSample& before = *std::prev(after);  // the first sample is at range 0
-  const float t = (range_m - before.range_m) / (after->range_m - before.range_m);
-  return before.z_m + t * (after->z_m - before.z_m);
+  return HeightBefore(ground,
+                      std::upper_bound(ground.begin(), ground.end(), range_m,
+                                       [](float range, const GroundSample& sample) {
+                                         return range < sample.range_m;
+                                       }),
+                      range_m);
 }
 
 GroundProfiles::GroundProfiles(const LeveledScan& scan,
@@ -68,34 +80,41 @@ RayProfile GroundProfiles::Ray(int ray) const {
 void GroundProfiles::Sort(const LeveledScan& scan, const RayTable& rays) {
   const int count = rays.rays();
   const float half = 0.5F * std::max(0.0F, scan.column_spacing_rad);
-  return_begin_.assign(static_cast<std::size_t>(count) + 1, 0);
-  const auto for_each = [&](auto&& visit) {
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      if (scan.range_m[i] >= rays.radius_m()) {
-        continue;
-      }
-      const int first =
-          static_cast<int>(std::floor((scan.azimuth_rad[i] - half) / rays.ray_width_rad()));
-      const int last =
-          static_cast<int>(std::floor((scan.azimuth_rad[i] + half) / rays.ray_width_rad()));
-      for (int ray = first; ray <= last; ++ray) {
-        visit(static_cast<std::size_t>((ray + count) % count), i);
-      }
-    }
+  struct Span {
+    int first;
+    int last;
+    std::size_t source;
   };
-  std::size_t size = 0;
-  for_each([&](std::size_t ray, std::size_t) {
-    ++return_begin_[ray + 1];
-    ++size;
-  });
-  for (std::size_t ray = 1; ray < return_begin_.size(); ++ray) {
-    return_begin_[ray] += return_begin_[ray - 1];
+  std::vector<Span> spans;
+  spans.reserve(scan.size());
+  const auto ray_below = [&rays](float azimuth_rad) {
+    return static_cast<int>(std::floor(azimuth_rad / rays.ray_width_rad()));
+  };
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (scan.range_m[i] < rays.radius_m()) {
+      spans.push_back(
+          {ray_below(scan.azimuth_rad[i] - half), ray_below(scan.azimuth_rad[i] + half), i});
+    }
   }
-  returns_.resize(size);
+  const auto wrap = [count](int ray) {
+    return static_cast<std::size_t>(ray < 0 ? ray + count : ray >= count ? ray - count : ray);
+  };
+  return_begin_.assign(static_cast<std::size_t>(count) + 1, 0);
+  for (const Span& span : spans) {
+    for (int ray = span.first; ray <= span.last; ++ray) {
+      ++return_begin_[wrap(ray) + 1];
+    }
+  }
+  std::partial_sum(return_begin_.begin(), return_begin_.end(), return_begin_.begin());
+  returns_.resize(return_begin_.back());
   std::vector<std::uint32_t> next(return_begin_.begin(), return_begin_.end() - 1);
-  for_each([&](std::size_t ray, std::size_t i) {
-    returns_[next[ray]++] = {scan.range_m[i], scan.z[i], scan.is_ground[i] != 0};
-  });
+  for (const Span& span : spans) {
+    const Return r{scan.range_m[span.source], scan.z[span.source],
+                   scan.is_ground[span.source] != 0};
+    for (int ray = span.first; ray <= span.last; ++ray) {
+      returns_[next[wrap(ray)]++] = r;
+    }
+  }
 }
 
 // The sensor is at height 0: a ray that ends behind a chord is lowest against it at its far end,
@@ -127,8 +146,12 @@ void GroundProfiles::Join(std::span<const Return> returns,
 RayEnd GroundProfiles::FindEnd(std::span<const Return> returns,
                                const RayProfile& profile,
                                const ProfileOptions& options) {
+  auto after = profile.ground.begin();
   for (const Return& r : returns) {
-    const float height_m = r.z_m - profile.GroundAt(r.range_m);
+    while (after != profile.ground.end() && after->range_m <= r.range_m) {
+      ++after;
+    }
+    const float height_m = r.z_m - HeightBefore(profile.ground, after, r.range_m);
     if (r.is_ground ? Stands(height_m, options) : height_m <= options.vehicle_clearance_m) {
       return {r.range_m, !r.is_ground};
     }
@@ -161,7 +184,7 @@ float GroundProfiles::SlopeFrom(std::span<const Return> from,
 }
 
 void GroundProfiles::BuildRay(std::span<Return> returns, const ProfileOptions& options) {
-  std::sort(returns.begin(), returns.end(), [](const Return& a, const Return& b) {
+  SmallStableSort(returns.begin(), returns.end(), [](const Return& a, const Return& b) {
     return a.range_m != b.range_m ? a.range_m < b.range_m : a.z_m < b.z_m;
   });
   const std::size_t begin = ground_begin_.back();

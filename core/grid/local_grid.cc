@@ -11,44 +11,41 @@ namespace {
 constexpr float kMaxAltitude_m = 32.0F;  // int16 millimetres
 constexpr std::uint16_t kMaxCount = std::numeric_limits<std::uint16_t>::max();
 
-struct AltitudeSum {
-  float sum_m = 0.0F;
-  std::uint16_t count = 0;
+// One cell while the rays are traced.
+struct TracedCell {
+  float altitude_sum_m = 0.0F;
+  std::uint16_t altitudes = 0;
   AltitudeSource source = AltitudeSource::kNone;
-};
+  Occupancy occupancy = Occupancy::kUnknown;
 
-// Collects altitudes; a better source replaces worse ones, equals are averaged, the first 65,535 of
-// them.
-class AltitudeGrid {
- public:
-  explicit AltitudeGrid(std::size_t size) : cells_(size) {}
-
-  void Add(std::uint32_t cell, float z_m, AltitudeSource source) {
-    AltitudeSum& sum = cells_[cell];
-    if (sum.source == AltitudeSource::kNone || source < sum.source) {
-      sum = {z_m, 1, source};
-    } else if (source == sum.source && sum.count < kMaxCount) {
-      sum.sum_m += z_m;
-      ++sum.count;
+  // A better source replaces worse ones, equals are averaged, the first 65,535 of them.
+  void AddAltitude(float z_m, AltitudeSource from) {
+    const bool is_other = static_cast<int>(source != AltitudeSource::kNone) &
+                          static_cast<int>(source != from);  // rare, unlike either of the two
+    if (is_other) {
+      if (from > source) {
+        return;
+      }
+      altitude_sum_m = 0.0F;
+      altitudes = 0;
+    }
+    if (altitudes < kMaxCount) {
+      altitude_sum_m += z_m;
+      ++altitudes;
+      source = from;
     }
   }
+  // Hits win over misses.
+  void AddMiss() { occupancy = occupancy == Occupancy::kUnknown ? Occupancy::kFree : occupancy; }
+  void AddHit() { occupancy = Occupancy::kObstacle; }
 
-  void Store(std::vector<KeyframeCell>& cells) const {
-    for (std::size_t i = 0; i < cells_.size(); ++i) {
-      const AltitudeSum& sum = cells_[i];
-      if (sum.source == AltitudeSource::kNone) {
-        continue;
-      }
-      const float mean_m = sum.sum_m / static_cast<float>(sum.count);
-      if (std::abs(mean_m) < kMaxAltitude_m) {
-        cells[i].altitude_mm = static_cast<std::int16_t>(std::lround(mean_m * 1000.0F));
-        cells[i].source = sum.source;
-      }
+  KeyframeCell Result() const {
+    const float mean_m = altitude_sum_m / static_cast<float>(altitudes);
+    if (source == AltitudeSource::kNone || std::abs(mean_m) >= kMaxAltitude_m) {
+      return {};  // not seen, or too high or too low for the grid
     }
+    return {static_cast<std::int16_t>(std::lround(mean_m * 1000.0F)), occupancy, source};
   }
-
- private:
-  std::vector<AltitudeSum> cells_;
 };
 
 // Each return in its own cell: ground of any deck, or an obstacle that stands on this one.
@@ -56,8 +53,7 @@ void AddReturns(const LeveledScan& scan,
                 const RayTable& rays,
                 const GroundProfiles& profiles,
                 const ProfileOptions& options,
-                AltitudeGrid& altitudes,
-                std::vector<KeyframeCell>& cells) {
+                std::vector<TracedCell>& cells) {
   const GridGeometry& grid = rays.grid();
   const float cells_per_m = 1.0F / static_cast<float>(grid.cell_size_m());
   for (std::size_t i = 0; i < scan.size(); ++i) {
@@ -69,16 +65,16 @@ void AddReturns(const LeveledScan& scan,
     if (!grid.Contains(ix, iy)) {
       continue;
     }
-    const auto cell = static_cast<std::size_t>(grid.Index(ix, iy));
+    TracedCell& cell = cells[grid.Index(ix, iy)];
     const float range_m = scan.range_m[i];
     const RayProfile profile = profiles.Ray(rays.Ray(scan.azimuth_rad[i]));
     const bool is_behind = range_m >= profile.end.range_m;  // the nearest that stands is there
     const float ground_m = is_behind ? profile.GroundAt(range_m) : 0.0F;
     if (is_behind && Stands(scan.z[i] - ground_m, options)) {
-      cells[cell].occupancy = Occupancy::kObstacle;
-      altitudes.Add(static_cast<std::uint32_t>(cell), ground_m, AltitudeSource::kExtrapolated);
+      cell.AddHit();
+      cell.AddAltitude(ground_m, AltitudeSource::kExtrapolated);
     } else if (scan.is_ground[i] != 0) {
-      altitudes.Add(static_cast<std::uint32_t>(cell), scan.z[i], AltitudeSource::kMeasured);
+      cell.AddAltitude(scan.z[i], AltitudeSource::kMeasured);
     }
   }
 }
@@ -91,31 +87,62 @@ AltitudeSource SourceBefore(const GroundSample& sample, const ProfileOptions& op
   return sample.is_joined ? AltitudeSource::kInterpolated : AltitudeSource::kExtrapolated;
 }
 
-// Altitudes below one ray, from the sensor's foot to its farthest return.
-void AddAlongRay(const RayProfile& profile,
-                 const RayTable& rays,
-                 int ray,
-                 const ProfileOptions& options,
-                 AltitudeGrid& altitudes) {
-  const std::uint32_t* cells = rays.Cells(ray);
-  const float end_m = std::max(profile.end.range_m, profile.farthest_m);
-  const int last = std::min(rays.steps() - 1, static_cast<int>(end_m / rays.step_m()));
-  std::size_t next = 1;
-  for (int step = 0; step <= last; ++step) {
-    const float range_m = rays.StepRange(step);
-    while (next < profile.ground.size() && profile.ground[next].range_m < range_m) {
-      ++next;
+// Steps [begin, end) of a ray: altitudes on a line, free before `misses_end`.
+struct RaySteps {
+  int begin;
+  int end;
+  int misses_end;
+};
+
+void AddLine(const GroundSample& from,
+             float slope,
+             AltitudeSource source,
+             const RaySteps& steps,
+             const RayTable& rays,
+             int ray,
+             std::vector<TracedCell>& cells) {
+  const std::uint32_t* below = rays.Cells(ray);
+  for (int step = steps.begin; step < steps.end; ++step) {
+    TracedCell& cell = cells[below[step]];
+    cell.AddAltitude(from.z_m + slope * (rays.StepRange(step) - from.range_m), source);
+    if (step < steps.misses_end) {
+      cell.AddMiss();
     }
+  }
+}
+
+// What one ray says about the cells below it, from the sensor's foot to its farthest return.
+void AddRay(const RayProfile& profile,
+            const RayTable& rays,
+            int ray,
+            const ProfileOptions& options,
+            std::vector<TracedCell>& cells) {
+  const float end_m = profile.end.range_m;
+  const float farthest_m = std::max(end_m, profile.farthest_m);
+  const int last = std::min(rays.steps() - 1, static_cast<int>(farthest_m / rays.step_m()));
+  const int misses_end = std::min(rays.steps(), static_cast<int>(end_m / rays.step_m()));
+  int step = 0;
+  // The first step from there on that is farther than `range_m`.
+  const auto step_behind = [&](float range_m) {
+    return std::clamp(static_cast<int>(range_m / rays.step_m() + 0.5F), step, last + 1);
+  };
+  for (std::size_t next = 1; next < profile.ground.size() && step <= last; ++next) {
     const GroundSample& before = profile.ground[next - 1];
-    if (next == profile.ground.size()) {
-      altitudes.Add(cells[step], before.z_m, AltitudeSource::kExtrapolated);
-      continue;
-    }
     const GroundSample& after = profile.ground[next];
-    const float t = (range_m - before.range_m) / (after.range_m - before.range_m);
-    altitudes.Add(cells[step], before.z_m + t * (after.z_m - before.z_m),
-                  range_m <= profile.end.range_m ? SourceBefore(after, options)
-                                                 : AltitudeSource::kExtrapolated);
+    const float slope = (after.z_m - before.z_m) / (after.range_m - before.range_m);
+    const int seen_end = step_behind(std::min(after.range_m, end_m));
+    AddLine(before, slope, SourceBefore(after, options), {step, seen_end, misses_end}, rays, ray,
+            cells);
+    step = seen_end;
+    const int end = step_behind(after.range_m);
+    AddLine(before, slope, AltitudeSource::kExtrapolated, {step, end, misses_end}, rays, ray,
+            cells);
+    step = end;
+  }
+  AddLine(profile.ground.back(), 0.0F, AltitudeSource::kExtrapolated, {step, last + 1, misses_end},
+          rays, ray, cells);
+  if (profile.end.is_obstacle && misses_end < rays.steps()) {
+    cells[rays.Cells(ray)[misses_end]].AddHit();
   }
 }
 
@@ -126,35 +153,18 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
                          const VehicleContact& contact,
                          const ProfileOptions& options) {
   const GroundProfiles profiles(scan, rays, contact, options);
-  LocalGrid grid;
-  grid.cells.resize(rays.grid().size());
-  AltitudeGrid altitudes(rays.grid().size());
-  AddReturns(scan, rays, profiles, options, altitudes, grid.cells);
-  for (int ray = 0; ray < rays.rays(); ++ray) {  // hits first
-    const RayProfile profile = profiles.Ray(ray);
-    AddAlongRay(profile, rays, ray, options, altitudes);
-    const int step = static_cast<int>(profile.end.range_m / rays.step_m());
-    if (profile.end.is_obstacle && step < rays.steps()) {
-      grid.cells[rays.Cells(ray)[step]].occupancy = Occupancy::kObstacle;
-    }
-  }
+  std::vector<TracedCell> cells(rays.grid().size());
+  AddReturns(scan, rays, profiles, options, cells);
   for (int ray = 0; ray < rays.rays(); ++ray) {
-    const int end =
-        std::min(rays.steps(), static_cast<int>(profiles.Ray(ray).end.range_m / rays.step_m()));
-    const std::uint32_t* cells = rays.Cells(ray);
-    for (int step = 0; step < end; ++step) {
-      KeyframeCell& cell = grid.cells[cells[step]];
-      cell.occupancy = cell.occupancy == Occupancy::kUnknown ? Occupancy::kFree : cell.occupancy;
-    }
+    AddRay(profiles.Ray(ray), rays, ray, options, cells);
   }
   options.body.ForEachCell(rays.grid(), [&](std::int32_t ix, std::int32_t iy) {
-    grid.cells[rays.grid().Index(ix, iy)].occupancy = Occupancy::kDriven;
+    cells[rays.grid().Index(ix, iy)].occupancy = Occupancy::kDriven;
   });
-  altitudes.Store(grid.cells);
-  for (KeyframeCell& cell : grid.cells) {
-    if (cell.source == AltitudeSource::kNone) {
-      cell.occupancy = Occupancy::kUnknown;  // too high or too low for the grid
-    }
+  LocalGrid grid;
+  grid.cells.reserve(cells.size());
+  for (const TracedCell& cell : cells) {
+    grid.cells.push_back(cell.Result());
   }
   return grid;
 }

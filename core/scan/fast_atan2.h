@@ -12,7 +12,7 @@ inline float FastAtan2(float y, float x) {
   const float ay = std::abs(y);
   const float larger = ax > ay ? ax : ay;
   const float smaller = ax > ay ? ay : ax;
-  const float t = larger > 0.0F ? smaller / larger : 0.0F;
+  const float t = smaller / (larger > 0.0F ? larger : 1.0F);  // no branch: loops of it are vectors
   const float s = t * t;
   float angle =
       t * (0.9998660F + s * (-0.3302995F + s * (0.1801410F + s * (-0.0851330F + s * 0.0208351F))));

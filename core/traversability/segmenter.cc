@@ -18,6 +18,12 @@ struct Votes {
   std::uint8_t ground = 0;
 };
 
+// [begin, end) of a range image's returns.
+struct Run {
+  std::uint32_t begin = 0;
+  std::uint32_t end = 0;
+};
+
 // One scan's windows: gathers each, fits its plane, lets the returns vote.
 class WindowPass {
  public:
@@ -49,37 +55,32 @@ class WindowPass {
   }
 
   void Gather(int row, int row_stride, int sector) {
-    members_.clear();
+    runs_.clear();
+    for (std::vector<float>* plane : {&window_.x, &window_.y, &window_.z}) {
+      plane->clear();
+    }
     for (std::size_t ring = 0; ring < 3; ++ring) {
       const int r = row + static_cast<int>(ring) * row_stride;
-      window_.ring_begin[ring] = static_cast<std::uint32_t>(members_.size());
       if (r < image_.rows) {
-        Append(image_.Begin(r, sector), image_.End(r, sector));
-        const int next = (sector + 1) % RangeImage::kSectors;
-        Append(image_.Begin(r, next), image_.End(r, next));
+        Append(r, sector);
+        Append(r, (sector + 1) % RangeImage::kSectors);
       }
+      window_.ring_begin[ring + 1] = static_cast<std::uint32_t>(window_.x.size());
     }
-    const std::size_t size = members_.size();
-    window_.ring_begin[3] = static_cast<std::uint32_t>(size);
-    Fill(window_.x, image_.x);
-    Fill(window_.y, image_.y);
-    Fill(window_.z, image_.z);
-  }
-
-  void Append(std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i) {
-      members_.push_back(i);
+    for (std::vector<float>* plane : {&window_.x, &window_.y, &window_.z}) {
+      plane->resize(plane->size() + RangeImage::kPadding, kPadding_m);
     }
   }
 
-  void Fill(std::vector<float>& plane, const std::vector<float>& from) const {
-    plane.resize(members_.size() + RangeImage::kPadding);
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      plane[i] = from[members_[i]];
-    }
-    for (std::size_t i = members_.size(); i < plane.size(); ++i) {
-      plane[i] = kPadding_m;
-    }
+  void Append(int row, int sector) {
+    const Run run{image_.Begin(row, sector), image_.End(row, sector)};
+    runs_.push_back(run);
+    const auto append = [&run](std::vector<float>& plane, const std::vector<float>& from) {
+      plane.insert(plane.end(), from.begin() + run.begin, from.begin() + run.end);
+    };
+    append(window_.x, image_.x);
+    append(window_.y, image_.y);
+    append(window_.z, image_.z);
   }
 
   // Asked of the best plane of all: a wall's that beats the ground's says that most returns are the
@@ -97,13 +98,14 @@ class WindowPass {
 
   // `plane` is null when the window found no ground.
   void Vote(const Plane* plane) {
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      Votes& votes = votes_[members_[i]];
-      ++votes.windows;
-      if (plane != nullptr) {
-        const float distance = plane->normal.x() * window_.x[i] + plane->normal.y() * window_.y[i] +
-                               plane->normal.z() * window_.z[i] + plane->offset_m;
-        votes.ground += static_cast<std::uint8_t>(std::abs(distance) < options_.threshold_m);
+    for (const Run& run : runs_) {
+      for (std::uint32_t i = run.begin; i < run.end; ++i) {
+        ++votes_[i].windows;
+        if (plane != nullptr) {
+          const float distance = plane->normal.x() * image_.x[i] + plane->normal.y() * image_.y[i] +
+                                 plane->normal.z() * image_.z[i] + plane->offset_m;
+          votes_[i].ground += static_cast<std::uint8_t>(std::abs(distance) < options_.threshold_m);
+        }
       }
     }
   }
@@ -113,7 +115,7 @@ class WindowPass {
   Eigen::Vector3f up_;
   PlaneFitOptions fit_options_;
   std::vector<Votes> votes_;
-  std::vector<std::uint32_t> members_;  // of the window at hand
+  std::vector<Run> runs_;  // of the window at hand
   WindowReturns window_;
 };
 

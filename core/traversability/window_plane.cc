@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "core/base/vector_clones.h"
+
 namespace atlas {
 namespace {
 
@@ -59,6 +61,7 @@ std::optional<Plane> ThroughPoints(const Eigen::Vector3f& a,
 
 // Whole vectors: the padding is far from every plane. Gives up, with fewer than `least`, as soon as
 // that many cannot be reached any more.
+ATLAS_VECTOR_CLONES
 std::uint32_t CountInliers(const WindowReturns& window,
                            const Plane& plane,
                            float threshold_m,
