@@ -54,25 +54,37 @@ float MedianSpacing(std::span<const float> sorted) {
   return *middle;
 }
 
-int SnapChannels(float spacing_rad, std::size_t rows) {
-  const int by_spacing =
-      spacing_rad > kSpacing16_rad ? 16 : (spacing_rad > kSpacing32_rad ? 32 : 64);
-  // A few rows too many are halves of rings that were cut.
-  const int by_count = rows > 38 ? 64 : (rows > 19 ? 32 : 16);
-  return std::max(by_spacing, by_count);
+float MeanSpacing(std::span<const float> sorted) {
+  return (sorted.back() - sorted.front()) / static_cast<float>(sorted.size() - 1);
 }
 
-// Rows that no scan ever showed: where two neighbours are two spacings apart, then on top.
-std::vector<float> FillEmptyRows(std::vector<float> rows, int channels, float spacing_rad) {
-  for (std::size_t i = 1; i < rows.size() && static_cast<int>(rows.size()) < channels; ++i) {
+// Whether all channels are about as far apart (VLP-16, HDL-32, HDL-64), judged by those that point
+// at the ground and always return: how many there are in between and above can then be told by the
+// spacing. Those of a VLP-32C or a Pandar40 crowd around the horizon: there are those that are
+// seen.
+bool IsEven(std::span<const float> rows) {
+  constexpr float kDown_rad = -3.0F * kDeg;
+  constexpr std::size_t kEnough = 6;
+  const auto down = rows.first(static_cast<std::size_t>(
+      std::lower_bound(rows.begin(), rows.end(), kDown_rad) - rows.begin()));
+  return down.size() < kEnough || MeanSpacing(down) < 1.5F * MedianSpacing(down);
+}
+
+int ChannelsByCount(std::size_t rows) {
+  return rows > 38 ? 64 : (rows > 19 ? 32 : 16);  // a few too many are halves of rings
+}
+
+int ChannelsBySpacing(float spacing_rad) {
+  return spacing_rad > kSpacing16_rad ? 16 : (spacing_rad > kSpacing32_rad ? 32 : 64);
+}
+
+// Where two neighbours are two spacings apart there is one that no scan ever showed.
+void FillGaps(std::vector<float>& rows, std::size_t channels, float spacing_rad) {
+  for (std::size_t i = 1; i < rows.size() && rows.size() < channels; ++i) {
     if (rows[i] - rows[i - 1] > 1.7F * spacing_rad) {
       rows.insert(rows.begin() + static_cast<std::ptrdiff_t>(i), rows[i - 1] + spacing_rad);
     }
   }
-  while (static_cast<int>(rows.size()) < channels) {
-    rows.push_back(rows.back() + spacing_rad);
-  }
-  return rows;
 }
 
 }  // namespace
@@ -112,10 +124,11 @@ Result<SensorLayout> SensorLayoutEstimator::Estimate() const {
         "returns are in no order, or stored column after column: expected ring after ring");
   }
   std::vector<float> rows = elevation_rad_;
-  const float mean_spacing = (rows.back() - rows.front()) / static_cast<float>(rows.size() - 1);
-  const float spacing = std::min(mean_spacing, 1.2F * MedianSpacing(rows));
-  const int channels = SnapChannels(spacing, rows.size());
-  while (static_cast<int>(rows.size()) > channels) {  // halves of a ring that was cut
+  const bool is_even = IsEven(rows);
+  const float spacing = std::min(MeanSpacing(rows), 1.2F * MedianSpacing(rows));
+  const auto channels = static_cast<std::size_t>(
+      std::max(ChannelsByCount(rows.size()), is_even ? ChannelsBySpacing(spacing) : 0));
+  while (rows.size() > channels) {  // halves of a ring that was cut
     std::size_t closest = 1;
     for (std::size_t i = 2; i < rows.size(); ++i) {
       if (rows[i] - rows[i - 1] < rows[closest] - rows[closest - 1]) {
@@ -124,7 +137,13 @@ Result<SensorLayout> SensorLayoutEstimator::Estimate() const {
     }
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(closest));
   }
-  return SensorLayout{ego_, FillEmptyRows(std::move(rows), channels, spacing)};
+  if (is_even) {
+    FillGaps(rows, channels, spacing);
+  }
+  while (rows.size() < channels) {  // those that see only sky
+    rows.push_back(rows.back() + spacing);
+  }
+  return SensorLayout{ego_, std::move(rows)};
 }
 
 std::vector<int> AssignRows(const RingSplit& split, std::span<const float> elevation_rad) {

@@ -6,7 +6,7 @@
 
 #include "core/base/status.h"
 #include "core/scan/ego_box.h"
-#include "core/scan/ring_splitter.h"
+#include "core/scan/rings/ring_splitter.h"
 
 namespace atlas {
 

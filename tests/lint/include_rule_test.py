@@ -21,7 +21,8 @@ COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/outp
 ALLOWED = {
     "core/base": [],
     "core/geometry": ["core/base"],
-    "core/scan": FLOOR_1,
+    "core/scan": FLOOR_1 + ["core/scan/rings"],
+    "core/scan/rings": FLOOR_1 + ["core/scan/ego_box.h", "core/scan/fast_atan2.h", "core/scan/point_cloud.h"],
     "core/traversability": FLOOR_2,
     "core/grid": FLOOR_2,
     "core/column": FLOOR_2,

@@ -82,6 +82,21 @@ TEST(SensorLayoutTest, SnapsByAngularSpacingWhateverTheRingsSee) {
   EXPECT_EQ(Channels({Rings(16, -15, 2), 350}, WalledYard), 16);
 }
 
+TEST(SensorLayoutTest, UnevenChannelsAreThoseThatAreSeen) {
+  const SyntheticSensor vlp32c{{-25.0,  -15.639, -11.31, -8.843, -7.254, -6.148, -5.333, -4.667,
+                                -4.0,   -3.667,  -3.333, -3.0,   -2.667, -2.333, -2.0,   -1.667,
+                                -1.333, -1.0,    -0.667, -0.333, 0.0,    0.333,  0.667,  1.0,
+                                1.333,  1.667,   2.333,  3.333,  4.667,  7.0,    10.333, 15.0}};
+  SensorLayoutEstimator estimator;
+  estimator.Add(testing::Scan(vlp32c, WalledYard));
+  const Result<SensorLayout> layout = estimator.Estimate();
+  ASSERT_TRUE(layout.has_value());
+  ASSERT_EQ(layout->channels(), 32);
+  for (std::size_t row = 0; row < 32; ++row) {
+    EXPECT_NEAR(layout->elevation_rad[row], vlp32c.elevation_deg[row] * testing::kDegree, 1e-3);
+  }
+}
+
 TEST(SensorLayoutTest, ScansOfOneDriveAddUp) {
   // A scan that shows the lower rings, then one that shows all: rows are those of the second.
   SensorLayoutEstimator estimator;

@@ -1,5 +1,5 @@
 // Rings in every order that a file may have them in, and scans that have none.
-#include "core/scan/ring_splitter.h"
+#include "core/scan/rings/ring_splitter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,6 +136,25 @@ TEST(RingSplitterTest, RingsInTheSkyHaveNoRunAndMoveNoOther) {
     ExpectWellFormed(split);
     EXPECT_EQ(Strays(split, sample), 0);
     EXPECT_EQ(split.runs.size(), 11U);  // -15 to -3 on the ground, -1 to 5 on the house
+    EXPECT_EQ(split.is_bottom_first, !storage.is_top_first);
+  }
+}
+
+TEST(RingSplitterTest, AStreetThatUpperRingsSeeOnlyOnItsSidesIsCutWhereRingsBegin) {
+  // Ahead and behind there is sky above the horizon: no return there tells that a ring goes on.
+  const auto world = [](const Eigen::Vector3d& d) -> std::optional<double> {
+    const double wall_m = (d.y() > 0.0 ? 7.0 : 9.0) / std::abs(d.y());
+    const bool is_wall = wall_m * d.z() < 4.0;
+    return Nearest(GroundRange(d, 1.8), is_wall ? std::optional(wall_m) : std::nullopt);
+  };
+  for (const Storage& storage : AllStorages()) {
+    SCOPED_TRACE(::testing::Message()
+                 << storage.is_top_first << storage.is_clockwise << storage.begin_rad);
+    const Sample sample = MakeScan(Rings(16, -15, 2), storage, world);
+    const RingSplit split = SplitRings(sample.cloud, EgoBox());
+    ExpectWellFormed(split);
+    EXPECT_EQ(split.runs.size(), 16U);
+    EXPECT_EQ(Strays(split, sample), 0);
     EXPECT_EQ(split.is_bottom_first, !storage.is_top_first);
   }
 }
