@@ -75,8 +75,8 @@ struct MapProfile {
   // Beside what a later stretch says, all before it counts for this much: so that one stretch can
   // turn what many agreed on, a car that left after years, into its opposite.
   std::int16_t carry_clamp = 48;
-  // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: six hits
-  // more than misses fill it again, so that what merely follows the vehicle does not.
+  // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: below
+  // -stretch_clamp it stays there, so that what follows the vehicle leaves no trail.
   std::int16_t driven_clamp = 127;
 
   std::optional<GeodeticOrigin> origin;

@@ -1,21 +1,19 @@
 #include "tests/data/street_map.h"
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <limits>
-#include <memory>
 #include <stdexcept>
 #include <utility>
 
 #include "core/base/integer_math.h"
-#include "core/fusion/observation/keyframe_placement.h"
 #include "core/geometry/nibble.h"
-#include "core/keyframe/keyframe_builder.h"
 #include "core/tile/column_lattice.h"
+#include "core/tile/tile_codec.h"
 
 namespace atlas::testing {
 namespace {
-
-constexpr double kKeyframeSpacing_m = 1.0;
 
 template <typename T>
 T Read(Result<T> result) {
@@ -25,40 +23,25 @@ T Read(Result<T> result) {
   return *std::move(result);
 }
 
+Bytes ReadBytes(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
 }  // namespace
 
-StreetMap::StreetMap(const std::filesystem::path& folder, double sensor_height_m)
-    : drive_(Read(OpenDriveFolder(folder))), sensor_height_m_(sensor_height_m) {
-  SensorLayoutEstimator estimator;
+StreetMap::StreetMap(const std::filesystem::path& drive,
+                     const std::filesystem::path& tiles,
+                     double sensor_height_m)
+    : drive_(Read(OpenDriveFolder(drive))), sensor_height_m_(sensor_height_m) {
   for (const DriveScan& scan : drive_.scans) {
     clouds_.push_back(Read(ReadScan(scan.scan)));
-    estimator.Add(clouds_.back());
   }
-  KeyframeBuilderOptions options;
-  options.mount.height_m = sensor_height_m;
-  const KeyframeBuilder builder(profile_, Read(estimator.Estimate()), options);
-  std::map<TileId, std::vector<PlacedKeyframe>> sources;
-  const DriveScan* last = nullptr;
-  for (std::size_t i = 0; i < clouds_.size(); ++i) {
-    const DriveScan& scan = drive_.scans[i];
-    if (last != nullptr &&
-        (scan.T_world_sensor.translation() - last->T_world_sensor.translation()).norm() <
-            kKeyframeSpacing_m) {
-      continue;
+  for (const auto& entry : std::filesystem::directory_iterator(tiles)) {
+    Tile tile = Read(DecodeTile(ReadBytes(entry.path()), profile_));
+    if (tile.id.level == 0) {
+      tiles_.emplace(tile.id, std::move(tile));
     }
-    last = &scan;
-    const YawAndLevel split = SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear()));
-    const auto keyframe =
-        std::make_shared<const Keyframe>(builder.Build(clouds_[i], split.R_level_sensor));
-    const KeyframePlacement placement = Read(
-        PlaceKeyframe(QuantizedPose::FromPose(scan.T_world_sensor), keyframe->level_quaternion));
-    for (const TileId& id : FootprintTiles(placement, keyframe->grid, profile_)) {
-      sources[id].push_back(
-          {{{"car", "street"}, scan.number}, 100 * scan.number, placement, keyframe});
-    }
-  }
-  for (const auto& [id, keyframes] : sources) {
-    tiles_.emplace(id, FuseTile(id, keyframes, profile_));
   }
 }
 

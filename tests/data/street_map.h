@@ -1,4 +1,4 @@
-// A recorded street, mapped in process: front end and fusion over its keyframes.
+// A recorded street, and the tiles of its map as `atlas query -o` wrote them.
 #pragma once
 
 #include <cstdint>
@@ -6,19 +6,20 @@
 #include <map>
 #include <vector>
 
-#include "core/fusion/tile_fusion.h"
 #include "core/geometry/map_profile.h"
 #include "core/scan/drive_folder.h"
 #include "core/scan/scan_reader.h"
+#include "core/tile/tile.h"
 
 namespace atlas::testing {
 
 // World frame, metres; the drive and its map live as long as this does.
 class StreetMap {
  public:
-  // A keyframe every metre, default profile. Throws std::runtime_error where the drive is
-  // unreadable.
-  StreetMap(const std::filesystem::path& folder, double sensor_height_m);
+  // Default profile. Throws std::runtime_error where the drive or a tile is unreadable.
+  StreetMap(const std::filesystem::path& drive,
+            const std::filesystem::path& tiles,
+            double sensor_height_m);
 
   const DriveFolder& drive() const { return drive_; }
   const std::vector<PointCloud>& clouds() const { return clouds_; }

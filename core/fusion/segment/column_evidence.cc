@@ -80,9 +80,8 @@ void AddNibbles(std::uint64_t nibbles,
   const Lanes before = std::bit_cast<Lanes>(evidence);
   const Lanes usual = All(clamp.usual);
   const Lanes sum = AddSaturating(before, added, usual);
-  // Below -usual, where the vehicle was, a mere miss goes no deeper and a hit adds up from there.
-  const Lanes deep = Min(before, Lanes{}) + Max(added, Lanes{});
-  const Lanes usually = before < -usual ? deep : sum;
+  // Below -usual the vehicle itself was: for this stretch that is the last word.
+  const Lanes usually = before < -usual ? before : sum;
   const Lanes is_free = added == All(kNibbleEvidence[kNibbleFree]);
   evidence = std::bit_cast<ColumnLanes>(is_free ? -All(clamp.driven) : usually);
 }

@@ -177,15 +177,14 @@ std::uint32_t StretchSurvey::AddSegment(std::size_t cell, const Segment& segment
   return index;
 }
 
-// As columns: where the vehicle stood evidence goes deeper than misses do, and hits add up from
-// there.
+// As columns: where the vehicle stood nothing else is for the rest of the stretch.
 std::int16_t StretchSurvey::AddOccupancy(int evidence, Occupancy occupancy) const {
   if (occupancy == Occupancy::kDriven) {
     return static_cast<std::int16_t>(-clamp_.driven);
   }
   const int added = occupancy_units_[static_cast<std::size_t>(occupancy)];
-  const int lowest = std::min<int>(evidence, -clamp_.usual);
-  return static_cast<std::int16_t>(std::clamp<int>(evidence + added, lowest, clamp_.usual));
+  const int sum = std::clamp<int>(evidence + added, -clamp_.usual, clamp_.usual);
+  return static_cast<std::int16_t>(evidence < -clamp_.usual ? evidence : sum);
 }
 
 void StretchSurvey::AddEvidence(const Observation& observation,

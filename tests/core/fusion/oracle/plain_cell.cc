@@ -147,13 +147,20 @@ void PlainCell::AddTo(const PlainObservation& observation,
   const int units = observation.occupancy == Occupancy::kObstacle ? profile_.hit_units
                     : observation.occupancy == Occupancy::kFree   ? profile_.miss_units
                                                                   : 0;
-  const int floor = std::min<int>(segment.occupancy, -profile_.stretch_clamp);
-  segment.occupancy =
-      observation.occupancy == Occupancy::kDriven
-          ? -profile_.driven_clamp
-          : std::clamp<int>(segment.occupancy + units, floor, profile_.stretch_clamp);
+  if (observation.occupancy == Occupancy::kDriven) {
+    segment.occupancy = -profile_.driven_clamp;
+  } else {
+    AddUnits(units, segment.occupancy);
+  }
   if (observation.column != 0) {
     AddColumn(observation, segment);
+  }
+}
+
+// Unless the vehicle was there: that is a stretch's last word.
+void PlainCell::AddUnits(int units, int& sum) const {
+  if (sum >= -profile_.stretch_clamp) {
+    sum = std::clamp<int>(sum + units, -profile_.stretch_clamp, profile_.stretch_clamp);
   }
 }
 
@@ -166,10 +173,11 @@ void PlainCell::AddColumn(const PlainObservation& observation, Segment& segment)
     }
     int& sum = segment.column[static_cast<std::size_t>(k)];
     segment.is_seen[static_cast<std::size_t>(k)] = true;
-    const int floor = std::min<int>(sum, -profile_.stretch_clamp);
-    sum = state == kNibbleFree
-              ? -profile_.driven_clamp
-              : std::clamp<int>(sum + kNibbleEvidence[state], floor, profile_.stretch_clamp);
+    if (state == kNibbleFree) {
+      sum = -profile_.driven_clamp;
+    } else {
+      AddUnits(kNibbleEvidence[state], sum);
+    }
   }
 }
 

@@ -70,6 +70,7 @@ class PlainCell {
   bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
   Segment& SegmentFor(const PlainObservation& observation, const Nearest& nearest);
   void AddTo(const PlainObservation& observation, std::int64_t weight, Segment& segment) const;
+  void AddUnits(int units, int& sum) const;
   void AddColumn(const PlainObservation& observation, Segment& segment) const;
   void KeepLatest();
   bool IsAlone(const Segment& segment) const;
