@@ -34,6 +34,7 @@ Status PlanOptions::Validate(const MapProfile& profile) const {
       {"comfort weight", comfort_weight, 0.0, 100.0},
       {"snap radius in metres", snap_radius_m, 0.0, 50.0},
       {"snap below in metres", snap_below_m, 0.0, 50.0},
+      {"snap far below in metres", snap_far_below_m, 0.0, 50.0},
       {"snap above in metres", snap_above_m, 0.0, 50.0},
       {"waypoint spacing in metres", waypoint_spacing_m, 0.0, 1000.0},
   };

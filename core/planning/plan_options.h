@@ -34,9 +34,11 @@ struct PlanOptions {
   double comfort_weight = 1.0;
 
   // Start and goal stand on the highest surface between `snap_below_m` below the given point (which
-  // may be a sensor's) and `snap_above_m` above it, and are moved at most this far across.
+  // may be a sensor's) and `snap_above_m` above it, and are moved at most this far across. Only
+  // where none is there they may stand farther below, under a lorry's sensor: not on another deck.
   double snap_radius_m = 3.0;
   double snap_below_m = 2.5;
+  double snap_far_below_m = 4.5;
   double snap_above_m = 0.5;
 
   // Points of the found route are thinned out to this distance.

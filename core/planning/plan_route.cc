@@ -1,6 +1,7 @@
 // Snap both ends to the map, search, thin out.
 #include "core/planning/plan_route.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -23,6 +24,31 @@ class Snapper {
   // The drivable node nearest in plan; none where there is a traversable surface, but none that
   // this vehicle may stand on. kNotFound where there is no such surface at all.
   Result<NodeRef> Snap(const char* what, const Eigen::Vector3d& point) {
+    for (const double below_m : {options_.snap_below_m, options_.snap_far_below_m}) {
+      const Result<Best> best = Search(point, below_m);
+      if (!best) {
+        return Error(best.error());
+      }
+      if (best->is_anything_open) {
+        return best->ref;
+      }
+    }
+    return Error(
+        StatusCode::kNotFound,
+        StrCat("plan: no traversable surface within ", options_.snap_radius_m, " m of the ", what,
+               " (", point.x(), ", ", point.y(), ", ", point.z(), "), expected one between ",
+               std::max(options_.snap_below_m, options_.snap_far_below_m), " m below and ",
+               options_.snap_above_m, " m above it"));
+  }
+
+ private:
+  struct Best {
+    double distance_m = std::numeric_limits<double>::infinity();
+    NodeRef ref;
+    bool is_anything_open = false;
+  };
+
+  Result<Best> Search(const Eigen::Vector3d& point, double below_m) {
     const std::int64_t side = profile_.tile_cells;
     const auto cell_of = [&](double m) {
       return static_cast<std::int64_t>(std::floor(m / profile_.cell_size_m()));
@@ -34,29 +60,15 @@ class Snapper {
       for (std::int64_t tx = FloorDiv(cell_of(point.x() - reach_m), side);
            tx <= FloorDiv(cell_of(point.x() + reach_m), side); ++tx) {
         const TileId id{0, static_cast<std::int32_t>(tx), static_cast<std::int32_t>(ty)};
-        if (Status status = SearchTile(id, point, best); !status.ok()) {
+        if (Status status = SearchTile(id, point, below_m, best); !status.ok()) {
           return Error(std::move(status));
         }
       }
     }
-    if (!best.is_anything_open) {
-      return Error(
-          StatusCode::kNotFound,
-          StrCat("plan: no traversable surface within ", reach_m, " m of the ", what, " (",
-                 point.x(), ", ", point.y(), ", ", point.z(), "), expected one between ",
-                 options_.snap_below_m, " m below and ", options_.snap_above_m, " m above it"));
-    }
-    return best.ref;
+    return best;
   }
 
- private:
-  struct Best {
-    double distance_m = std::numeric_limits<double>::infinity();
-    NodeRef ref;
-    bool is_anything_open = false;
-  };
-
-  Status SearchTile(const TileId& id, const Eigen::Vector3d& point, Best& best) {
+  Status SearchTile(const TileId& id, const Eigen::Vector3d& point, double below_m, Best& best) {
     const auto slot = map_.Ready(id);
     if (!slot) {
       return slot.error();
@@ -71,7 +83,7 @@ class Snapper {
       if (distance_m > options_.snap_radius_m || distance_m >= best.distance_m) {
         continue;
       }
-      const NodeRef ref = Standing(used, cell, point.z());
+      const NodeRef ref = Standing(used, cell, point.z(), below_m);
       if (ref.is_none() || !map_.node(ref).Has(SurfaceNode::kOpen)) {
         continue;
       }
@@ -95,12 +107,12 @@ class Snapper {
   }
 
   // The highest surface of the cell that a point at this height may stand on.
-  NodeRef Standing(std::uint32_t slot, std::size_t cell, double z_m) {
+  NodeRef Standing(std::uint32_t slot, std::size_t cell, double z_m, double below_m) {
     const SurfaceTile& tile = map_.tile(slot);
     NodeRef ref;
     for (std::uint32_t i = tile.cell_begin[cell]; i < tile.cell_begin[cell + 1]; ++i) {
       const double above_m = 1e-3 * tile.nodes[i].altitude_mm - z_m;
-      if (above_m <= options_.snap_above_m && above_m >= -options_.snap_below_m) {
+      if (above_m <= options_.snap_above_m && above_m >= -below_m) {
         ref = {slot, i};
       }
     }

@@ -57,7 +57,7 @@ TEST(PlanLimitsTest, NoSurfaceAtAnEndIsNotFoundAndSaysWhich) {
   const Status start = plan({-50.0, 0.0, 0.0}, world.goal());
   EXPECT_EQ(start.code(), StatusCode::kNotFound);
   EXPECT_NE(start.message().find("start"), std::string::npos) << start.message();
-  const Status goal = plan(world.start(), world.goal() + Eigen::Vector3d(0.0, 0.0, 4.0));
+  const Status goal = plan(world.start(), world.goal() + Eigen::Vector3d(0.0, 0.0, 5.0));
   EXPECT_EQ(goal.code(), StatusCode::kNotFound);
   EXPECT_NE(goal.message().find("goal"), std::string::npos) << goal.message();
 }

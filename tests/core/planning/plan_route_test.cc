@@ -71,6 +71,37 @@ TEST(PlanRouteTest, PointsOfASensorStandOnTheSurfaceBelow) {
   EXPECT_NEAR(route->waypoints.back().z(), 0.0, 1e-9);
 }
 
+TEST(PlanRouteTest, PointsOfALorrysSensorStandFartherBelowButNotOnAnotherDeck) {
+  const auto plan = [](TinyWorld& world, double height_m) {
+    const Eigen::Vector3d sensor(0.0, 0.0, height_m);
+    return PlanRoute(world, world.profile(), {world.start() + sensor, world.goal() + sensor, {}});
+  };
+  TinyWorld yard;
+  yard.Draw(kCorridor, 0.0);
+  for (const double height_m : {1.0, 3.0, 4.4}) {
+    const auto route = plan(yard, height_m);
+    ASSERT_TRUE(route.has_value()) << height_m;
+    EXPECT_TRUE(route->found) << height_m;
+  }
+  const auto refused = plan(yard, 5.0);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code(), StatusCode::kNotFound);
+  // Its own deck has a hole right below it: the vehicle is moved across, not down to the next one.
+  TinyWorld decks;
+  decks.Draw(kCorridor, 0.0);
+  decks.Draw({"........................",  //
+              "........................",  //
+              " .S..................G..",  //
+              "........................",  //
+              "........................"},
+             2.6);
+  const auto route = PlanRoute(decks, decks.profile(),
+                               {decks.start() + Eigen::Vector3d(-1.0, 0.0, 1.5), decks.goal(), {}});
+  ASSERT_TRUE(route.has_value());
+  ASSERT_TRUE(route->found);
+  EXPECT_NEAR(route->waypoints.front().z(), 2.6, 1e-9);
+}
+
 // Deck 0 in the west, a ramp from x = 5 m to x = 15 m, deck 1 in the east.
 TinyWorld TwoDecks(double ramp_deg) {
   TinyWorld decks;
