@@ -32,7 +32,7 @@ Result<std::vector<std::string>> ReadLines(const fs::path& path) {
       lines.back().push_back(static_cast<char>(byte));
     }
   }
-  while (!lines.empty() && lines.back().empty()) {
+  while (!lines.empty() && lines.back().find_first_not_of(" \t") == std::string::npos) {
     lines.pop_back();
   }
   return lines;

@@ -80,6 +80,10 @@ Result<Settings> ReadConfigFile(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, ignored)) {
     return Error(StatusCode::kNotFound, StrCat("there is no file ", path.string()));
   }
+  if (std::filesystem::is_directory(path, ignored)) {  // which toml++ takes for an empty file
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat(path.string(), " is a folder: expected a file"));
+  }
   Settings settings;
   try {
     const toml::table table = toml::parse_file(path.string());

@@ -62,6 +62,13 @@ TEST_F(DriveFolderTest, ScansBelongToTheLineOfTheirNumber) {
   EXPECT_FALSE(drive->scans[0].label.has_value());
 }
 
+TEST_F(DriveFolderTest, BlankLinesAtTheEndAreNoPoses) {
+  Write("poses.txt", std::string(kIdentity) + kIdentity + "\r\n  \t\n\n");
+  const Result<std::vector<Pose>> poses = ReadPoses(folder_ / "poses.txt");
+  ASSERT_TRUE(poses.has_value()) << poses.error().message();
+  EXPECT_EQ(poses->size(), 2U);
+}
+
 TEST_F(DriveFolderTest, MissingAndShortFilesAreNamed) {
   EXPECT_EQ(OpenDriveFolder(folder_ / "nowhere").error().code(), StatusCode::kNotFound);
   EXPECT_EQ(OpenDriveFolder(folder_).error().code(), StatusCode::kInvalidData);  // no scan

@@ -115,6 +115,11 @@ TEST_F(DaemonConfigTest, AnUnknownKeyIsAnErrorWithItsLine) {
               HasSubstr("unknown key 'map.deep'"));
 }
 
+TEST_F(DaemonConfigTest, AFolderIsNoConfigurationFile) {
+  EXPECT_THAT(Refusal({"--config", std::filesystem::temp_directory_path().string()}),
+              HasSubstr("is a folder"));
+}
+
 TEST_F(DaemonConfigTest, AValueOfAnotherTypeIsAnErrorWithItsLine) {
   EXPECT_THAT(RefusedFile("data = '/x'\nworkers = '3'\n"),
               HasSubstr("line 2: 'workers': expected a number"));

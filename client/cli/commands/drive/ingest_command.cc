@@ -78,6 +78,10 @@ class IngestCommand : public Command {
     if (!client) return client.error();
     const Result<IngestReport> report = Ingest(*drive, *client, context);
     if (!report) return report.error();
+    if (report->keyframes == 0) {
+      context.err << "note: none of the drive's " << drive->scans.size()
+                  << " scans is selected (--range, --scans)\n";
+    }
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     if (context.is_json) {
       context.PrintJson(ReportJson(*report, wall.count()));

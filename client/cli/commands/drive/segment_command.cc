@@ -57,7 +57,8 @@ class SegmentCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt, optional labels/NNNNNN.label");
     arguments.Optional("--threshold", "T", threshold_m_,
-                       "Distance from a plane that is still ground, metres [0.12]");
+                       StrCat("Distance from a plane that is still ground, metres [",
+                              FixedText(threshold_m_, 2), "]"));
     arguments.Flag("--curbs", with_curbs_, "Score kerbs too: the border of road and sidewalk");
     arguments.Choice("--mode", {"paper", "atlas"}, mode_, "The paper's rules, or ours");
   }
