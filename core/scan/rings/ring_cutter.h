@@ -23,7 +23,7 @@ class RingCutter {
   // Rings close: they end at the slope with which they began, a turn before, and not with which the
   // next one begins. How many more do than do not.
   int score() const { return 2 * closed_ - borders_; }
-  // Of KITTI's rings 94 to 100 % close where they begin, and 88 % at most anywhere else.
+  // Of KITTI's rings 94 to 100 % close where they begin, and 86 % at most anywhere else.
   bool IsOrigin() const { return 100 * closed_ > 93 * borders_; }
 
  private:
