@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "core/localization/map_window.h"
 #include "core/localization/pose_search.h"
+#include "core/localization/window/map_window.h"
 
 namespace atlas {
 

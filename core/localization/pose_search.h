@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
-#include "core/localization/map_window.h"
 #include "core/localization/scan_features.h"
+#include "core/localization/window/map_window.h"
 
 namespace atlas {
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/localization/map_window.h"
+#include "core/localization/window/map_window.h"
 #include "tests/core/localization/painted_map.h"
 
 namespace atlas {

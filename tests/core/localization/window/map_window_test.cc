@@ -1,4 +1,4 @@
-#include "core/localization/map_window.h"
+#include "core/localization/window/map_window.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,146 @@
+#include "core/localization/window/map_window.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/geometry/nibble.h"
+
+namespace atlas {
+namespace {
+
+struct Corner {
+  std::int64_t x;
+  std::int64_t y;
+};
+
+// Whether a square of cells touches the window's [0, side)^2. Tiles elsewhere may be so far that 32
+// bits would bring their cells back.
+bool Overlaps(const Corner& first, std::int64_t length, std::int64_t side) {
+  return first.x > -length && first.x < side && first.y > -length && first.y < side;
+}
+
+bool IsMeasured(const TileLayer& layer) {
+  return (layer.flags & TileLayer::kMeasured) != 0;
+}
+
+}  // namespace
+
+// What the tiles hold of a window.
+struct MapWindow::Content {
+  SegmentMasks masks;
+  std::vector<std::pair<std::uint32_t, float>> surfaces;  // by cell and height
+
+  void AddColumn(const TileLayer& layer,
+                 std::size_t cell,
+                 const WindowGrid& grid,
+                 const MapProfile& profile,
+                 const MapWindowOptions& options) {
+    const std::int64_t base = ColumnBaseIndex(layer.altitude_mm, profile) - grid.first_segment();
+    for (int k = 0; k < profile.column_segments; ++k) {
+      const std::int64_t bit = base + k;
+      const std::uint8_t nibble = NibbleAt(layer.column, k);
+      if (nibble == 0 || bit < 0 || bit >= WindowGrid::kSegments) {
+        continue;
+      }
+      if (nibble >= options.occupied_nibble) {
+        masks.occupied[cell] |= std::uint64_t{1} << bit;
+      } else if (nibble <= options.free_nibble) {
+        masks.free[cell] |= std::uint64_t{1} << bit;
+      }
+    }
+  }
+
+  void AddCell(std::span<const TileLayer> layers,
+               std::size_t cell,
+               const WindowGrid& grid,
+               const MapProfile& profile,
+               const MapWindowOptions& options) {
+    const bool is_any_measured = std::any_of(layers.begin(), layers.end(), IsMeasured);
+    for (const TileLayer& layer : layers) {
+      if (is_any_measured && !IsMeasured(layer)) {
+        continue;  // what stands there does so at a guessed height
+      }
+      if (layer.is_traversable() && IsMeasured(layer)) {
+        surfaces.emplace_back(static_cast<std::uint32_t>(cell),
+                              static_cast<float>(layer.altitude_mm * 1e-3 - grid.origin().z()));
+      }
+      AddColumn(layer, cell, grid, profile, options);
+    }
+  }
+};
+
+MapWindow::Content MapWindow::Collect(const WindowGrid& grid,
+                                      const MapProfile& profile,
+                                      std::span<const Tile* const> tiles,
+                                      const MapWindowOptions& options) {
+  Content content;
+  content.masks.occupied.assign(grid.size(), 0);
+  content.masks.free.assign(grid.size(), 0);
+  for (const Tile* tile : tiles) {
+    const std::int64_t left = std::int64_t{tile->id.x} * profile.tile_cells - grid.first_x();
+    const std::int64_t low = std::int64_t{tile->id.y} * profile.tile_cells - grid.first_y();
+    if (!Overlaps({left, low}, profile.tile_cells, grid.side())) {
+      continue;
+    }
+    for (std::int32_t j = 0; j < profile.tile_cells; ++j) {
+      for (std::int32_t i = 0; i < profile.tile_cells; ++i) {
+        const WindowCell cell{static_cast<std::int32_t>(left + i),
+                              static_cast<std::int32_t>(low + j)};
+        if (grid.Contains(cell)) {
+          content.AddCell(tile->Layers(static_cast<std::size_t>(j * profile.tile_cells + i)),
+                          grid.Index(cell), grid, profile, options);
+        }
+      }
+    }
+  }
+  return content;
+}
+
+MapWindow::MapWindow(const MapProfile& profile,
+                     std::span<const Tile* const> tiles,
+                     const Eigen::Vector3d& center,
+                     double radius_m,
+                     const MapWindowOptions& options)
+    : MapWindow(profile,
+                WindowGrid(profile, center, radius_m),
+                Collect(WindowGrid(profile, center, radius_m), profile, tiles, options),
+                options) {}
+
+MapWindow::MapWindow(const MapProfile& profile,
+                     const WindowGrid& grid,
+                     Content content,
+                     const MapWindowOptions& options)
+    : grid_(grid),
+      slab_m_(static_cast<float>(profile.slab_margin_mm) * 1e-3F),
+      columns_(grid_, std::move(content.masks), options.lines),
+      surfaces_(grid_, std::move(content.surfaces), options.slope_baseline_m) {}
+
+bool MapWindow::IsMapped(const Eigen::Vector3f& p) const {
+  const WindowCell cell = grid_.CellAt(p.head<2>());
+  return grid_.Contains(cell) && !surfaces_.Of(grid_.Index(cell)).empty();
+}
+
+bool MapWindow::IsFree(const Eigen::Vector3f& p) const {
+  constexpr float kReach_m = 0.1F;  // what stands at a segment's edge may be counted beside it
+  const WindowCell cell = grid_.CellAt(p.head<2>());
+  const int lower = grid_.SegmentAt(p.z() - kReach_m);
+  const int upper = grid_.SegmentAt(p.z() + kReach_m);
+  if (!grid_.Contains(cell) || lower < 0 || upper < 0) {
+    return false;
+  }
+  const std::size_t index = grid_.Index(cell);
+  const auto surfaces = surfaces_.Of(index);
+  return columns_.IsFree(index, lower) && columns_.IsFree(index, upper) &&
+         std::none_of(surfaces.begin(), surfaces.end(), [&](const SurfacePlane& surface) {
+           return p.z() < surface.z_m && p.z() > surface.z_m - slab_m_;
+         });
+}
+
+bool MapWindow::IsOccupied(const Eigen::Vector3f& p) const {
+  const int segment = grid_.SegmentAt(p.z());
+  const WindowCell cell = grid_.CellAt(p.head<2>());
+  return segment >= 0 && grid_.Contains(cell) && columns_.IsOccupied(grid_.Index(cell), segment);
+}
+
+}  // namespace atlas

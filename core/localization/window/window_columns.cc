@@ -1,0 +1,153 @@
+#include "core/localization/window/window_columns.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+namespace atlas {
+namespace {
+
+constexpr std::int32_t kBlockCells = 16;
+
+}  // namespace
+
+WindowColumns::WindowColumns(const WindowGrid& grid,
+                             SegmentMasks masks,
+                             const ColumnLineOptions& options)
+    : masks_(std::move(masks)) {
+  IndexBlocks(grid);
+  FitLines(grid, options);
+}
+
+const ColumnLine* WindowColumns::NearestLine(const WindowGrid& grid,
+                                             const Eigen::Vector3f& p,
+                                             float radius_m) const {
+  const int segment = grid.SegmentAt(p.z());
+  if (segment < 0) {
+    return nullptr;
+  }
+  const WindowCell cell = grid.CellAt(p.head<2>());
+  const auto reach = static_cast<std::int32_t>(std::ceil(radius_m / grid.cell_size_m()));
+  const std::uint64_t bit = std::uint64_t{1} << segment;
+  if (reach <= kBlockCells && grid.Contains(cell) && (NearMask(cell) & bit) == 0) {
+    return nullptr;
+  }
+  const std::int32_t last = grid.side() - 1;
+  float best = radius_m * radius_m;
+  std::size_t best_cell = grid.size();
+  for (std::int32_t y = std::max(0, cell.y - reach); y <= std::min(last, cell.y + reach); ++y) {
+    for (std::int32_t x = std::max(0, cell.x - reach); x <= std::min(last, cell.x + reach); ++x) {
+      const std::size_t index = grid.Index({x, y});
+      if ((masks_.occupied[index] & bit) == 0) {
+        continue;
+      }
+      const float distance = (grid.Center({x, y}) - p.head<2>()).squaredNorm();
+      if (distance < best) {
+        best = distance;
+        best_cell = index;
+      }
+    }
+  }
+  return best_cell == grid.size() ? nullptr : &LineAt(best_cell, segment);
+}
+
+void WindowColumns::IndexBlocks(const WindowGrid& grid) {
+  side_blocks_ = grid.side() / kBlockCells + 1;
+  near_masks_.assign(
+      static_cast<std::size_t>(side_blocks_) * static_cast<std::size_t>(side_blocks_), 0);
+  const auto add = [this](std::int32_t x, std::int32_t y, std::uint64_t mask) {
+    for (std::int32_t j = std::max(0, y - 1); j <= std::min(side_blocks_ - 1, y + 1); ++j) {
+      for (std::int32_t i = std::max(0, x - 1); i <= std::min(side_blocks_ - 1, x + 1); ++i) {
+        near_masks_[static_cast<std::size_t>(j * side_blocks_ + i)] |= mask;
+      }
+    }
+  };
+  for (std::int32_t y = 0; y < grid.side(); ++y) {
+    for (std::int32_t x = 0; x < grid.side(); ++x) {
+      if (const std::uint64_t mask = masks_.occupied[grid.Index({x, y})]; mask != 0) {
+        add(x / kBlockCells, y / kBlockCells, mask);
+      }
+    }
+  }
+}
+
+void WindowColumns::FitLines(const WindowGrid& grid, const ColumnLineOptions& options) {
+  first_line_.assign(grid.size(), 0);
+  for (std::int32_t y = 0; y < grid.side(); ++y) {
+    for (std::int32_t x = 0; x < grid.side(); ++x) {
+      const std::size_t index = grid.Index({x, y});
+      first_line_[index] = static_cast<std::uint32_t>(lines_.size());
+      for (std::uint64_t mask = masks_.occupied[index]; mask != 0; mask &= mask - 1) {
+        lines_.push_back(FitLine(grid, {x, y}, std::countr_zero(mask), options));
+      }
+    }
+  }
+}
+
+ColumnLine WindowColumns::FitLine(const WindowGrid& grid,
+                                  WindowCell cell,
+                                  int segment,
+                                  const ColumnLineOptions& options) const {
+  const auto reach = static_cast<std::int32_t>(std::lround(options.radius_m / grid.cell_size_m()));
+  float count = 0.0F;
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  Eigen::Matrix2f squares = Eigen::Matrix2f::Zero();
+  for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+    for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+      const WindowCell other{cell.x + dx, cell.y + dy};
+      if (dx * dx + dy * dy <= reach * reach && grid.Contains(other) &&
+          IsOccupied(grid.Index(other), segment)) {
+        const Eigen::Vector2f offset(static_cast<float>(dx), static_cast<float>(dy));
+        count += 1.0F;
+        sum += offset;
+        squares += offset * offset.transpose();
+      }
+    }
+  }
+  const Eigen::Vector2f mean = sum / count;
+  const Eigen::Matrix2f spread = squares / count - mean * mean.transpose();
+  // Closed-form eigenvectors of a symmetric 2x2 matrix: half the angle of (xx - yy, 2 xy).
+  const float difference = spread(0, 0) - spread(1, 1);
+  const float root = std::hypot(difference, 2.0F * spread(0, 1));
+  const float trace = spread.trace();
+  const float angle = 0.5F * std::atan2(2.0F * spread(0, 1), difference);
+  ColumnLine line;
+  line.normal = {-std::sin(angle), std::cos(angle)};
+  line.is_wall = count >= 3.0F && (trace - root) < options.max_ratio * (trace + root);
+  line.center = grid.Center(cell);
+  if (line.is_wall) {
+    line.center += grid.cell_size_m() * mean;
+    FindFreeSide(grid, segment, options.free_side_m, line);
+  }
+  return line;
+}
+
+void WindowColumns::FindFreeSide(const WindowGrid& grid,
+                                 int segment,
+                                 float away_m,
+                                 ColumnLine& line) const {
+  const auto is_free_at = [&](const Eigen::Vector2f& p) {
+    const WindowCell cell = grid.CellAt(p);
+    return grid.Contains(cell) && IsFree(grid.Index(cell), segment);
+  };
+  const Eigen::Vector2f arm = away_m * line.normal;
+  const bool is_free_before = is_free_at(line.center + arm);
+  const bool is_free_behind = is_free_at(line.center - arm);
+  line.is_one_sided = is_free_before != is_free_behind;
+  if (line.is_one_sided && is_free_behind) {
+    line.normal = -line.normal;
+  }
+}
+
+std::uint64_t WindowColumns::NearMask(WindowCell cell) const {
+  return near_masks_[static_cast<std::size_t>((cell.y / kBlockCells) * side_blocks_ +
+                                              cell.x / kBlockCells)];
+}
+
+const ColumnLine& WindowColumns::LineAt(std::size_t cell, int segment) const {
+  const std::uint64_t below = masks_.occupied[cell] & ((std::uint64_t{1} << segment) - 1);
+  return lines_[first_line_[cell] + static_cast<std::size_t>(std::popcount(below))];
+}
+
+}  // namespace atlas

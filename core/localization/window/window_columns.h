@@ -1,0 +1,77 @@
+// What the columns of a map window say: occupied and free segments, and the occupied ones as
+// vertical lines with horizontal normals.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/localization/window/window_grid.h"
+
+namespace atlas {
+
+struct ColumnLineOptions {
+  float radius_m = 0.7F;     // neighbourhood that a line's normal comes from
+  float max_ratio = 0.35F;   // smaller over larger spread: a wall; above: a pole or a bush
+  float free_side_m = 0.5F;  // before a wall's face it is free, this far from it
+};
+
+// An occupied segment: where the structure around it stands, in the window's plane.
+struct ColumnLine {
+  Eigen::Vector2f center = Eigen::Vector2f::Zero();  // of the neighbourhood, window frame, metres
+  Eigen::Vector2f normal = Eigen::Vector2f::UnitX();
+  bool is_wall = false;  // only the distance along the normal counts
+  // A wall of which one face was mapped: free space lies before it, along the normal, and nothing
+  // is known behind it. Who sees it is before it.
+  bool is_one_sided = false;
+
+  bool CanBeSeenFrom(const Eigen::Vector2f& sensor) const {
+    return !is_one_sided || normal.dot(sensor - center) > 0.0F;
+  }
+};
+
+// One word a cell, bit k its segment k (WindowGrid).
+struct SegmentMasks {
+  std::vector<std::uint64_t> occupied;
+  std::vector<std::uint64_t> free;
+};
+
+class WindowColumns {
+ public:
+  WindowColumns(const WindowGrid& grid, SegmentMasks masks, const ColumnLineOptions& options);
+
+  std::size_t lines() const { return lines_.size(); }
+  const std::vector<std::uint64_t>& occupied() const { return masks_.occupied; }
+  bool IsOccupied(std::size_t cell, int segment) const {
+    return ((masks_.occupied[cell] >> segment) & 1) != 0;
+  }
+  bool IsFree(std::size_t cell, int segment) const {
+    return ((masks_.free[cell] >> segment) & 1) != 0;
+  }
+  // The line nearest to `p` (window frame) at its height, within `radius_m`; null without one.
+  const ColumnLine* NearestLine(const WindowGrid& grid,
+                                const Eigen::Vector3f& p,
+                                float radius_m) const;
+
+ private:
+  void IndexBlocks(const WindowGrid& grid);
+  void FitLines(const WindowGrid& grid, const ColumnLineOptions& options);
+  ColumnLine FitLine(const WindowGrid& grid,
+                     WindowCell cell,
+                     int segment,
+                     const ColumnLineOptions& options) const;
+  void FindFreeSide(const WindowGrid& grid, int segment, float away_m, ColumnLine& line) const;
+  std::uint64_t NearMask(WindowCell cell) const;
+  const ColumnLine& LineAt(std::size_t cell, int segment) const;
+
+  SegmentMasks masks_;
+  // Occupied segments of a block of cells and its eight neighbours: most of what is looked for
+  // stands nowhere near.
+  std::vector<std::uint64_t> near_masks_;
+  std::int32_t side_blocks_ = 0;
+  std::vector<std::uint32_t> first_line_;  // by cell: index of its lowest occupied segment's line
+  std::vector<ColumnLine> lines_;
+};
+
+}  // namespace atlas
