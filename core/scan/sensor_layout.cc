@@ -65,9 +65,32 @@ float MeanSpacing(std::span<const float> sorted) {
 bool IsEven(std::span<const float> rows) {
   constexpr float kDown_rad = -3.0F * kDeg;
   constexpr std::size_t kEnough = 6;
+  constexpr float kWidestGap = 2.5F;  // of the median: one channel may be dead
   const auto down = rows.first(static_cast<std::size_t>(
       std::lower_bound(rows.begin(), rows.end(), kDown_rad) - rows.begin()));
-  return down.size() < kEnough || MeanSpacing(down) < 1.5F * MedianSpacing(down);
+  if (down.size() < kEnough) {
+    return true;
+  }
+  const float most = kWidestGap * MedianSpacing(down);
+  for (std::size_t i = 1; i < down.size(); ++i) {
+    if (down[i] - down[i - 1] > most) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Without the rows that halves of rings made: they lie closer to another than rings do.
+std::vector<float> WithoutHalves(std::span<const float> rows) {
+  constexpr float kHalf = 0.4F;
+  const float least = kHalf * MedianSpacing(rows);
+  std::vector<float> kept{rows.front()};
+  for (const float row : rows.subspan(1)) {
+    if (row - kept.back() >= least) {
+      kept.push_back(row);
+    }
+  }
+  return kept;
 }
 
 int ChannelsByCount(std::size_t rows) {
@@ -123,7 +146,7 @@ Result<SensorLayout> SensorLayoutEstimator::Estimate() const {
         StatusCode::kInvalidData,
         "returns are in no order, or stored column after column: expected ring after ring");
   }
-  std::vector<float> rows = elevation_rad_;
+  std::vector<float> rows = WithoutHalves(elevation_rad_);
   const bool is_even = IsEven(rows);
   const float spacing = std::min(MeanSpacing(rows), 1.2F * MedianSpacing(rows));
   const auto channels = static_cast<std::size_t>(

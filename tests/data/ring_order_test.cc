@@ -21,6 +21,7 @@ namespace atlas {
 namespace {
 
 constexpr std::size_t kScans = 4;
+constexpr std::size_t kManyScans = 60;        // rows that are none add up over a drive
 const EgoBox kNoVehicle{-1.0F, -1.0F, 0.0F};  // left out before the scan is turned
 
 struct Storage {
@@ -34,10 +35,11 @@ struct Stored {
   std::vector<int> row;  // of each return, as the recorded order has it
 };
 
-std::vector<PointCloud> ReadScans(const DriveFolder& drive) {
+std::vector<PointCloud> ReadScans(const DriveFolder& drive, std::size_t most) {
   std::vector<PointCloud> clouds;
-  for (std::size_t i = 0; i < kScans; ++i) {
-    Result<PointCloud> cloud = ReadScan(drive.scans[i * drive.scans.size() / kScans].scan);
+  const std::size_t count = std::min(most, drive.scans.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    Result<PointCloud> cloud = ReadScan(drive.scans[i * drive.scans.size() / count].scan);
     EXPECT_TRUE(cloud) << cloud.error().message();
     clouds.push_back(cloud ? std::move(*cloud) : PointCloud());
   }
@@ -91,23 +93,65 @@ double Misplaced(const std::vector<PointCloud>& clouds,
   return static_cast<double>(misplaced) / static_cast<double>(all);
 }
 
-class RingOrderTest : public ::testing::TestWithParam<const char*> {};
-
-TEST_P(RingOrderTest, HowADriveIsStoredChangesNoRow) {
-  const char* data = std::getenv("ATLAS_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
-  const std::filesystem::path folder =
-      std::filesystem::path(data == nullptr ? "" : data) / GetParam();
-  if (!std::filesystem::is_directory(folder)) {
-    GTEST_SKIP() << GetParam() << " is not in $ATLAS_DATA";
+// The returns of every so-many-th channel: as a sensor of fewer rings would have stored them.
+PointCloud KeepRows(const PointCloud& cloud, const SensorLayout& layout, int step, int first) {
+  const RingSplit split = SplitRings(cloud, layout.ego);
+  const std::vector<int> rows = AssignRows(split, layout.elevation_rad);
+  PointCloud kept;
+  for (std::size_t k = 0; k < split.runs.size(); ++k) {
+    for (std::uint32_t i = split.runs[k].begin; rows[k] % step == first && i < split.runs[k].end;
+         ++i) {
+      kept.points.push_back(cloud.points[split.index[i]]);
+    }
   }
-  const Result<DriveFolder> drive = OpenDriveFolder(folder);
-  ASSERT_TRUE(drive) << drive.error().message();
-  const std::vector<PointCloud> clouds = ReadScans(*drive);
+  return kept;
+}
+
+Result<SensorLayout> LayoutOf(const std::vector<PointCloud>& clouds) {
   SensorLayoutEstimator estimator;
   for (const PointCloud& cloud : clouds) {
     estimator.Add(cloud);
   }
-  const Result<SensorLayout> layout = estimator.Estimate();
+  return estimator.Estimate();
+}
+
+class RingOrderTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const char* data = std::getenv("ATLAS_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
+    const std::filesystem::path folder =
+        std::filesystem::path(data == nullptr ? "" : data) / GetParam();
+    if (!std::filesystem::is_directory(folder)) {
+      GTEST_SKIP() << GetParam() << " is not in $ATLAS_DATA";
+    }
+    Result<DriveFolder> drive = OpenDriveFolder(folder);
+    ASSERT_TRUE(drive) << drive.error().message();
+    drive_ = std::move(*drive);
+  }
+
+  DriveFolder drive_;
+};
+
+TEST_P(RingOrderTest, EverySoManyThRingIsASensorOfThatManyRings) {
+  const std::vector<PointCloud> clouds = ReadScans(drive_, kManyScans);
+  const Result<SensorLayout> layout = LayoutOf(clouds);
+  ASSERT_TRUE(layout) << layout.error().message();
+  for (int step = 2; layout->channels() / step >= 16; step *= 2) {
+    for (int first = 0; first < step; ++first) {
+      std::vector<PointCloud> kept;
+      for (const PointCloud& cloud : clouds) {
+        kept.push_back(KeepRows(cloud, *layout, step, first));
+      }
+      const Result<SensorLayout> found = LayoutOf(kept);
+      ASSERT_TRUE(found) << found.error().message();
+      EXPECT_EQ(found->channels(), layout->channels() / step) << "from ring " << first;
+    }
+  }
+}
+
+TEST_P(RingOrderTest, HowADriveIsStoredChangesNoRow) {
+  const std::vector<PointCloud> clouds = ReadScans(drive_, kScans);
+  const Result<SensorLayout> layout = LayoutOf(clouds);
   ASSERT_TRUE(layout) << layout.error().message();
   for (const double turned_deg : {0.0, 10.0, 45.0, 90.0, 180.0, 250.0, 350.0}) {
     for (int bits = 0; bits < 4; ++bits) {
