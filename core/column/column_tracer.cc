@@ -149,7 +149,8 @@ std::uint64_t ColumnFromMasks(
   return (states & kLowBits) * kNibbleHit + ((states >> 1) & kLowBits) * kNibbleMiss;
 }
 
-// The vehicle's own cells: free from the ground to the sensor, whatever was traced there.
+// The vehicle's own cells: free from the ground to the sensor, whatever was traced there, and
+// nearly so right above it, where the heads of those are that follow.
 void MarkBody(const GridGeometry& grid,
               const ColumnOptions& options,
               const HalfSegments& halves,
@@ -162,8 +163,10 @@ void MarkBody(const GridGeometry& grid,
                                                 grid, options.block_cells)];
       const std::uint64_t body =
           SpreadToNibbles(halves.From(anchor, halves.BelowSensor())) & kLowBits;
-      result.columns[cell] =
-          LowNibbles((result.columns[cell] & ~(body * 15)) | body * kNibbleFree, options.segments);
+      const std::uint64_t above = SpreadToNibbles(halves.From(anchor, halves.Bit(0))) & kLowBits;
+      result.columns[cell] = LowNibbles((result.columns[cell] & ~((body | above) * 15)) |
+                                            body * kNibbleFree | above * kNibbleOver,
+                                        options.segments);
     }
   });
 }

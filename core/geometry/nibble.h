@@ -16,6 +16,7 @@ inline constexpr std::uint8_t kNibbleMiss =
     6;  // rays passed and none returned: p = 0.39 (paper: 0.4)
 
 inline constexpr std::uint8_t kNibbleFree = 1;  // the vehicle itself was there: p = 0.1
+inline constexpr std::uint8_t kNibbleOver = 2;  // right above the vehicle: p = 0.16
 
 inline constexpr int kEvidenceLimit = 64;
 

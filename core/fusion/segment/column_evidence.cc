@@ -80,10 +80,18 @@ void AddNibbles(std::uint64_t nibbles,
   const Lanes before = std::bit_cast<Lanes>(evidence);
   const Lanes usual = All(clamp.usual);
   const Lanes sum = AddSaturating(before, added, usual);
-  // Below -usual the vehicle itself was: for this stretch that is the last word.
-  const Lanes usually = before < -usual ? before : sum;
+  // Where the vehicle itself was is for this stretch the last word; right above it a mere miss goes
+  // no deeper, and a hit adds up.
+  const Lanes driven = -All(clamp.driven);
+  const Lanes is_deep = before < -usual;
+  const Lanes deep = Min(before, Lanes{}) + Max(added, Lanes{});
+  const Lanes usually = is_deep ? deep : sum;
+  const Lanes is_over = added == All(kNibbleEvidence[kNibbleOver]);
+  const Lanes said = is_over ? driven + All(1) : usually;
   const Lanes is_free = added == All(kNibbleEvidence[kNibbleFree]);
-  evidence = std::bit_cast<ColumnLanes>(is_free ? -All(clamp.driven) : usually);
+  evidence = std::bit_cast<ColumnLanes>(is_free                          ? driven
+                                        : (is_deep & (before == driven)) ? before
+                                                                         : said);
 }
 
 int FoldEvidence(int sum, int said, const FoldClamp& clamp) {

@@ -18,8 +18,10 @@ constexpr std::int32_t ColumnMargin(std::int32_t column_segments) {
 
 // Where a stretch's evidence saturates; at most 127.
 struct EvidenceClamp {
-  std::int8_t usual;   // at +- this
-  std::int8_t driven;  // kNibbleFree puts it at - this, for good if that is deeper than -usual
+  std::int8_t usual;  // at +- this
+  // kNibbleFree puts it at - this, for good if that is deeper than -usual; kNibbleOver one short of
+  // it, and hits add up from there.
+  std::int8_t driven;
 };
 
 // Adds the evidence of a keyframe's nibbles, the lowest of them to value `offset`; what would come

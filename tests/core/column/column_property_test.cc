@@ -69,14 +69,19 @@ void ForEachSegment(const ColumnWorld& world, const Visit& visit) {
   }
 }
 
-TEST(ColumnPropertyTest, NothingButHitMissFreeAndUnknownIsSaid) {
+TEST(ColumnPropertyTest, NothingButHitMissFreeOverAndUnknownIsSaid) {
   std::mt19937 random(91);
   for (const Shape& shape : kShapes) {
     const ColumnWorld world = RandomWorld(shape, random);
     std::set<int> states;
     ForEachSegment(world,
                    [&](std::int32_t, std::int32_t, int, int state) { states.insert(state); });
+    const bool is_over_said = states.erase(kNibbleOver) > 0;
     EXPECT_EQ(states, (std::set<int>{0, kNibbleFree, kNibbleMiss, kNibbleHit})) << shape.height_m;
+    const float reach_m = static_cast<float>(shape.segments) * shape.height_m;
+    if (reach_m < 1.7F || reach_m > 3.0F) {  // columns end below the sensor, or above
+      EXPECT_EQ(is_over_said, reach_m > 3.0F) << shape.height_m;
+    }
   }
 }
 

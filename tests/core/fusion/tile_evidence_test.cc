@@ -78,6 +78,27 @@ TEST(TileEvidenceTest, WhereTheVehicleStoodOneCanDrive) {
   EXPECT_EQ(OccupancyOf({{driven}, Session("b", 100, Occupancy::kObstacle)}), 64 - 48);
 }
 
+TEST(TileEvidenceTest, WhatFollowsTheVehicleLeavesNothingBehind) {
+  // Lower segment: the vehicle itself. Upper one: right above it, which a ceiling fills, and no
+  // head.
+  const auto column_after = [](std::uint32_t hits_before, std::uint32_t hits_after) {
+    std::vector<PlacedKeyframe> keyframes;
+    const auto add = [&](std::uint64_t column) {
+      const auto sequence = static_cast<std::uint32_t>(keyframes.size());
+      keyframes.push_back(See({.column = column}, {"car", "a", sequence}));
+    };
+    for (std::uint32_t i = 0; i < hits_before; ++i) add(0xCC);
+    add(std::uint64_t{kNibbleOver} << 4 | kNibbleFree);
+    add(0x66);
+    for (std::uint32_t i = 0; i < hits_after; ++i) add(0xCC);
+    return Middle(keyframes)[0].column;
+  };
+  EXPECT_EQ(column_after(50, 0) & 0xFF, 0x11U);
+  EXPECT_EQ(column_after(0, 50) & 0xFF, 0xF1U);
+  EXPECT_LT((column_after(0, 4) >> 4) & 15, kNibbleUnknown);
+  EXPECT_GT((column_after(0, 5) >> 4) & 15, kNibbleUnknown);
+}
+
 TEST(TileEvidenceTest, AStretchFoldsInTheOrderOfItsSequence) {
   // Hits saturate at +64 in four; one miss before or after them differs.
   const auto occupancy_with_miss_at = [](std::uint32_t sequence) {

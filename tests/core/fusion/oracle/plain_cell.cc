@@ -147,20 +147,24 @@ void PlainCell::AddTo(const PlainObservation& observation,
   const int units = observation.occupancy == Occupancy::kObstacle ? profile_.hit_units
                     : observation.occupancy == Occupancy::kFree   ? profile_.miss_units
                                                                   : 0;
-  if (observation.occupancy == Occupancy::kDriven) {
-    segment.occupancy = -profile_.driven_clamp;
-  } else {
-    AddUnits(units, segment.occupancy);
-  }
+  Add({units, observation.occupancy == Occupancy::kDriven, false}, segment.occupancy);
   if (observation.column != 0) {
     AddColumn(observation, segment);
   }
 }
 
-// Unless the vehicle was there: that is a stretch's last word.
-void PlainCell::AddUnits(int units, int& sum) const {
-  if (sum >= -profile_.stretch_clamp) {
-    sum = std::clamp<int>(sum + units, -profile_.stretch_clamp, profile_.stretch_clamp);
+// Where the vehicle itself was is a stretch's last word; right above it misses go no deeper and
+// hits add up.
+void PlainCell::Add(const Say& say, int& sum) const {
+  const bool is_last_word =
+      sum == -profile_.driven_clamp && profile_.driven_clamp > profile_.stretch_clamp;
+  if (say.is_vehicle || is_last_word) {
+    sum = -profile_.driven_clamp;
+  } else if (say.is_over_vehicle) {
+    sum = 1 - profile_.driven_clamp;
+  } else {
+    const int floor = std::min<int>(sum, -profile_.stretch_clamp);
+    sum = std::clamp<int>(sum + say.units, floor, profile_.stretch_clamp);
   }
 }
 
@@ -173,11 +177,7 @@ void PlainCell::AddColumn(const PlainObservation& observation, Segment& segment)
     }
     int& sum = segment.column[static_cast<std::size_t>(k)];
     segment.is_seen[static_cast<std::size_t>(k)] = true;
-    if (state == kNibbleFree) {
-      sum = -profile_.driven_clamp;
-    } else {
-      AddUnits(kNibbleEvidence[state], sum);
-    }
+    Add({kNibbleEvidence[state], state == kNibbleFree, state == kNibbleOver}, sum);
   }
 }
 

@@ -70,7 +70,12 @@ class PlainCell {
   bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
   Segment& SegmentFor(const PlainObservation& observation, const Nearest& nearest);
   void AddTo(const PlainObservation& observation, std::int64_t weight, Segment& segment) const;
-  void AddUnits(int units, int& sum) const;
+  struct Say {
+    int units;
+    bool is_vehicle;
+    bool is_over_vehicle;
+  };
+  void Add(const Say& say, int& sum) const;
   void AddColumn(const PlainObservation& observation, Segment& segment) const;
   void KeepLatest();
   bool IsAlone(const Segment& segment) const;
