@@ -76,7 +76,7 @@ struct MapProfile {
   // turn what many agreed on, a car that left after years, into its opposite.
   std::int16_t carry_clamp = 48;
   // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: below
-  // -stretch_clamp it stays there, so that what follows the vehicle leaves no trail.
+  // -stretch_clamp it stays there, so that what follows leaves no trail in that stretch.
   std::int16_t driven_clamp = 127;
 
   std::optional<GeodeticOrigin> origin;

@@ -151,7 +151,7 @@ Result<SensorLayout> SensorLayoutEstimator::Estimate() const {
   const float spacing = std::min(MeanSpacing(rows), 1.2F * MedianSpacing(rows));
   const auto channels = static_cast<std::size_t>(
       std::max(ChannelsByCount(rows.size()), is_even ? ChannelsBySpacing(spacing) : 0));
-  while (rows.size() > channels) {  // halves of a ring that was cut
+  while (rows.size() > channels) {  // halves that lay farther away, or a sensor of 128
     std::size_t closest = 1;
     for (std::size_t i = 2; i < rows.size(); ++i) {
       if (rows[i] - rows[i - 1] < rows[closest] - rows[closest - 1]) {

@@ -2,16 +2,12 @@
 // about the sensor (its rings then begin at another azimuth), its rings in the other order, each of
 // them the other way around, every return lies in the same row.
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <numbers>
-#include <optional>
 
 #include <gtest/gtest.h>
 
-#include "core/base/str_cat.h"
 #include "core/scan/drive_folder.h"
 #include "core/scan/rings/ring_splitter.h"
 #include "core/scan/scan_reader.h"
