@@ -1,5 +1,6 @@
 #include "client/drive/drive_ingest.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -8,6 +9,7 @@
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/keyframe/keyframe_codec.h"
+#include "core/scan/ego_box.h"
 #include "core/scan/scan_reader.h"
 
 namespace atlas {
@@ -30,6 +32,12 @@ Pose MotionAt(const DriveFolder& drive, std::size_t index) {
   if (index + 1 < drive.scans.size()) found = motion(index, index + 1);
   if (!found && index > 0) found = motion(index - 1, index);
   return found.value_or(Pose::Identity());
+}
+
+// Whether all that returned is the vehicle itself.
+bool SeesNothing(const PointCloud& cloud) {
+  return std::all_of(cloud.points.begin(), cloud.points.end(),
+                     [ego = EgoBox()](const auto& point) { return ego.Contains(point); });
 }
 
 SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
@@ -92,10 +100,12 @@ class Ingest {
   }
 
   // Reads every scan once before the first is uploaded: a drive with a bad one leaves no trace.
-  Status CheckScans() const {
+  Status CheckScans() {
     for (const SelectedScan& selected : selected_) {
       const DriveScan& scan = drive_.scans[selected.index];
-      if (const auto cloud = ReadScan(scan.scan); !cloud) return cloud.error();
+      const auto cloud = ReadScan(scan.scan);
+      if (!cloud) return cloud.error();
+      report_.empty_scans += SeesNothing(*cloud) ? 1U : 0U;
       if (const auto time_ms = TimeOf(scan); !time_ms) return time_ms.error();
     }
     return {};

@@ -32,7 +32,8 @@ struct IngestOptions {
 };
 
 struct IngestReport {
-  std::uint64_t keyframes = 0;  // selected
+  std::uint64_t keyframes = 0;    // selected
+  std::uint64_t empty_scans = 0;  // of those: without a return from beyond the vehicle
   UploadTotals totals;
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob

@@ -9,7 +9,7 @@
 namespace atlas {
 namespace {
 
-constexpr std::uint8_t kProfileVersion = 2;
+constexpr std::uint8_t kProfileVersion = 3;
 constexpr std::array<std::string_view, 3> kPresetNames = {"paper", "strict", "bounded"};
 
 Status OutOfRange(const char* field, double value, const char* range) {
@@ -81,6 +81,9 @@ Status ValidateFusion(const MapProfile& profile) {
   }
   if (profile.driven_clamp < profile.stretch_clamp || profile.driven_clamp > 127) {
     return OutOfRange("driven clamp", profile.driven_clamp, "the stretch clamp to 127");
+  }
+  if (profile.driven_hold_ms > 3'600'000) {
+    return OutOfRange("hold where a vehicle drove, in ms,", profile.driven_hold_ms, "0 to 3600000");
   }
   return {};
 }
@@ -169,6 +172,7 @@ Bytes MapProfile::Encode() const {
   out.I16(evidence_clamp);
   out.I16(carry_clamp);
   out.I16(driven_clamp);
+  out.U32(driven_hold_ms);
   EncodeOrigin(origin, out);
   return out.Take();
 }
@@ -208,6 +212,7 @@ Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
   profile.evidence_clamp = in.I16();
   profile.carry_clamp = in.I16();
   profile.driven_clamp = in.I16();
+  profile.driven_hold_ms = in.U32();
   profile.origin = DecodeOrigin(in);
   if (!in.ok() || in.remaining() != 0) {
     return Error(StatusCode::kInvalidData, "map profile: truncated or has trailing bytes");

@@ -78,6 +78,8 @@ struct MapProfile {
   // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: below
   // -stretch_clamp it stays there, so that what follows leaves no trail in that stretch.
   std::int16_t driven_clamp = 127;
+  // ... and so long in those of others: what they see of it until then follows the vehicle.
+  std::uint32_t driven_hold_ms = 60'000;
 
   std::optional<GeodeticOrigin> origin;
 

@@ -12,9 +12,9 @@ namespace {
 
 constexpr float kDeg = std::numbers::pi_v<float> / 180.0F;
 // Mean spacings: VLP-16 2.0 and every fourth ring of an HDL-64 1.7; HDL-32 1.33 and every second
-// ring of an HDL-64 0.85; HDL-64 0.43 degrees.
+// ring of an HDL-64 0.85; OS1-64 0.71, HDL-64 0.43 degrees.
 constexpr float kSpacing16_rad = 1.5F * kDeg;
-constexpr float kSpacing32_rad = 0.6F * kDeg;
+constexpr float kSpacing32_rad = 0.78F * kDeg;
 constexpr std::uint32_t kMinRunReturns = 8;  // fewer do not tell where a ring points
 constexpr float kNewRow = 0.6F;  // of the spacing: farther from every row is another row
 

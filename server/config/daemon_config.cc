@@ -80,7 +80,7 @@ Status ApplyListen(const std::string& text, DaemonConfig& config) {
   const auto port = colon == std::string::npos ? std::nullopt
                                                : ParseNumber<std::uint16_t>(text.substr(colon + 1));
   if (!port) {
-    return BadValue("listen", text, "HOST:PORT");
+    return BadValue("listen", text, "HOST:PORT, the port from 0 to 65535");
   }
   config.port = *port;
   config.host = text.substr(0, colon);

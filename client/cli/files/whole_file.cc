@@ -1,5 +1,6 @@
 #include "client/cli/files/whole_file.h"
 
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <system_error>
@@ -53,20 +54,22 @@ Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
 
 Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes) {
   std::error_code error;
-  const std::uint64_t size = std::filesystem::file_size(path, error);
-  if (error == std::errc::is_a_directory) {
+  if (std::filesystem::is_directory(path, error)) {
     return Error(StatusCode::kInvalidData, StrCat(path.string(), ": a folder, expected a file"));
-  }
-  if (error) return Error(SystemError("cannot read", path, error.value()));
-  if (size > max_bytes) {
-    return Error(StatusCode::kResourceExhausted,
-                 StrCat(path.string(), ": ", size, " bytes, at most ", max_bytes));
   }
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  std::string text(size, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(size));
-  if (!file) return Error(SystemError("cannot read", path, errno != 0 ? errno : EIO));
+  std::string text;
+  std::array<char, 1 << 16> block{};
+  while (file.good() && text.size() <= max_bytes) {  // a pipe does not say its size
+    file.read(block.data(), block.size());
+    text.append(block.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  if (text.size() > max_bytes) {
+    return Error(StatusCode::kResourceExhausted,
+                 StrCat(path.string(), ": more than ", max_bytes, " bytes"));
+  }
+  if (!file.eof()) return Error(SystemError("cannot read", path, errno != 0 ? errno : EIO));
   return text;
 }
 

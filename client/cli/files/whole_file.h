@@ -14,7 +14,8 @@ Status MakeDirectory(const std::filesystem::path& directory);
 // Written beside `path` and renamed over it.
 Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes);
 
-// kNotFound, kPermissionDenied, kInvalidData for a folder; kResourceExhausted above `max_bytes`.
+// Also of a pipe. kNotFound, kPermissionDenied, kInvalidData for a folder; kResourceExhausted above
+// `max_bytes`.
 Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes);
 
 }  // namespace atlas

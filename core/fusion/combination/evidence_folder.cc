@@ -40,13 +40,18 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
       continue;
     }
     const Segment& segment = *segments[i].segment;
+    const bool is_about_it = SpeaksOfOccupancy(segment, layers[labels[i]]);
+    SegmentSay say{.time_ms = segments[i].last_time_ms,
+                   .layer = labels[i],
+                   .occupancy = is_about_it ? segment.occupancy : 0,
+                   .column_base = segment.column_base,
+                   .column = segment.column};
+    drives_.Hear(say);
     Sum& sum = sums_[labels[i]];
-    if (SpeaksOfOccupancy(segment, layers[labels[i]])) {
-      sum.occupancy = FoldEvidence(sum.occupancy, segment.occupancy, clamp);
-    }
+    sum.occupancy = FoldEvidence(sum.occupancy, say.occupancy, clamp);
     if (segment.column_seen != 0) {
-      sum.column.Fold(segment.column, segment.column_seen,
-                      std::int64_t{sum.span.base} - segment.column_base, clamp);
+      sum.column.Fold(say.column, segment.column_seen,
+                      std::int64_t{sum.span.base} - say.column_base, clamp);
     }
   }
   for (std::size_t layer = 0; layer < layers.size(); ++layer) {
@@ -56,6 +61,7 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
 
 void EvidenceFolder::Begin(std::span<const CellLayer> layers) {
   sums_.clear();
+  drives_.Clear();
   for (std::size_t i = 0; i < layers.size(); ++i) {
     const std::int32_t* above = i + 1 < layers.size() ? &layers[i + 1].altitude_mm : nullptr;
     sums_.push_back({ColumnSpanOf(layers[i].altitude_mm, above, profile_), 0, {}});

@@ -1,6 +1,6 @@
 // Occupancy and columns of one cell's layers: the say of each stretch, in the order in which they
 // saw the layer last. The fold saturates, so that no stretch has more than its say, no evidence
-// becomes certainty, and what was seen last counts.
+// becomes certainty, and what was seen last counts; but what follows a vehicle.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/fusion/combination/cell_layers.h"
+#include "core/fusion/combination/recent_drives.h"
 #include "core/fusion/segment/column_evidence.h"
 #include "core/fusion/segment/segment_view.h"
 #include "core/tile/column_lattice.h"
@@ -19,7 +20,7 @@ namespace atlas {
 class EvidenceFolder {
  public:
   // `profile` must outlive the folder.
-  explicit EvidenceFolder(const MapProfile& profile) : profile_(profile) {}
+  explicit EvidenceFolder(const MapProfile& profile) : profile_(profile), drives_(profile) {}
 
   // Appends the cell's layers to `out`, complete. Segments in canonical order with the layer of
   // each, or kNoLayer.
@@ -44,6 +45,7 @@ class EvidenceFolder {
   static TileLayer Finish(const CellLayer& surface, const Sum& sum);
 
   const MapProfile& profile_;
+  RecentDrives drives_;
   std::vector<Sum> sums_;
   std::vector<std::uint32_t> order_;
 };

@@ -54,6 +54,17 @@ Lanes AddSaturating(Lanes a, Lanes b, Lanes limit) {
   return Max(Min(a, highest), -lowest) + b;
 }
 
+// Values from `offset` on, 0 beyond them.
+ColumnLanes From(const ColumnLanes& lanes, std::int64_t offset) {
+  ColumnLanes from{};
+  const auto skipped = static_cast<std::size_t>(std::clamp<std::int64_t>(offset, 0, 16));
+  const auto shifted = static_cast<std::size_t>(std::clamp<std::int64_t>(-offset, 0, 16));
+  if (skipped + shifted < lanes.size()) {
+    std::memcpy(from.data() + shifted, lanes.data() + skipped, lanes.size() - skipped - shifted);
+  }
+  return from;
+}
+
 // Bit k: nibble k is not 0.
 std::uint16_t SeenBits(std::uint64_t nibbles) {
   std::uint64_t bits =
@@ -94,6 +105,21 @@ void AddNibbles(std::uint64_t nibbles,
                                                                          : said);
 }
 
+bool HasValue(const ColumnLanes& evidence, std::int8_t value) {
+  const auto is_it = std::bit_cast<Lanes>(evidence) == All(value);
+  using Halves = std::array<std::uint64_t, 2>;
+  return std::bit_cast<Halves>(is_it) != Halves{};
+}
+
+void DropHitsWhere(const ColumnLanes& other,
+                   std::int8_t value,
+                   std::int64_t offset,
+                   ColumnLanes& evidence) {
+  const Lanes before = std::bit_cast<Lanes>(evidence);
+  const Lanes beside = std::bit_cast<Lanes>(From(other, offset));
+  evidence = std::bit_cast<ColumnLanes>(beside == All(value) ? Min(before, Lanes{}) : before);
+}
+
 int FoldEvidence(int sum, int said, const FoldClamp& clamp) {
   if (said == 0) {
     return sum;
@@ -110,12 +136,9 @@ void ColumnSum::Fold(const ColumnLanes& said,
   if (offset >= 16 || offset <= -16) {
     return;
   }
-  ColumnLanes column{};
-  const auto skipped = static_cast<std::size_t>(std::max<std::int64_t>(offset, 0));
-  const auto shifted = static_cast<std::size_t>(std::max<std::int64_t>(-offset, 0));
-  std::memcpy(column.data() + shifted, said.data() + skipped, said.size() - skipped - shifted);
-  seen_ |= (std::uint32_t{said_seen} >> skipped) << shifted;
-  const Lanes says = std::bit_cast<Lanes>(column);
+  const std::uint32_t seen = said_seen;
+  seen_ |= offset >= 0 ? seen >> offset : seen << -offset;
+  const Lanes says = std::bit_cast<Lanes>(From(said, offset));
   const Lanes before = std::bit_cast<Lanes>(evidence_);
   const Lanes evidence_limit = All(clamp.evidence);
   const Lanes say_limit = All(std::min(clamp.stretch, clamp.evidence));

@@ -32,6 +32,15 @@ void AddNibbles(std::uint64_t nibbles,
                 ColumnLanes& evidence,
                 std::uint16_t& seen);
 
+// Whether one of them is `value`.
+bool HasValue(const ColumnLanes& evidence, std::int8_t value);
+// Of `evidence`, whose first value stands beside value `offset` of `other`: what is above 0 becomes
+// 0 where the other is `value`.
+void DropHitsWhere(const ColumnLanes& other,
+                   std::int8_t value,
+                   std::int64_t offset,
+                   ColumnLanes& evidence);
+
 // How evidence of stretches adds up (MapProfile's clamps of these names).
 struct FoldClamp {
   std::int8_t stretch;

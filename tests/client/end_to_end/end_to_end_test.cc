@@ -96,6 +96,20 @@ TEST_F(EndToEndTest, OtherContentUnderAKeyIsAConflict) {
   EXPECT_EQ(Digest(daemon), digest);
 }
 
+TEST_F(EndToEndTest, ScansThatSeeNothingAreCounted) {
+  const fs::path blind = shared_root / "blind";
+  fs::copy(shared_drive, blind, fs::copy_options::recursive);
+  std::ofstream(blind / "velodyne" / "000003.bin", std::ios::binary)
+      << std::string(16 * 100, '\0');  // a hundred returns at the sensor itself
+  DaemonProcess daemon(NewData(), kSmall);
+  EXPECT_EQ(Ingest(daemon).Get<int>("empty_scans"), 0);
+  const CommandRun run =
+      RunAtlas(daemon.address(), {"ingest", blind.string(), "--every", "0", "--range", "0:10"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.Get<int>("empty_scans"), 1);
+  EXPECT_NE(run.err.find("1 of 10 scans"), std::string::npos) << run.err;
+}
+
 TEST_F(EndToEndTest, QueriesKeepTheirBudgetAndComeCoarseFirst) {
   DaemonProcess daemon(NewData(), kSmall);
   ASSERT_EQ(Ingest(daemon).exit_code, 0);

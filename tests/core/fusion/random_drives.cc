@@ -35,6 +35,7 @@ MapProfile DrivesProfile(std::uint32_t seed) {
   profile.preset = seed % 4 == 1 ? FusionPreset::kBounded : FusionPreset::kStrict;
   profile.band_segments = 3;
   profile.band_vehicle_segments = 2;
+  profile.driven_hold_ms = seed % 5 == 0 ? 60'000 : 600;
   return profile;
 }
 

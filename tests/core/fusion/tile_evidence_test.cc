@@ -73,9 +73,39 @@ TEST(TileEvidenceTest, WhereTheVehicleStoodOneCanDrive) {
   };
   EXPECT_EQ(occupancy_after(50, 0), -64);  // as much as a stretch may say
   EXPECT_EQ(occupancy_after(0, 50), -64);  // whatever follows the vehicle
-  // A later visit that sees something there is believed.
-  const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 1});
-  EXPECT_EQ(OccupancyOf({{driven}, Session("b", 100, Occupancy::kObstacle)}), 64 - 48);
+}
+
+TEST(TileEvidenceTest, WhatFollowsAVehicleIsNotThereForOthersEither) {
+  const auto occupancy_after = [](std::uint32_t seconds) {
+    const std::uint32_t last = 1 + 10 * seconds;  // 100 ms a sequence number
+    const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 1});
+    return OccupancyOf({{driven}, Session("b", last - 19, Occupancy::kObstacle)});
+  };
+  EXPECT_EQ(occupancy_after(2), -64);
+  EXPECT_EQ(occupancy_after(60), -64);
+  EXPECT_EQ(occupancy_after(61), 64 - 48);  // it came to stay
+  // Nor does it help to be another stretch of the same session, or to have been seen before.
+  const auto before = Session("b", 10, Occupancy::kObstacle);
+  const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 250});
+  EXPECT_EQ(OccupancyOf({before, {driven}, Session("a", 260, Occupancy::kObstacle)}), -16);
+  // A vehicle on another deck says nothing of this one.
+  const PlacedKeyframe above = See({.z_m = 5.0, .occupancy = Occupancy::kDriven}, {"car", "a", 1});
+  EXPECT_EQ(OccupancyOf({{above}, Session("b", 10, Occupancy::kObstacle)}), 64);
+}
+
+TEST(TileEvidenceTest, ColumnsOfWhatFollowsAVehicleAreNotThereEither) {
+  // Seen from 0.4 m lower, so that the other's column begins a segment lower: at 0 m, not at 1 m.
+  const auto column_after = [](std::uint32_t seconds, std::uint8_t said) {
+    const PlacedKeyframe car = See({.z_m = 0.8, .column = said}, {"car", "a", 1});
+    const PlacedKeyframe other = See({.z_m = 0.4, .column = 0xFFF}, {"car", "b", 1 + 10 * seconds});
+    const auto layers = Middle({car, other});
+    EXPECT_EQ(layers.size(), 1u);
+    return layers[0].column & 0xFFF;
+  };
+  EXPECT_EQ(column_after(1, kNibbleFree), 0xF1FU);
+  EXPECT_EQ(column_after(60, kNibbleFree), 0xF1FU);
+  EXPECT_EQ(column_after(61, kNibbleFree), 0xFAFU);  // 64 - 48
+  EXPECT_EQ(column_after(1, kNibbleOver), 0xFAFU);   // a ceiling right above it
 }
 
 TEST(TileEvidenceTest, WhatFollowsTheVehicleLeavesNothingBehind) {

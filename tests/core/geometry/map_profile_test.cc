@@ -21,7 +21,7 @@ TEST(MapProfileTest, ReadsBack) {
 }
 
 TEST(MapProfileTest, GoldenFile) {
-  const Bytes golden = testing::GoldenFile("profile_v2.bin", GoldenProfile().Encode());
+  const Bytes golden = testing::GoldenFile("profile_v3.bin", GoldenProfile().Encode());
   EXPECT_EQ(MapProfile::Decode(golden).value(), GoldenProfile());
   EXPECT_EQ(GoldenProfile().Encode(), golden);
 }
@@ -42,7 +42,7 @@ TEST(MapProfileTest, RefusesTruncationTrailingBytesAndNewerVersions) {
   bytes.push_back(0);
   EXPECT_FALSE(MapProfile::Decode(bytes).has_value());
   bytes.pop_back();
-  bytes[0] = 3;
+  bytes[0] = 4;
   EXPECT_EQ(MapProfile::Decode(bytes).error().code(), StatusCode::kUnsupported);
 }
 
@@ -115,6 +115,10 @@ TEST(MapProfileTest, NamesTheFieldOutOfRange) {
       {"stretch clamp",
        [](MapProfile& p) {
          p.stretch_clamp = 128;
+       }},
+      {"hold where a vehicle drove",
+       [](MapProfile& p) {
+         p.driven_hold_ms = 3'600'001;
        }},
       {"carry clamp",
        [](MapProfile& p) {

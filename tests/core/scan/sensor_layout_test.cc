@@ -79,6 +79,7 @@ TEST(SensorLayoutTest, SnapsByAngularSpacingWhateverTheRingsSee) {
   EXPECT_EQ(Channels({Rings(32, -30.67, 1.333)}, OpenPlain), 32);
   EXPECT_EQ(Channels({Rings(32, -24.8, 0.84)}, WalledYard), 32);  // every second of 64
   EXPECT_EQ(Channels({Rings(64, -24.8, 0.42)}, OpenPlain), 64);
+  EXPECT_EQ(Channels({Rings(64, -22.5, 0.714)}, OpenPlain), 64);  // OS1-64
   EXPECT_EQ(Channels({Rings(16, -15, 2), 350}, WalledYard), 16);
 }
 

@@ -35,6 +35,7 @@ inline MapProfile GoldenProfile() {
   profile.evidence_clamp = 64;
   profile.carry_clamp = 48;
   profile.driven_clamp = 127;
+  profile.driven_hold_ms = 60'000;
   profile.origin = GeodeticOrigin{49'013'000'000, -8'400'000'000, 115'000};
   return profile;
 }

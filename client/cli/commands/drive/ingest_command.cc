@@ -21,6 +21,7 @@ double FrontendMsPerScan(const IngestReport& report) {
 
 boost::json::object ReportJson(const IngestReport& report, double wall_s) {
   return {{"keyframes", report.keyframes},
+          {"empty_scans", report.empty_scans},
           {"acked", report.totals.acked},
           {"duplicates", report.totals.duplicates},
           {"metres", Rounded(report.metres, 3)},
@@ -81,6 +82,10 @@ class IngestCommand : public Command {
     if (report->keyframes == 0) {
       context.err << "note: none of the drive's " << drive->scans.size()
                   << " scans is selected (--range, --scans)\n";
+    }
+    if (report->empty_scans > 0) {
+      context.err << "note: no return from beyond the vehicle in " << report->empty_scans << " of "
+                  << report->keyframes << " scans\n";
     }
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     if (context.is_json) {

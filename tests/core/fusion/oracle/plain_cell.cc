@@ -29,6 +29,29 @@ int Folded(int sum, int said, const MapProfile& profile) {
   return std::clamp<int>(carried + say, -profile.evidence_clamp, profile.evidence_clamp);
 }
 
+bool IsLastWord(int sum, const MapProfile& profile) {
+  return sum == -profile.driven_clamp && profile.driven_clamp > profile.stretch_clamp;
+}
+
+struct TimedSay {
+  std::int64_t time_ms;
+  int units;
+};
+
+// By time; hits do not count for a while after a vehicle was there itself.
+int FoldedAll(std::span<const TimedSay> says, const MapProfile& profile) {
+  int sum = 0;
+  for (std::size_t i = 0; i < says.size(); ++i) {
+    const bool follows_vehicle = std::any_of(
+        says.begin(), says.begin() + static_cast<std::ptrdiff_t>(i), [&](const TimedSay& before) {
+          return IsLastWord(before.units, profile) &&
+                 says[i].time_ms - before.time_ms <= profile.driven_hold_ms;
+        });
+    sum = Folded(sum, follows_vehicle ? std::min(says[i].units, 0) : says[i].units, profile);
+  }
+  return sum;
+}
+
 }  // namespace
 
 void PlainCell::Fuse(std::span<const PlainObservation> observations,
@@ -156,9 +179,7 @@ void PlainCell::AddTo(const PlainObservation& observation,
 // Where the vehicle itself was is a stretch's last word; right above it misses go no deeper and
 // hits add up.
 void PlainCell::Add(const Say& say, int& sum) const {
-  const bool is_last_word =
-      sum == -profile_.driven_clamp && profile_.driven_clamp > profile_.stretch_clamp;
-  if (say.is_vehicle || is_last_word) {
+  if (say.is_vehicle || IsLastWord(sum, profile_)) {
     sum = -profile_.driven_clamp;
   } else if (say.is_over_vehicle) {
     sum = 1 - profile_.driven_clamp;
@@ -340,15 +361,16 @@ TileLayer PlainCell::Publish(std::size_t index) const {
     return std::tie(a->last->time_ms, a->last->key) < std::tie(b->last->time_ms, b->last->key);
   });
   const Layer& layer = layers_[index];
-  int occupancy = 0;
+  std::vector<TimedSay> occupancies;
   for (const Segment* segment : in_order) {
     const bool is_wrong_guess =
         layer.is_measured && !segment->representative->is_strong() &&
         std::abs(segment->representative->altitude_mm - layer.altitude_mm) > profile_.same_layer_mm;
     if (!is_wrong_guess) {
-      occupancy = Folded(occupancy, segment->occupancy, profile_);
+      occupancies.push_back({segment->last->time_ms, segment->occupancy});
     }
   }
+  const int occupancy = FoldedAll(occupancies, profile_);
   TileLayer out;
   out.altitude_mm = static_cast<std::int32_t>(layer.altitude_mm);
   out.sigma_100um = sigmas_.SigmaOfWeight100um(layer.weight);
@@ -374,17 +396,15 @@ std::uint64_t PlainCell::PublishColumn(std::span<const Segment* const> in_order,
             layers_[index + 1].altitude_mm - profile_.slab_margin_mm) {
       break;  // it would reach into the slab of the next layer
     }
-    int sum = 0;
-    bool is_seen = false;
+    std::vector<TimedSay> says;
     for (const Segment* segment : in_order) {
       const std::int64_t own = lattice - segment->column_base;
       if (own >= 0 && own < 16 && segment->is_seen[static_cast<std::size_t>(own)]) {
-        is_seen = true;
-        sum = Folded(sum, segment->column[static_cast<std::size_t>(own)], profile_);
+        says.push_back({segment->last->time_ms, segment->column[static_cast<std::size_t>(own)]});
       }
     }
-    if (is_seen) {
-      column |= std::uint64_t{NibbleFromEvidence(sum)} << (4 * k);
+    if (!says.empty()) {
+      column |= std::uint64_t{NibbleFromEvidence(FoldedAll(says, profile_))} << (4 * k);
     }
   }
   return column;

@@ -121,6 +121,21 @@ TEST(RingSplitterTest, EveryStorageOrderMakesOneRunARing) {
   }
 }
 
+// However a VLP-16's scan of `world` is stored, each of `count` rings is one run.
+template <typename World>
+void ExpectRings(std::size_t count, const World& world) {
+  for (const Storage& storage : AllStorages()) {
+    SCOPED_TRACE(::testing::Message()
+                 << storage.is_top_first << storage.is_clockwise << storage.begin_rad);
+    const Sample sample = MakeScan(Rings(16, -15, 2), storage, world);
+    const RingSplit split = SplitRings(sample.cloud, EgoBox());
+    ExpectWellFormed(split);
+    EXPECT_EQ(split.runs.size(), count);
+    EXPECT_EQ(Strays(split, sample), 0);
+    EXPECT_EQ(split.is_bottom_first, !storage.is_top_first);
+  }
+}
+
 TEST(RingSplitterTest, RingsInTheSkyHaveNoRunAndMoveNoOther) {
   // An open place with one house: rings above the horizon see it or nothing.
   const auto world = [](const Eigen::Vector3d& d) {
@@ -128,16 +143,7 @@ TEST(RingSplitterTest, RingsInTheSkyHaveNoRunAndMoveNoOther) {
                           d.z() < std::sin(6.0 * testing::kDegree);
     return Nearest(GroundRange(d, 1.8), is_house ? RoundWallRange(d, 20.0) : std::nullopt);
   };
-  for (const Storage& storage : AllStorages()) {
-    SCOPED_TRACE(::testing::Message()
-                 << storage.is_top_first << storage.is_clockwise << storage.begin_rad);
-    const Sample sample = MakeScan(Rings(16, -15, 2), storage, world);
-    const RingSplit split = SplitRings(sample.cloud, EgoBox());
-    ExpectWellFormed(split);
-    EXPECT_EQ(Strays(split, sample), 0);
-    EXPECT_EQ(split.runs.size(), 11U);  // -15 to -3 on the ground, -1 to 5 on the house
-    EXPECT_EQ(split.is_bottom_first, !storage.is_top_first);
-  }
+  ExpectRings(11, world);  // -15 to -3 on the ground, -1 to 5 on the house
 }
 
 TEST(RingSplitterTest, AStreetThatUpperRingsSeeOnlyOnItsSidesIsCutWhereRingsBegin) {
@@ -147,16 +153,7 @@ TEST(RingSplitterTest, AStreetThatUpperRingsSeeOnlyOnItsSidesIsCutWhereRingsBegi
     const bool is_wall = wall_m * d.z() < 4.0;
     return Nearest(GroundRange(d, 1.8), is_wall ? std::optional(wall_m) : std::nullopt);
   };
-  for (const Storage& storage : AllStorages()) {
-    SCOPED_TRACE(::testing::Message()
-                 << storage.is_top_first << storage.is_clockwise << storage.begin_rad);
-    const Sample sample = MakeScan(Rings(16, -15, 2), storage, world);
-    const RingSplit split = SplitRings(sample.cloud, EgoBox());
-    ExpectWellFormed(split);
-    EXPECT_EQ(split.runs.size(), 16U);
-    EXPECT_EQ(Strays(split, sample), 0);
-    EXPECT_EQ(split.is_bottom_first, !storage.is_top_first);
-  }
+  ExpectRings(16, world);
 }
 
 TEST(RingSplitterTest, AzimuthsThatJitterByAReturnOrTwoCutNoRing) {
