@@ -1,6 +1,7 @@
 #include "core/keyframe/sensor_mount.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -35,11 +36,22 @@ struct GroundFit {
   double spread_m = 0.0;
 };
 
-std::vector<Eigen::Vector3d> GroundBelow(const LeveledScan& scan, float half_width_m) {
-  constexpr float kNear_m = 12.0F;
+// Where the ground that the wheels stand on is looked for.
+struct Reach {
+  float ahead_m;  // and behind
+  float half_width_m;
+};
+constexpr float kLane_m = 1.5F;
+constexpr float kAnywhere_m = 100.0F;
+// A VLP-16 3.8 m up sees its lane 14 m away; what is nearer all around are roofs of parked cars.
+constexpr std::array<Reach, 4> kReaches = {
+    {{12.0F, kLane_m}, {25.0F, kLane_m}, {12.0F, kAnywhere_m}, {25.0F, kAnywhere_m}}};
+
+std::vector<Eigen::Vector3d> GroundWithin(const LeveledScan& scan, const Reach& reach) {
   std::vector<Eigen::Vector3d> ground;
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    if (scan.is_ground[i] != 0 && scan.range_m[i] < kNear_m && std::abs(scan.y[i]) < half_width_m) {
+    if (scan.is_ground[i] != 0 && scan.range_m[i] < reach.ahead_m &&
+        std::abs(scan.y[i]) < reach.half_width_m) {
       ground.emplace_back(scan.x[i], scan.y[i], scan.z[i]);
     }
   }
@@ -105,11 +117,9 @@ Status SensorMount::Validate() const {
 }
 
 void SensorMountEstimator::Add(const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor) {
-  constexpr float kLane_m = 1.5F;
-  constexpr float kAnywhere_m = 100.0F;
-  std::optional<GroundFit> fit = FitGround(GroundBelow(scan, kLane_m));
-  if (!fit) {
-    fit = FitGround(GroundBelow(scan, kAnywhere_m));
+  std::optional<GroundFit> fit;
+  for (std::size_t i = 0; i < kReaches.size() && !fit; ++i) {
+    fit = FitGround(GroundWithin(scan, kReaches[i]));
   }
   if (fit) {
     const Eigen::Vector3d up_level(-fit->plane.x(), -fit->plane.y(), 1.0);
@@ -121,7 +131,7 @@ void SensorMountEstimator::Add(const LeveledScan& scan, const Eigen::Quaterniond
 Result<SensorMount> SensorMountEstimator::Estimate() const {
   if (grounds_.empty()) {
     return Error(StatusCode::kInvalidData,
-                 "no ground within 12 m in any scan: give the sensor's height");
+                 "no ground within 25 m in any scan: give the sensor's height");
   }
   std::vector<Ground> flattest = grounds_;
   std::stable_sort(flattest.begin(), flattest.end(),

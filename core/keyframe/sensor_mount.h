@@ -26,8 +26,9 @@ struct SensorMount {
 class SensorMountEstimator {
  public:
   // Fits a plane to the ground within 12 m ahead and behind and 1.5 m to the sides (pavements
-  // beside a street lie a kerb higher), else all around. Its height at the sensor is right also
-  // where the ground slopes and is seen on one side only. `R_level_sensor` as for LevelScan.
+  // beside a street lie a kerb higher); where none is seen within 25 m, then all around. Its height
+  // at the sensor is right also where the ground slopes and is seen on one side only.
+  // `R_level_sensor` as for LevelScan.
   void Add(const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor);
 
   // The medians over the half of the scans in which the ground was flattest. kInvalidData when no

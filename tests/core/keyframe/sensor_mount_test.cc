@@ -39,15 +39,12 @@ TEST(SensorMountTest, TheHeightOfASlopeSeenAheadOnlyIsThatBelowTheSensor) {
   EXPECT_NEAR(mount.TiltDeg(), std::atan(0.08) / kDegree, 0.05);
 }
 
-TEST(SensorMountTest, ATiltedSensorIsToldFromATiltedRoad) {
-  ShapeWorld street;
-  street.patches = {{0.0},
-                    {0.12, {0.0, 0.0}, testing::Surface::kGround, {-100.0, -100.0}, {100.0, -2.5}}};
-  const Eigen::Vector3d up(std::sin(-4.0 * kDegree), std::sin(6.0 * kDegree), 1.0);
-  Pose T_world_sensor = testing::UprightPose({0.0, 0.0, 2.1}, 0.0);
+// Of a VLP-16 upright but for `up` (sensor frame), `height_m` above the world's zero.
+SensorMount MountIn(const ShapeWorld& world, double height_m, const Eigen::Vector3d& up) {
+  Pose T_world_sensor = testing::UprightPose({0.0, 0.0, height_m}, 0.0);
   T_world_sensor.linear() *=
       Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  const PointCloud cloud = testing::CastScan(Vlp16(), street, T_world_sensor).cloud;
+  const PointCloud cloud = testing::CastScan(Vlp16(), world, T_world_sensor).cloud;
   SensorLayoutEstimator layout;
   layout.Add(cloud);
   const Eigen::Quaterniond R_level_sensor =
@@ -55,9 +52,27 @@ TEST(SensorMountTest, ATiltedSensorIsToldFromATiltedRoad) {
   SensorMountEstimator estimator;
   estimator.Add(SegmentScan(cloud, layout.Estimate().value(), 1, R_level_sensor, {}),
                 R_level_sensor);
-  const SensorMount mount = estimator.Estimate().value();
+  return estimator.Estimate().value();
+}
+
+TEST(SensorMountTest, ATiltedSensorIsToldFromATiltedRoad) {
+  ShapeWorld street;
+  street.patches = {{0.0},
+                    {0.12, {0.0, 0.0}, testing::Surface::kGround, {-100.0, -100.0}, {100.0, -2.5}}};
+  const Eigen::Vector3d up(std::sin(-4.0 * kDegree), std::sin(6.0 * kDegree), 1.0);
+  const SensorMount mount = MountIn(street, 2.1, up);
   EXPECT_NEAR(mount.height_m, 2.1, 0.01);
   EXPECT_LT(std::acos(mount.up.dot(up.normalized())) / kDegree, 0.3);
+}
+
+TEST(SensorMountTest, RoofsOfParkedCarsAreNotTheGroundOfALorry) {
+  ShapeWorld street;
+  street.patches = {{0.0},
+                    {1.5, {0.0, 0.0}, testing::Surface::kGround, {-30.0, 2.2}, {30.0, 4.0}},
+                    {1.5, {0.0, 0.0}, testing::Surface::kGround, {-30.0, -4.0}, {30.0, -2.2}}};
+  for (const double height_m : {1.8, 2.5, 3.1, 3.8, 4.5}) {
+    EXPECT_NEAR(MountIn(street, height_m, Eigen::Vector3d::UnitZ()).height_m, height_m, 0.03);
+  }
 }
 
 TEST(SensorMountTest, AKerbAndTheFootOfARampAreLeftOut) {
