@@ -13,6 +13,8 @@ namespace {
 // A slope is taken over at least this share of the gap that it is extended into, so that noise is
 // not extended into slope.
 constexpr float kSlopeBase = 0.5F;
+// How far from a slope what was seen of it may lie: a bonnet and the roof behind it are none.
+constexpr float kStraight_m = 0.15F;
 
 using GroundSamples = std::span<const GroundSample>;
 
@@ -177,7 +179,14 @@ float GroundProfiles::SlopeFrom(std::span<const Return> from,
   for (const Return& r : from) {
     if (r.is_ground && r.range_m > first.range_m && r.range_m >= first.range_m + base_m) {
       const float slope = (r.z_m - first.z_m) / (r.range_m - first.range_m);
-      return slope <= options.max_ground_slope ? slope : 0.0F;
+      const auto is_off = [&](const Return& between) {
+        const float above_m = between.z_m - first.z_m - slope * (between.range_m - first.range_m);
+        const bool is_on_it = above_m > kStraight_m && !between.is_ground;  // or hangs above it
+        return std::abs(above_m) > kStraight_m && !is_on_it &&
+               above_m <= options.vehicle_clearance_m;
+      };
+      const bool is_slope = slope <= options.max_ground_slope && std::none_of(&first, &r, is_off);
+      return is_slope ? slope : 0.0F;
     }
   }
   return 0.0F;

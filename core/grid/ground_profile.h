@@ -98,7 +98,7 @@ class GroundProfiles {
                         std::span<const GroundSample> ground,
                         const ProfileOptions& options);
   // Slope from the first return of `from` to the next ground at least `base_m` behind it; 0 where
-  // there is none or no vehicle climbs it.
+  // there is none, no vehicle climbs it, or other ground or a ray below it lies between the two.
   static float SlopeFrom(std::span<const Return> from, float base_m, const ProfileOptions& options);
   static RayEnd FindEnd(std::span<const Return> returns,
                         const RayProfile& profile,

@@ -82,6 +82,7 @@ void PeerConnection::Drain() {
 
 asio::awaitable<void> PeerConnection::Read() {
   Status broken = co_await ReadRequests();
+  DropUnread();
   if (!broken.ok()) {
     spdlog::warn("{}: {}", peer_, broken.message());
     is_refused_ = true;
@@ -241,6 +242,12 @@ Status PeerConnection::Hold(std::size_t bytes) {
 void PeerConnection::Release(std::size_t bytes) {
   budget_.GiveBack(bytes);
   held_bytes_ -= bytes;
+}
+
+// What came of a frame that nobody waits for any more.
+void PeerConnection::DropUnread() {
+  decoder_ = FrameDecoder(options_.max_frame_bytes);
+  Release(held_bytes_ - request_bytes_);
 }
 
 // Starts the clock of the next frame, or of the rest of one. The Hello's runs from the start.

@@ -57,6 +57,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   boost::asio::awaitable<void> Linger();
   Status Hold(std::size_t bytes);
   void Release(std::size_t bytes);
+  void DropUnread();
   void ExpectFrame(bool is_mid_frame);
   void Finish();
 

@@ -116,6 +116,13 @@ TEST_F(GroundProfileTest, WhatIsHigherThanAStepMustBeOnASlopeThatShows) {
   EXPECT_TRUE(GroundRanges({{4.7F, -0.9F, true}, {4.9F, -0.9F, true}}).empty());
   EXPECT_TRUE(
       GroundRanges({{4.7F, -0.9F, true}, {6.4F, -0.85F, true}, {6.5F, -0.5F, true}}).empty());
+  // A bonnet, a windscreen and a roof: together steep as a ramp, and no line.
+  EXPECT_TRUE(GroundRanges({{4.3F, -0.9F, true},
+                            {4.9F, -0.88F, true},
+                            {5.3F, -0.55F, false},
+                            {5.8F, -0.3F, true},
+                            {6.2F, -0.3F, true}})
+                  .empty());
   // A rail 0.9 m up, one return wide.
   EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {9, -0.9F, true}}), (std::vector<int>{50}));
   // Ramps of 18.5 degrees: first seen behind a gap, up to a crest, and behind a crest.
@@ -123,6 +130,13 @@ TEST_F(GroundProfileTest, WhatIsHigherThanAStepMustBeOnASlopeThatShows) {
             (std::vector<int>{50, 80, 95}));
   EXPECT_EQ(GroundRanges({{3, -1.3F, true}, {6, -0.3F, true}, {9, 0.0F, true}, {14, 0.0F, true}}),
             (std::vector<int>{30, 60, 90, 140}));
+  // A ramp below a ceiling, bumpy by a hand's breadth.
+  EXPECT_EQ(GroundRanges({{4, -1.0F, true},
+                          {4.5F, 2.2F, false},
+                          {5, -0.55F, true},
+                          {6, -0.33F, true},
+                          {8, 0.33F, true}}),
+            (std::vector<int>{40, 50, 60, 80}));
   EXPECT_EQ(GroundRanges({{5, -1.8F, true}, {8, -2.8F, true}, {12, -4.1F, true}}),
             (std::vector<int>{50, 80, 120}));
   // A kerb, a lawn 0.1 m up.
