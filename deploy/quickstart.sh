@@ -69,7 +69,10 @@ say "localizing a second pass"
 "$atlas" localize "$second" "${rest[@]}" | tail -n 12
 
 say "planning from the first pose to the last"
-"$atlas" plan --from "$from" --to "$to" | tail -n 8
+"$atlas" plan --from "$from" --to "$to" | tail -n 8 || {
+  status=$?
+  ((status == 3)) || exit "$status"  # no route is an answer, too: the drive may have jumped
+}
 
 say "drawing"
 "$atlas" render -o "$work/map.png"

@@ -109,7 +109,7 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
   for (std::uint32_t i = 0; i < wanted.size(); ++i) {
     PlannedStretch& w = wanted[i];
     const bool grows = w.kept < w.frames.size();
-    Stretch stretch{std::move(w.key), w.number, 0, {}, {}, {}, false, 0, 0};
+    Stretch stretch{std::move(w.key), w.number, 0, 0, {}, {}, {}, false, 0, 0};
     if (w.old == PlannedStretch::kNone) {
       stretch.open.emplace(whole, profile);
     } else {
@@ -120,10 +120,12 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
       }
       settled_numbers[w.old] = stretch.open ? SettledSegments::kGone : i;
     }
+    stretch.session = 0;
     stretch.vehicle = 0;
     if (!next.empty()) {
-      const bool is_same = next.back().key.vehicle == stretch.key.vehicle;
-      stretch.vehicle = next.back().vehicle + (is_same ? 0u : 1u);
+      const Stretch& before = next.back();
+      stretch.session = before.session + (before.key == stretch.key ? 0u : 1u);
+      stretch.vehicle = before.vehicle + (before.key.vehicle == stretch.key.vehicle ? 0u : 1u);
     }
     stretch.frames = std::move(w.frames);
     stretch.times_ms.clear();
@@ -284,8 +286,14 @@ void TileSurveys::CollectOpen(std::size_t cell, std::uint32_t stretch) {
 }
 
 SegmentView TileSurveys::View(Segment& segment, std::uint32_t stretch) const {
-  return {&segment, stretches_[stretch].times_ms[segment.last_frame], stretch,
-          stretches_[stretch].vehicle};
+  const Stretch& its = stretches_[stretch];
+  return {
+      .segment = &segment,
+      .last_time_ms = its.times_ms[segment.last_frame],
+      .driven_ms = segment.driven_frame == Segment::kNone ? 0 : its.times_ms[segment.driven_frame],
+      .stretch = stretch,
+      .session = its.session,
+      .vehicle = its.vehicle};
 }
 
 std::size_t TileSurveys::bytes() const {

@@ -50,6 +50,7 @@ class TileSurveys {
   struct Stretch {
     SessionKey key;
     std::uint32_t number = 0;
+    std::uint32_t session = 0;  // equal for equal keys, rising
     std::uint32_t vehicle = 0;  // equal for equal vehicle names, rising
     std::vector<StretchMember> frames;
     std::vector<std::int64_t> times_ms;  // of the frames: they are looked up for every segment

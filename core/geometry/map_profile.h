@@ -75,10 +75,10 @@ struct MapProfile {
   // Beside what a later stretch says, all before it counts for this much: so that one stretch can
   // turn what many agreed on, a car that left after years, into its opposite.
   std::int16_t carry_clamp = 48;
-  // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this: below
-  // -stretch_clamp it stays there, so that what follows leaves no trail in that stretch.
+  // Where the vehicle itself was (kNibbleFree) its stretch's evidence falls to minus this; below
+  // -stretch_clamp hits do not count there, so that what follows leaves no trail ...
   std::int16_t driven_clamp = 127;
-  // ... and so long in those of others: what they see of it until then follows the vehicle.
+  // ... for so long, in this and in later stretches of the session.
   std::uint32_t driven_hold_ms = 60'000;
 
   std::optional<GeodeticOrigin> origin;

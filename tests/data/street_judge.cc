@@ -41,29 +41,39 @@ std::size_t OccupiedOnPath(const StreetMap& street) {
   return occupied.size();
 }
 
-bool IsKept(const StreetMap& street, std::int64_t x, std::int64_t y, const StreetSquare& square) {
+// Where a square is occupied: in a column segment 0.5 to 2 m above the road, or on a surface up to
+// there.
+struct Kept {
+  bool in_column = false;
+  bool on_surface = false;
+};
+
+Kept FindKept(const StreetMap& street, std::int64_t x, std::int64_t y, double road_m) {
+  Kept kept;
   for (int cell = 0; cell < kCellsAMetre * kCellsAMetre; ++cell) {
-    if (street.IsOccupied(x * kCellsAMetre + cell % kCellsAMetre,
-                          y * kCellsAMetre + cell / kCellsAMetre, square.road_m + 0.5,
-                          square.road_m + 2.0)) {
-      return true;
-    }
+    const std::int64_t cell_x = x * kCellsAMetre + cell % kCellsAMetre;
+    const std::int64_t cell_y = y * kCellsAMetre + cell / kCellsAMetre;
+    kept.in_column |= street.IsOccupied(cell_x, cell_y, road_m + 0.5, road_m + 2.0);
+    kept.on_surface |= street.IsSurfaceOccupied(cell_x, cell_y, road_m - 2.0, road_m + 2.0);
   }
-  return false;
+  return kept;
 }
 
 struct Count {
   int squares = 0;
-  int kept = 0;
+  int in_columns = 0;
+  int occupied = 0;  // in columns or on surfaces
 
-  void Add(bool is_kept) {
+  void Add(const Kept& kept) {
     ++squares;
-    kept += is_kept ? 1 : 0;
+    in_columns += kept.in_column ? 1 : 0;
+    occupied += kept.in_column || kept.on_surface ? 1 : 0;
   }
 };
 
 std::ostream& operator<<(std::ostream& out, const Count& count) {
-  return out << "{\"squares\":" << count.squares << ",\"kept\":" << count.kept << '}';
+  return out << "{\"squares\":" << count.squares << ",\"in_columns\":" << count.in_columns
+             << ",\"occupied\":" << count.occupied << '}';
 }
 
 void Judge(const StreetMap& street) {
@@ -73,9 +83,9 @@ void Judge(const StreetMap& street) {
   Count ground;
   for (const auto& [key, square] : JudgeSquares(street)) {
     if (square.is_asked_for()) {
-      const bool is_kept = IsKept(street, key.first, key.second, square);
-      asked.Add(is_kept);
-      (square.stands() ? standing : square.rises() ? moved : ground).Add(is_kept);
+      const Kept kept = FindKept(street, key.first, key.second, square.road_m);
+      asked.Add(kept);
+      (square.stands() ? standing : square.rises() ? moved : ground).Add(kept);
     }
   }
   std::cout << "{\"occupied_on_path\":" << OccupiedOnPath(street) << ",\"asked\":" << asked

@@ -1,5 +1,6 @@
 #include "tests/data/street_map.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -57,19 +58,23 @@ StreetMap::Road StreetMap::RoadAt(double x, double y) const {
   return road;
 }
 
-bool StreetMap::IsOccupied(std::int64_t cell_x,
-                           std::int64_t cell_y,
-                           double low_m,
-                           double high_m) const {
+std::span<const TileLayer> StreetMap::LayersAt(std::int64_t cell_x, std::int64_t cell_y) const {
   const std::int64_t side = profile_.tile_cells;
   const TileId id{0, static_cast<std::int32_t>(FloorDiv(cell_x, side)),
                   static_cast<std::int32_t>(FloorDiv(cell_y, side))};
   const auto tile = tiles_.find(id);
   if (tile == tiles_.end() || tile->second.is_empty()) {
-    return false;
+    return {};
   }
-  const auto cell = static_cast<std::size_t>((cell_y - id.y * side) * side + cell_x - id.x * side);
-  for (const TileLayer& layer : tile->second.Layers(cell)) {
+  return tile->second.Layers(
+      static_cast<std::size_t>((cell_y - id.y * side) * side + cell_x - id.x * side));
+}
+
+bool StreetMap::IsOccupied(std::int64_t cell_x,
+                           std::int64_t cell_y,
+                           double low_m,
+                           double high_m) const {
+  for (const TileLayer& layer : LayersAt(cell_x, cell_y)) {
     const std::int32_t base = ColumnBaseIndex(layer.altitude_mm, profile_);
     for (int k = 0; k < profile_.column_segments; ++k) {
       const double bottom_m = (base + k) * profile_.segment_height_m();
@@ -80,6 +85,17 @@ bool StreetMap::IsOccupied(std::int64_t cell_x,
     }
   }
   return false;
+}
+
+bool StreetMap::IsSurfaceOccupied(std::int64_t cell_x,
+                                  std::int64_t cell_y,
+                                  double low_m,
+                                  double high_m) const {
+  const auto layers = LayersAt(cell_x, cell_y);
+  return std::any_of(layers.begin(), layers.end(), [&](const TileLayer& layer) {
+    const double z_m = layer.altitude_mm * 1e-3;
+    return layer.occupancy > 0 && z_m > low_m && z_m < high_m;
+  });
 }
 
 }  // namespace atlas::testing

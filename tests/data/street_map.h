@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "core/geometry/map_profile.h"
@@ -33,8 +34,15 @@ class StreetMap {
 
   // Whether an occupied segment (p > 0.5) of the cell at these indices reaches into (low, high).
   bool IsOccupied(std::int64_t cell_x, std::int64_t cell_y, double low_m, double high_m) const;
+  // Whether something stands on a surface of the cell (p > 0.5) between `low_m` and `high_m`.
+  bool IsSurfaceOccupied(std::int64_t cell_x,
+                         std::int64_t cell_y,
+                         double low_m,
+                         double high_m) const;
 
  private:
+  std::span<const TileLayer> LayersAt(std::int64_t cell_x, std::int64_t cell_y) const;
+
   MapProfile profile_;
   DriveFolder drive_;
   std::vector<PointCloud> clouds_;

@@ -42,6 +42,8 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
     const Segment& segment = *segments[i].segment;
     const bool is_about_it = SpeaksOfOccupancy(segment, layers[labels[i]]);
     SegmentSay say{.time_ms = segments[i].last_time_ms,
+                   .driven_ms = segments[i].driven_ms,
+                   .session = segments[i].session,
                    .layer = labels[i],
                    .occupancy = is_about_it ? segment.occupancy : 0,
                    .column_base = segment.column_base,

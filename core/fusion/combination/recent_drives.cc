@@ -8,10 +8,10 @@ void RecentDrives::Hear(SegmentSay& say) {
   if (last_word_ == kNone) {
     return;
   }
-  for (auto drive = drives_.rbegin();
-       drive != drives_.rend() && say.time_ms - drive->time_ms <= hold_ms_; ++drive) {
-    if (drive->layer == say.layer) {
-      DropHits(*drive, say);
+  for (const SegmentSay& drive : drives_) {
+    const bool is_recent = say.time_ms - drive.driven_ms <= hold_ms_;
+    if (drive.session == say.session && drive.layer == say.layer && is_recent) {
+      DropHits(drive, say);
     }
   }
   if (IsDrive(say)) {

@@ -1,5 +1,5 @@
-// Where vehicles themselves were in one cell, and for how long that keeps out what others see
-// there: whatever it is follows a vehicle, or is one.
+// Where a vehicle itself was in one cell, and for how long that keeps out what later stretches of
+// its session see there: whatever it is follows the vehicle.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,9 @@ namespace atlas {
 
 // What a segment says of its layer.
 struct SegmentSay {
-  std::int64_t time_ms = 0;  // of the keyframe that saw it last
+  std::int64_t time_ms = 0;    // of the keyframe that saw it last
+  std::int64_t driven_ms = 0;  // of the last whose vehicle was there itself, if one was
+  std::uint32_t session = 0;
   std::uint32_t layer = 0;
   int occupancy = 0;
   std::int32_t column_base = 0;
@@ -27,8 +29,8 @@ class RecentDrives {
         hold_ms_(profile.driven_hold_ms) {}
 
   void Clear() { drives_.clear(); }
-  // Drops the hits of `say` where a vehicle was up to `driven_hold_ms` ago, and remembers where its
-  // own was. By time.
+  // Drops the hits of `say` where the vehicle of its session was up to `driven_hold_ms` ago, and
+  // remembers where it is now. By time.
   void Hear(SegmentSay& say);
 
  private:

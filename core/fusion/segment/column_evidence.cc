@@ -105,6 +105,18 @@ void AddNibbles(std::uint64_t nibbles,
                                                                          : said);
 }
 
+bool SpeakOfVehicle(std::uint64_t nibbles) {
+  constexpr std::uint64_t kEach = 0x1111'1111'1111'1111;
+  const auto has_zero = [](std::uint64_t n) {
+    return ((n - kEach) & ~n & (8 * kEach)) != 0;
+  };
+  return has_zero(nibbles ^ (kNibbleFree * kEach)) || has_zero(nibbles ^ (kNibbleOver * kEach));
+}
+
+void ReleaseDriven(const EvidenceClamp& clamp, ColumnLanes& evidence) {
+  evidence = std::bit_cast<ColumnLanes>(Max(std::bit_cast<Lanes>(evidence), -All(clamp.usual)));
+}
+
 bool HasValue(const ColumnLanes& evidence, std::int8_t value) {
   const auto is_it = std::bit_cast<Lanes>(evidence) == All(value);
   using Halves = std::array<std::uint64_t, 2>;

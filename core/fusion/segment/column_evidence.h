@@ -19,8 +19,8 @@ constexpr std::int32_t ColumnMargin(std::int32_t column_segments) {
 // Where a stretch's evidence saturates; at most 127.
 struct EvidenceClamp {
   std::int8_t usual;  // at +- this
-  // kNibbleFree puts it at - this, for good if that is deeper than -usual; kNibbleOver one short of
-  // it, and hits add up from there.
+  // kNibbleFree puts it at - this, until released if that is deeper than -usual; kNibbleOver one
+  // short of it, and hits add up from there.
   std::int8_t driven;
 };
 
@@ -31,6 +31,11 @@ void AddNibbles(std::uint64_t nibbles,
                 const EvidenceClamp& clamp,
                 ColumnLanes& evidence,
                 std::uint16_t& seen);
+
+// Whether a keyframe says of some segment that its vehicle is there itself, or right below it.
+bool SpeakOfVehicle(std::uint64_t nibbles);
+// Brings evidence that is deeper than usual back to where hits add up from.
+void ReleaseDriven(const EvidenceClamp& clamp, ColumnLanes& evidence);
 
 // Whether one of them is `value`.
 bool HasValue(const ColumnLanes& evidence, std::int8_t value);

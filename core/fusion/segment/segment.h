@@ -17,18 +17,19 @@ struct alignas(64) Segment {
   // Eq. 3 in information form; altitudes are taken from `reference_mm` to stay small.
   std::int64_t weight = 0;
   std::int64_t moment = 0;
-  std::int32_t reference_mm = 0;    // the first observation's altitude
-  std::int32_t altitude_mm = 0;     // the representative's: the nearest observation's
-  std::int32_t column_base = 0;     // lattice index of the column's lowest segment
-  std::uint32_t last_frame = 0;     // of the stretch, the last that saw it
-  std::uint32_t next = kNone;       // of the same cell
-  std::uint16_t column_seen = 0;    // bit k: something was said about segment k of the column
-  std::uint16_t observations = 0;   // saturating
-  std::uint16_t distance_step = 0;  // the representative's
-  std::int16_t occupancy = 0;       // evidence, units of ln(9)/64
-  AltitudeSource source = AltitudeSource::kNone;  // the representative's
-  bool is_strong = false;                         // some altitude was measured or interpolated
-  bool is_used = false;                           // it was part of a layer when combined last
+  std::int32_t reference_mm = 0;       // the first observation's altitude
+  std::int32_t altitude_mm = 0;        // the representative's: the nearest observation's
+  std::int32_t column_base = 0;        // lattice index of the column's lowest segment
+  std::uint32_t last_frame = 0;        // of the stretch, the last that saw it
+  std::uint32_t driven_frame = kNone;  // the last whose vehicle was there itself, while it holds
+  std::uint32_t next = kNone;          // of the same cell
+  std::uint16_t column_seen = 0;       // bit k: something was said about segment k of the column
+  std::uint16_t observations = 0;      // saturating
+  std::uint16_t distance_step = 0;     // the representative's
+  std::int8_t occupancy = 0;           // evidence, units of ln(9)/64
+  AltitudeSource source : 2 = AltitudeSource::kNone;  // the representative's
+  bool is_strong : 1 = false;                         // some altitude was measured or interpolated
+  bool is_used : 1 = false;                           // it was part of a layer when combined last
   ColumnLanes column{};
 };
 static_assert(sizeof(Segment) == 64);  // one line of a cache: it is read for every observation

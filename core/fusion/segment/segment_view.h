@@ -10,7 +10,9 @@ namespace atlas {
 struct SegmentView {
   Segment* segment = nullptr;
   std::int64_t last_time_ms = 0;  // of the keyframe that saw it last
+  std::int64_t driven_ms = 0;     // of its driven_frame, if it has one
   std::uint32_t stretch = 0;      // its place in canonical order
+  std::uint32_t session = 0;      // FusionStretch's number
   std::uint32_t vehicle = 0;      // FusionStretch's number
 };
 

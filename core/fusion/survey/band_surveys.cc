@@ -58,8 +58,16 @@ void BandSurveys::Collect(std::size_t cell, std::vector<SegmentView>& segments) 
     StretchSurvey& survey = surveys_[i];
     for (std::uint32_t k = survey.First(cell); k != Segment::kNone; k = survey.At(k).next) {
       Segment& segment = survey.At(k);
+      const auto time_ms = [&](std::uint32_t frame) {
+        return survey.frames()[frame].time_ms;
+      };
       segments.push_back(
-          {&segment, survey.frames()[segment.last_frame].time_ms, i, stretches_[i].vehicle});
+          {.segment = &segment,
+           .last_time_ms = time_ms(segment.last_frame),
+           .driven_ms = segment.driven_frame == Segment::kNone ? 0 : time_ms(segment.driven_frame),
+           .stretch = i,
+           .session = stretches_[i].session,
+           .vehicle = stretches_[i].vehicle});
     }
   }
 }

@@ -177,14 +177,23 @@ std::uint32_t StretchSurvey::AddSegment(std::size_t cell, const Segment& segment
   return index;
 }
 
-// As columns: where the vehicle stood nothing else is for the rest of the stretch.
-std::int16_t StretchSurvey::AddOccupancy(int evidence, Occupancy occupancy) const {
+void StretchSurvey::ReleaseOld(std::uint32_t frame, Segment& segment) const {
+  const std::int64_t ago_ms = frames_[frame].time_ms - frames_[segment.driven_frame].time_ms;
+  if (ago_ms > profile_.driven_hold_ms) {
+    segment.driven_frame = Segment::kNone;
+    segment.occupancy = std::max<std::int8_t>(segment.occupancy, -clamp_.usual);
+    ReleaseDriven(clamp_, segment.column);
+  }
+}
+
+// As columns: where the vehicle stood nothing else is until that is released.
+std::int8_t StretchSurvey::AddOccupancy(int evidence, Occupancy occupancy) const {
   if (occupancy == Occupancy::kDriven) {
-    return static_cast<std::int16_t>(-clamp_.driven);
+    return static_cast<std::int8_t>(-clamp_.driven);
   }
   const int added = occupancy_units_[static_cast<std::size_t>(occupancy)];
   const int sum = std::clamp<int>(evidence + added, -clamp_.usual, clamp_.usual);
-  return static_cast<std::int16_t>(evidence < -clamp_.usual ? evidence : sum);
+  return static_cast<std::int8_t>(evidence < -clamp_.usual ? evidence : sum);
 }
 
 void StretchSurvey::AddEvidence(const Observation& observation,
@@ -199,7 +208,13 @@ void StretchSurvey::AddEvidence(const Observation& observation,
     ++segment.observations;
   }
   segment.last_frame = frame;
-  segment.is_strong |= observation.is_strong();
+  segment.is_strong = segment.is_strong || observation.is_strong();
+  if (segment.driven_frame != Segment::kNone) {
+    ReleaseOld(frame, segment);
+  }
+  if (occupancy == Occupancy::kDriven || SpeakOfVehicle(observation.column)) {
+    segment.driven_frame = frame;
+  }
   segment.occupancy = AddOccupancy(segment.occupancy, occupancy);
   if (observation.column != 0) {
     AddNibbles(observation.column, std::int64_t{observation.column_base} - segment.column_base,

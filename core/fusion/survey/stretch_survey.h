@@ -86,7 +86,9 @@ class StretchSurvey {
                    std::int64_t weight,
                    std::uint32_t frame,
                    std::uint32_t segment);
-  std::int16_t AddOccupancy(int evidence, Occupancy occupancy) const;
+  // Forgets that the vehicle was there, once it was long ago when `frame` was taken.
+  void ReleaseOld(std::uint32_t frame, Segment& segment) const;
+  std::int8_t AddOccupancy(int evidence, Occupancy occupancy) const;
   bool IsOneLayer(const Observation& observation,
                   const Match& match,
                   const SigmaTable& sigmas) const;

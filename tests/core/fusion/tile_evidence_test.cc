@@ -75,30 +75,51 @@ TEST(TileEvidenceTest, WhereTheVehicleStoodOneCanDrive) {
   EXPECT_EQ(occupancy_after(0, 50), -64);  // whatever follows the vehicle
 }
 
-TEST(TileEvidenceTest, WhatFollowsAVehicleIsNotThereForOthersEither) {
-  const auto occupancy_after = [](std::uint32_t seconds) {
-    const std::uint32_t last = 1 + 10 * seconds;  // 100 ms a sequence number
-    const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 1});
-    return OccupancyOf({{driven}, Session("b", last - 19, Occupancy::kObstacle)});
+// Twenty keyframes that see an obstacle where the vehicle of session a drove at 0.1 s; the last of
+// them is `seconds` later.
+std::int8_t OccupancyOfFollower(const char* session, std::uint32_t seconds) {
+  const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 1});
+  const std::uint32_t last = 1 + 10 * seconds;  // 100 ms a sequence number
+  return OccupancyOf({{driven}, Session(session, last - 19, Occupancy::kObstacle)});
+}
+
+TEST(TileEvidenceTest, WhatFollowsTheVehicleIsNotThereForAMinute) {
+  EXPECT_EQ(OccupancyOfFollower("a", 3), -64);   // the same stretch
+  EXPECT_EQ(OccupancyOfFollower("a", 60), -64);  // a later one
+  EXPECT_EQ(OccupancyOfFollower("a", 61), 64 - 48);
+  EXPECT_EQ(OccupancyOfFollower("b", 3), 64 - 48);  // who says that the clocks are the same?
+  // Within one stretch, keyframes 10 s apart.
+  const auto occupancy_after = [](std::uint32_t count) {
+    std::vector<PlacedKeyframe> keyframes = {
+        See({.occupancy = Occupancy::kDriven}, {"car", "a", 0})};
+    for (std::uint32_t i = 1; i <= count; ++i) {
+      keyframes.push_back(See({.occupancy = Occupancy::kObstacle}, {"car", "a", i}));
+      keyframes.back().time_ms = keyframes.front().time_ms + 10'000 * i;
+    }
+    return Middle(keyframes)[0].occupancy;
   };
-  EXPECT_EQ(occupancy_after(2), -64);
-  EXPECT_EQ(occupancy_after(60), -64);
-  EXPECT_EQ(occupancy_after(61), 64 - 48);  // it came to stay
-  // Nor does it help to be another stretch of the same session, or to have been seen before.
+  EXPECT_EQ(occupancy_after(6), -64);
+  EXPECT_EQ(occupancy_after(7), -64 + 25);  // it came to stay, and hits add up
+  EXPECT_GT(occupancy_after(10), 0);
+}
+
+TEST(TileEvidenceTest, WhereTheVehicleWasNothingWasBefore) {
   const auto before = Session("b", 10, Occupancy::kObstacle);
   const PlacedKeyframe driven = See({.occupancy = Occupancy::kDriven}, {"car", "a", 250});
   EXPECT_EQ(OccupancyOf({before, {driven}, Session("a", 260, Occupancy::kObstacle)}), -16);
-  // A vehicle on another deck says nothing of this one.
+  // On another deck it says nothing of this one.
   const PlacedKeyframe above = See({.z_m = 5.0, .occupancy = Occupancy::kDriven}, {"car", "a", 1});
-  EXPECT_EQ(OccupancyOf({{above}, Session("b", 10, Occupancy::kObstacle)}), 64);
+  EXPECT_EQ(OccupancyOf({{above}, Session("a", 260, Occupancy::kObstacle)}), 64);
 }
 
-TEST(TileEvidenceTest, ColumnsOfWhatFollowsAVehicleAreNotThereEither) {
-  // Seen from 0.4 m lower, so that the other's column begins a segment lower: at 0 m, not at 1 m.
+TEST(TileEvidenceTest, ColumnsOfWhatFollowsTheVehicleAreNotThereEither) {
+  // Seen by a later stretch from 0.4 m lower, so that its column begins a segment lower: at 0 m,
+  // not at 1 m.
   const auto column_after = [](std::uint32_t seconds, std::uint8_t said) {
     const PlacedKeyframe car = See({.z_m = 0.8, .column = said}, {"car", "a", 1});
-    const PlacedKeyframe other = See({.z_m = 0.4, .column = 0xFFF}, {"car", "b", 1 + 10 * seconds});
-    const auto layers = Middle({car, other});
+    PlacedKeyframe later = See({.z_m = 0.4, .column = 0xFFF}, {"car", "a", 300});
+    later.time_ms = car.time_ms + 1'000 * seconds;
+    const auto layers = Middle({car, later});
     EXPECT_EQ(layers.size(), 1u);
     return layers[0].column & 0xFFF;
   };
@@ -106,6 +127,20 @@ TEST(TileEvidenceTest, ColumnsOfWhatFollowsAVehicleAreNotThereEither) {
   EXPECT_EQ(column_after(60, kNibbleFree), 0xF1FU);
   EXPECT_EQ(column_after(61, kNibbleFree), 0xFAFU);  // 64 - 48
   EXPECT_EQ(column_after(1, kNibbleOver), 0xFAFU);   // a ceiling right above it
+}
+
+TEST(TileEvidenceTest, WhereTheVehicleWasLongAgoHitsAddUpAgain) {
+  const auto column_after = [](std::uint32_t hits) {
+    std::vector<PlacedKeyframe> keyframes = {
+        See({.column = std::uint64_t{kNibbleOver} << 4 | kNibbleFree}, {"car", "a", 0})};
+    for (std::uint32_t i = 1; i <= hits; ++i) {
+      keyframes.push_back(See({.column = 0xCC}, {"car", "a", i}));
+      keyframes.back().time_ms += 60'000;
+    }
+    return Middle(keyframes)[0].column & 0xFF;
+  };
+  EXPECT_EQ(column_after(1), 0x33U);  // -64 + 29
+  EXPECT_EQ(column_after(3), 0xBBU);
 }
 
 TEST(TileEvidenceTest, WhatFollowsTheVehicleLeavesNothingBehind) {

@@ -78,7 +78,7 @@ class IngestCommand : public Command {
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
     const Result<IngestReport> report = Ingest(*drive, *client, context);
-    if (!report) return report.error();
+    if (!report) return Explained(report.error());
     if (report->keyframes == 0) {
       context.err << "note: none of the drive's " << drive->scans.size()
                   << " scans is selected (--range, --scans)\n";
@@ -97,6 +97,15 @@ class IngestCommand : public Command {
   }
 
  private:
+  // What else differs is seldom the scan.
+  static Status Explained(const Status& failure) {
+    return failure.code() != StatusCode::kConflict
+               ? failure
+               : Status(failure.code(), failure.message() +
+                                            "; were other options given then, or were the sensor's "
+                                            "height and tilt estimated from fewer scans of the "
+                                            "folder? --session gives it a name of its own");
+  }
   Status CompleteOptions() {
     const Result<ScanParity> parity = drive_.parity();
     if (!parity) return parity.error();

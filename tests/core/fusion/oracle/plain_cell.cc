@@ -34,18 +34,20 @@ bool IsLastWord(int sum, const MapProfile& profile) {
 }
 
 struct TimedSay {
-  std::int64_t time_ms;
+  const PlacedKeyframe* last;
+  const PlacedKeyframe* driven;
   int units;
 };
 
-// By time; hits do not count for a while after a vehicle was there itself.
+// By time; hits do not count for a while after the session's vehicle was there itself.
 int FoldedAll(std::span<const TimedSay> says, const MapProfile& profile) {
   int sum = 0;
   for (std::size_t i = 0; i < says.size(); ++i) {
     const bool follows_vehicle = std::any_of(
         says.begin(), says.begin() + static_cast<std::ptrdiff_t>(i), [&](const TimedSay& before) {
           return IsLastWord(before.units, profile) &&
-                 says[i].time_ms - before.time_ms <= profile.driven_hold_ms;
+                 before.last->key.session == says[i].last->key.session &&
+                 says[i].last->time_ms - before.driven->time_ms <= profile.driven_hold_ms;
         });
     sum = Folded(sum, follows_vehicle ? std::min(says[i].units, 0) : says[i].units, profile);
   }
@@ -164,6 +166,10 @@ void PlainCell::AddTo(const PlainObservation& observation,
                       std::int64_t weight,
                       Segment& segment) const {
   segment.last = observation.placed;
+  ReleaseOld(segment);
+  if (SpeaksOfVehicle(observation)) {
+    segment.driven = observation.placed;
+  }
   segment.weight += weight;
   segment.weighted_mm += weight * observation.altitude_mm;
   ++segment.observations;
@@ -174,6 +180,28 @@ void PlainCell::AddTo(const PlainObservation& observation,
   if (observation.column != 0) {
     AddColumn(observation, segment);
   }
+}
+
+// What the vehicle said of where it was itself holds for a while.
+void PlainCell::ReleaseOld(Segment& segment) const {
+  if (segment.driven == nullptr ||
+      segment.last->time_ms - segment.driven->time_ms <= profile_.driven_hold_ms) {
+    return;
+  }
+  segment.driven = nullptr;
+  segment.occupancy = std::max<int>(segment.occupancy, -profile_.stretch_clamp);
+  for (int& evidence : segment.column) {
+    evidence = std::max<int>(evidence, -profile_.stretch_clamp);
+  }
+}
+
+bool PlainCell::SpeaksOfVehicle(const PlainObservation& observation) {
+  bool speaks = observation.occupancy == Occupancy::kDriven;
+  for (int nibble = 0; nibble < 16; ++nibble) {
+    const std::uint8_t state = NibbleAt(observation.column, nibble);
+    speaks |= state == kNibbleFree || state == kNibbleOver;
+  }
+  return speaks;
 }
 
 // Where the vehicle itself was is a stretch's last word; right above it misses go no deeper and
@@ -367,7 +395,7 @@ TileLayer PlainCell::Publish(std::size_t index) const {
         layer.is_measured && !segment->representative->is_strong() &&
         std::abs(segment->representative->altitude_mm - layer.altitude_mm) > profile_.same_layer_mm;
     if (!is_wrong_guess) {
-      occupancies.push_back({segment->last->time_ms, segment->occupancy});
+      occupancies.push_back({segment->last, segment->driven, segment->occupancy});
     }
   }
   const int occupancy = FoldedAll(occupancies, profile_);
@@ -400,7 +428,7 @@ std::uint64_t PlainCell::PublishColumn(std::span<const Segment* const> in_order,
     for (const Segment* segment : in_order) {
       const std::int64_t own = lattice - segment->column_base;
       if (own >= 0 && own < 16 && segment->is_seen[static_cast<std::size_t>(own)]) {
-        says.push_back({segment->last->time_ms, segment->column[static_cast<std::size_t>(own)]});
+        says.push_back({segment->last, segment->driven, segment->column[static_cast<std::size_t>(own)]});
       }
     }
     if (!says.empty()) {

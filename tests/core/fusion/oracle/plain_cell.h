@@ -40,6 +40,7 @@ class PlainCell {
   struct Segment {
     const PlacedKeyframe* first = nullptr;
     const PlacedKeyframe* last = nullptr;
+    const PlacedKeyframe* driven = nullptr;  // the last whose vehicle was there, while it holds
     const PlainObservation* representative = nullptr;
     std::int64_t weight = 0;
     std::int64_t weighted_mm = 0;
@@ -76,6 +77,8 @@ class PlainCell {
     bool is_over_vehicle;
   };
   void Add(const Say& say, int& sum) const;
+  void ReleaseOld(Segment& segment) const;
+  static bool SpeaksOfVehicle(const PlainObservation& observation);
   void AddColumn(const PlainObservation& observation, Segment& segment) const;
   void KeepLatest();
   bool IsAlone(const Segment& segment) const;
