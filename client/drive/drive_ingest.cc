@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 
 #include "client/drive/drive_survey.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/keyframe/keyframe_codec.h"
+#include "core/keyframe/vehicle_trail.h"
 #include "core/scan/ego_box.h"
 #include "core/scan/scan_reader.h"
 
@@ -50,7 +52,11 @@ SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
 class Ingest {
  public:
   Ingest(const DriveFolder& drive, const IngestOptions& options, AtlasClient& client)
-      : drive_(drive), options_(options), uploader_(client, options.upload) {}
+      : drive_(drive), options_(options), uploader_(client, options.upload) {
+    for (const DriveScan& scan : drive.scans) {
+      poses_.push_back(scan.T_world_sensor);
+    }
+  }
 
   Status Prepare(const MapProfile& profile) {
     ATLAS_RETURN_IF_ERROR(options_.Validate());
@@ -146,10 +152,15 @@ class Ingest {
     std::optional<Pose> T_now_later;
     if (options_.is_deskewed) T_now_later = MotionAt(drive_, index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
-    Bytes blob = EncodeKeyframe(
-        builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor, T_now_later));
+    Bytes blob = EncodeKeyframe(builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor,
+                                                TrailUntil(index), T_now_later));
     report_.frontend_s += timer.elapsed_s();
     return blob;
+  }
+
+  // Of the whole drive, whichever scans are selected: a scan's keyframe is always the same.
+  std::vector<VehiclePlace> TrailUntil(std::size_t index) const {
+    return TrailBefore(std::span(poses_).first(index + 1), builder_->mount());
   }
 
   // What is in flight is waited for, so that it is either there or refused when this returns.
@@ -162,6 +173,7 @@ class Ingest {
 
   const DriveFolder& drive_;
   const IngestOptions& options_;
+  std::vector<Pose> poses_;  // of all scans
   KeyframeUploader uploader_;
   std::optional<KeyframeBuilder> builder_;
   std::vector<SelectedScan> selected_;

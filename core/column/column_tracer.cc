@@ -149,27 +149,43 @@ std::uint64_t ColumnFromMasks(
   return (states & kLowBits) * kNibbleHit + ((states >> 1) & kLowBits) * kNibbleMiss;
 }
 
-// The vehicle's own cells: free from the ground to the sensor, whatever was traced there, and
-// nearly so right above it, where the heads of those are that follow.
-void MarkBody(const GridGeometry& grid,
-              const ColumnOptions& options,
-              const HalfSegments& halves,
-              std::span<const KeyframeCell> cells,
-              LocalColumns& result) {
-  options.body.ForEachCell(grid, [&](std::int32_t ix, std::int32_t iy) {
-    const std::size_t cell = grid.Index(ix, iy);
-    if (cells[cell].source != AltitudeSource::kNone) {
-      const int anchor = result.anchors[BlockOf(iy + grid.radius_cells, ix + grid.radius_cells,
-                                                grid, options.block_cells)];
-      const std::uint64_t body =
-          SpreadToNibbles(halves.From(anchor, halves.BelowSensor())) & kLowBits;
-      const std::uint64_t above = SpreadToNibbles(halves.From(anchor, halves.Bit(0))) & kLowBits;
-      result.columns[cell] = LowNibbles((result.columns[cell] & ~((body | above) * 15)) |
-                                            body * kNibbleFree | above * kNibbleOver,
-                                        options.segments);
+// Marks cells of the vehicle itself: free from the ground to the segment that a sensor at a height
+// is in, whatever was traced there, and nearly so in that one, where the heads of those are that
+// follow.
+class BodyMarker {
+ public:
+  BodyMarker(const GridGeometry& grid,
+             const ColumnOptions& options,
+             const HalfSegments& halves,
+             std::span<const KeyframeCell> cells,
+             LocalColumns& result)
+      : grid_(grid), options_(options), halves_(halves), cells_(cells), result_(result) {}
+
+  void Mark(std::int32_t ix, std::int32_t iy, float sensor_z_m) {
+    const std::size_t cell = grid_.Index(ix, iy);
+    if (cells_[cell].source == AltitudeSource::kNone) {
+      return;
     }
-  });
-}
+    const int anchor = result_.anchors[BlockOf(iy + grid_.radius_cells, ix + grid_.radius_cells,
+                                               grid_, options_.block_cells)];
+    const auto nibbles = [&](HalfMask mask) {
+      return SpreadToNibbles(halves_.From(anchor, mask)) & kLowBits;
+    };
+    const std::uint64_t body = nibbles(halves_.Below(sensor_z_m));
+    const std::uint64_t above = nibbles(halves_.SegmentAt(sensor_z_m) & kLowerHalves);
+    std::uint64_t& column = result_.columns[cell];
+    column =
+        LowNibbles((column & ~((body | above) * 15)) | body * kNibbleFree | above * kNibbleOver,
+                   options_.segments);
+  }
+
+ private:
+  const GridGeometry& grid_;
+  const ColumnOptions& options_;
+  const HalfSegments& halves_;
+  std::span<const KeyframeCell> cells_;
+  LocalColumns& result_;
+};
 
 }  // namespace
 
@@ -185,6 +201,7 @@ ColumnOptions ColumnOptions::FromProfile(const MapProfile& profile, std::int32_t
 LocalColumns TraceColumns(const LeveledScan& scan,
                           const RayTable& rays,
                           std::span<const KeyframeCell> cells,
+                          std::span<const VehiclePlace> trail,
                           const ColumnOptions& options) {
   const float foot_m = GroundHeight(cells[rays.grid().Index(0, 0)]);
   const HalfSegments halves(options.segment_height_m, foot_m);
@@ -210,7 +227,14 @@ LocalColumns TraceColumns(const LeveledScan& scan,
                      options.segments);
     }
   });
-  MarkBody(grid, options, halves, cells, result);
+  BodyMarker marker(grid, options, halves, cells, result);
+  for (const VehiclePlace& place : trail) {
+    options.body.ForEachCell(grid, place, [&](std::int32_t ix, std::int32_t iy, float, float) {
+      marker.Mark(ix, iy, place.sensor_m.z());
+    });
+  }
+  options.body.ForEachCell(grid,
+                           [&](std::int32_t ix, std::int32_t iy) { marker.Mark(ix, iy, 0.0F); });
   return result;
 }
 

@@ -33,11 +33,14 @@ class HalfSegments {
   }
   // Both bits of the segment at a height.
   HalfMask SegmentAt(float z_m) const {
-    const int bit = 2 * (static_cast<int>(std::floor(z_m * segments_per_m_)) - first_segment_);
+    const int bit = FirstBit(z_m);
     return bit >= 0 && bit < kBits ? HalfMask{3} << bit : 0;
   }
-  // All segments that end below the sensor.
-  HalfMask BelowSensor() const { return first_segment_ < 0 ? Bit(0) - 1 : 0; }
+  // All segments below the one at a height.
+  HalfMask Below(float z_m) const {
+    const int bit = FirstBit(z_m);
+    return bit <= 0 ? 0 : bit >= kBits ? ~HalfMask{0} : (HalfMask{1} << bit) - 1;
+  }
 
   // The halves from segment `anchor` on, its lower one in bit 0.
   HalfMask From(int anchor, HalfMask mask) const {
@@ -49,6 +52,11 @@ class HalfSegments {
   }
 
  private:
+  // Of the segment at a height.
+  int FirstBit(float z_m) const {
+    return 2 * (static_cast<int>(std::floor(z_m * segments_per_m_)) - first_segment_);
+  }
+
   static constexpr int kBits = 64;
   static constexpr int kBelowGround = 8;
 

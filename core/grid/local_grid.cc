@@ -146,17 +146,37 @@ void AddRay(const RayProfile& profile,
   }
 }
 
+// Wheels do not measure again what a return or a later place of the trail did.
+void AddPlace(const VehiclePlace& place,
+              const GridGeometry& grid,
+              float sensor_height_m,
+              const ProfileOptions& options,
+              std::vector<TracedCell>& cells) {
+  options.body.ForEachCell(
+      grid, place, [&](std::int32_t ix, std::int32_t iy, float x_m, float y_m) {
+        TracedCell& cell = cells[grid.Index(ix, iy)];
+        cell.occupancy = Occupancy::kDriven;
+        if (cell.source != AltitudeSource::kMeasured) {
+          cell.AddAltitude(place.GroundAt(x_m, y_m, sensor_height_m), AltitudeSource::kMeasured);
+        }
+      });
+}
+
 }  // namespace
 
 LocalGrid BuildLocalGrid(const LeveledScan& scan,
                          const RayTable& rays,
                          const VehicleContact& contact,
+                         std::span<const VehiclePlace> trail,
                          const ProfileOptions& options) {
   const GroundProfiles profiles(scan, rays, contact, options);
   std::vector<TracedCell> cells(rays.grid().size());
   AddReturns(scan, rays, profiles, options, cells);
   for (int ray = 0; ray < rays.rays(); ++ray) {
     AddRay(profiles.Ray(ray), rays, ray, options, cells);
+  }
+  for (const VehiclePlace& place : trail) {
+    AddPlace(place, rays.grid(), contact.sensor_height_m, options, cells);
   }
   options.body.ForEachCell(rays.grid(), [&](std::int32_t ix, std::int32_t iy) {
     cells[rays.grid().Index(ix, iy)].occupancy = Occupancy::kDriven;

@@ -57,13 +57,15 @@ KeyframeBuilder::KeyframeBuilder(const MapProfile& map,
 
 Keyframe KeyframeBuilder::Build(const PointCloud& cloud,
                                 const Eigen::Quaterniond& R_level_sensor,
+                                std::span<const VehiclePlace> trail,
                                 const std::optional<Pose>& T_now_later) const {
   const LeveledScan scan = SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor,
                                        options_.segmenter, T_now_later);
   const VehicleContact contact{(R_level_sensor * options_.mount.up).cast<float>(),
                                static_cast<float>(options_.mount.height_m)};
-  LocalGrid grid = BuildLocalGrid(scan, rays_, contact, WithClearance(options_.profile, map_));
-  LocalColumns columns = TraceColumns(scan, rays_, grid.cells,
+  LocalGrid grid =
+      BuildLocalGrid(scan, rays_, contact, trail, WithClearance(options_.profile, map_));
+  LocalColumns columns = TraceColumns(scan, rays_, grid.cells, trail,
                                       ColumnOptions::FromProfile(map_, Keyframe::kBlockCells));
   Pose attitude = Pose::Identity();
   attitude.linear() = R_level_sensor.toRotationMatrix();

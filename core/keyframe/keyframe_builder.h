@@ -2,11 +2,13 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "core/base/status.h"
 #include "core/column/column_tracer.h"
 #include "core/geometry/map_profile.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/vehicle_body.h"
 #include "core/grid/local_grid.h"
 #include "core/keyframe/keyframe.h"
 #include "core/keyframe/sensor_mount.h"
@@ -45,10 +47,14 @@ class KeyframeBuilder {
                   const KeyframeBuilderOptions& options);
 
   // `R_level_sensor`: the attitude without yaw (SplitYaw), never a fit to the ground. A scan
-  // without a usable return makes a keyframe that has seen nothing. `T_now_later` as SegmentScan.
+  // without a usable return makes a keyframe that has seen nothing. `trail`: what the vehicle drove
+  // before it (TrailBefore). `T_now_later` as SegmentScan.
   Keyframe Build(const PointCloud& cloud,
                  const Eigen::Quaterniond& R_level_sensor,
+                 std::span<const VehiclePlace> trail = {},
                  const std::optional<Pose>& T_now_later = std::nullopt) const;
+
+  const SensorMount& mount() const { return options_.mount; }
 
  private:
   MapProfile map_;

@@ -99,6 +99,14 @@ def garage(atlas):
     assert track["failures"] <= 0.03 * track["scans"]
     refused = atlas.call("plan", *ends, "--max-slope-deg", 5)
     assert refused.returncode == 3 and json.loads(refused.stdout)["found"] is False
+    # A keyframe in 3.4 m: what lies between two of them is known from having been driven on.
+    with tempfile.TemporaryDirectory() as work:
+        half = Atlas(atlas.bin, work)
+        half.run("ingest", folder, "--scans", "even", "--every", 0)
+        half.run("wait")
+        route = half.run("plan", *ends)
+        print(f"of its even scans: route of {route['length_m']} m")
+        assert half.stop() == 0 and route["found"]
 
 
 def localization(bin_dir):
@@ -185,7 +193,7 @@ def judge_street(bin_dir, flags, **change):
 def street(bin_dir):
     """What moves (walkers, a van ahead, a cyclist behind) leaves no trail where the vehicle drove; what stands is kept."""
     all_scans = "--every 0"
-    cases = [(flags, {}) for flags in ("", "--every 0.5", "--every 2", all_scans, all_scans + " --rings 16",
+    cases = [(flags, {}) for flags in ("", "--every 0.5", "--every 2", "--every 5", all_scans, all_scans + " --rings 16",
                                        all_scans + " --deskew on", all_scans + " --scans even")]
     # Stretches of 256 sequence numbers that end within the drive.
     cases += [(flags, {"first": first}) for flags in ("", all_scans) for first in (130, 210)]
@@ -199,7 +207,7 @@ def street(bin_dir):
         assert result["occupied_on_path"] == 0
         assert result["standing"]["squares"] > 200 and in_columns["standing"] >= 0.95
         assert occupied >= 0.9
-        assert in_columns["moved"] <= 0.5, "what moves leaves trails"
+        assert in_columns["moved"] <= 0.6, "what moves leaves trails"
 
 
 class Shots:

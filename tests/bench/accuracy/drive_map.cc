@@ -6,6 +6,7 @@
 
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
+#include "core/keyframe/vehicle_trail.h"
 
 namespace atlas::testing {
 namespace {
@@ -63,7 +64,13 @@ Result<KeyframeBuilder> FindBuilder(const SimulatedDrive& drive,
 }
 
 Keyframe BuildKeyframe(const KeyframeBuilder& builder, const SimulatedDrive& drive, std::size_t i) {
-  return builder.Build(CloudOf(drive.Scan(i)), LevelOf(drive.sensor_pose(i)));
+  constexpr std::size_t kTrailScans = 32;
+  std::vector<Pose> poses;
+  for (std::size_t k = i - std::min(i, kTrailScans); k <= i; ++k) {
+    poses.push_back(drive.sensor_pose(k));
+  }
+  return builder.Build(CloudOf(drive.Scan(i)), LevelOf(drive.sensor_pose(i)),
+                       TrailBefore(poses, builder.mount()));
 }
 
 Result<std::vector<PlacedKeyframe>> BuildKeyframes(const SimulatedDrive& drive,

@@ -5,6 +5,7 @@
 
 #include "client/drive/drive_survey.h"
 #include "core/keyframe/keyframe_builder.h"
+#include "core/keyframe/vehicle_trail.h"
 #include "core/scan/drive_folder.h"
 #include "core/scan/scan_reader.h"
 
@@ -36,8 +37,10 @@ Result<std::vector<PlacedKeyframe>> ReadKeyframes(const std::filesystem::path& f
   if (!builder) return Error(builder.error());
   std::vector<PlacedKeyframe> placed;
   std::optional<Eigen::Vector3d> last;
+  std::vector<Pose> poses;
   for (const DriveScan& scan : drive->scans) {
     const Pose& pose = scan.T_world_sensor;
+    poses.push_back(pose);
     if (last && (pose.translation() - *last).norm() < kSpacing_m) {
       continue;
     }
@@ -45,7 +48,8 @@ Result<std::vector<PlacedKeyframe>> ReadKeyframes(const std::filesystem::path& f
     const auto cloud = ReadScan(scan.scan);
     if (!cloud) return Error(cloud.error());
     const YawAndLevel split = SplitYaw(Eigen::Quaterniond(pose.linear()));
-    auto keyframe = std::make_shared<const Keyframe>(builder->Build(*cloud, split.R_level_sensor));
+    auto keyframe = std::make_shared<const Keyframe>(
+        builder->Build(*cloud, split.R_level_sensor, TrailBefore(poses, builder->mount())));
     const auto placement = PlaceKeyframe(QuantizedPose::FromPose(pose), keyframe->level_quaternion);
     if (!placement) return Error(placement.error());
     placed.push_back(

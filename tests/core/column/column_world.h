@@ -50,7 +50,7 @@ class ColumnWorld {
     }
   }
 
-  void Trace() { result_ = TraceColumns(scan_, rays_, cells_, options_); }
+  void Trace() { result_ = TraceColumns(scan_, rays_, cells_, {}, options_); }
 
   const GridGeometry& grid() const { return rays_.grid(); }
   const LocalColumns& result() const { return result_; }

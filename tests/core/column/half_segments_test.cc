@@ -58,7 +58,9 @@ TEST(HalfSegmentsTest, BelowTheSensorAreTheSegmentsThatEndThere) {
       for (int segment = -100; segment < 0; ++segment) {
         expected |= halves.Bit(2 * segment) | halves.Bit(2 * segment + 1);
       }
-      EXPECT_EQ(halves.BelowSensor(), expected) << height_m << " " << foot_m;
+      EXPECT_EQ(halves.Below(0.0F), expected) << height_m << " " << foot_m;
+      EXPECT_EQ(halves.Below(0.99F * height_m), expected);
+      EXPECT_EQ(halves.Below(-100.0F), 0U);
     }
   }
 }

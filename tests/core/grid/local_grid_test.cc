@@ -33,7 +33,7 @@ class LocalGridTest : public ::testing::Test {
   }
 
   LocalGrid Build(const LeveledScan& scan) {
-    LocalGrid grid = BuildLocalGrid(scan, rays_, contact_, options_);
+    LocalGrid grid = BuildLocalGrid(scan, rays_, contact_, trail_, options_);
     ExpectInvariants(grid);
     return grid;
   }
@@ -70,6 +70,7 @@ class LocalGridTest : public ::testing::Test {
 
   RayTable rays_{GridGeometry{100'000, 200}};
   VehicleContact contact_{Eigen::Vector3f::UnitZ(), kHeight_m};
+  std::vector<VehiclePlace> trail_;
   ProfileOptions options_;
 };
 

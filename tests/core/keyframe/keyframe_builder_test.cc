@@ -29,14 +29,15 @@ std::optional<double> WallAhead(const Eigen::Vector3d& direction, double x_m) {
 class KeyframeBuilderTest : public ::testing::Test {
  protected:
   Keyframe Build(const testing::World& world,
-                 const Eigen::Quaterniond& R_level_sensor = Eigen::Quaterniond::Identity()) {
+                 const Eigen::Quaterniond& R_level_sensor = Eigen::Quaterniond::Identity(),
+                 std::span<const VehiclePlace> trail = {}) {
     const PointCloud cloud = Scan(Vlp16(), world);
     SensorLayoutEstimator estimator;
     estimator.Add(cloud);
     KeyframeBuilderOptions options;
     options.mount.height_m = kHeight_m;
     const KeyframeBuilder builder(profile_, *estimator.Estimate(), options);
-    Keyframe keyframe = builder.Build(cloud, R_level_sensor);
+    Keyframe keyframe = builder.Build(cloud, R_level_sensor, trail);
     EXPECT_TRUE(ValidateKeyframe(keyframe).ok());
     const Result<Keyframe> decoded = DecodeKeyframe(EncodeKeyframe(keyframe));
     EXPECT_TRUE(decoded.has_value() && *decoded == keyframe);
@@ -137,6 +138,37 @@ TEST_F(KeyframeBuilderTest, OptionsOutOfRangeAreNamed) {
   options.max_range_m = 20.0;
   options.mount.height_m = std::nan("");
   EXPECT_EQ(options.Validate(profile_).code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(KeyframeBuilderTest, WhatItJustDroveIsFreeWhateverFollowsIt) {
+  // Up a ramp of 0.1 to the flat where it is now; something stands 3 m behind it.
+  const auto world = [](const Eigen::Vector3d& d) {
+    const auto behind = d.x() < -1e-6 ? std::optional<double>(-3.0 / d.x()) : std::nullopt;
+    return Nearest(GroundRange(d, kHeight_m), behind);
+  };
+  std::vector<VehiclePlace> trail;
+  for (float x_m = -0.5F; x_m >= -5.0F; x_m -= 0.5F) {
+    VehiclePlace place;
+    place.sensor_m = Eigen::Vector3f(x_m, 0.0F, 0.1F * x_m);
+    place.normal = Eigen::Vector3f(-0.1F, 0.0F, 1.0F).normalized();
+    trail.push_back(place);
+  }
+  const Keyframe without = Build(world);
+  const Keyframe with = Build(world, Eigen::Quaterniond::Identity(), trail);
+  EXPECT_EQ(without.cells[CellAt(without, -3.05, 0.55)].occupancy, Occupancy::kObstacle);
+  EXPECT_EQ(Segment(without, -3.05, 0.55, -0.5), kNibbleHit);
+  for (const double x_m : {-1.95, -3.05, -4.05, -6.35}) {
+    for (const double y_m : {-1.05, 0.05, 1.05}) {
+      const KeyframeCell& cell = with.cells[CellAt(with, x_m, y_m)];
+      EXPECT_EQ(cell.occupancy, Occupancy::kDriven) << x_m << ' ' << y_m;
+      EXPECT_EQ(cell.source, AltitudeSource::kMeasured);
+      EXPECT_NEAR(cell.altitude_mm, 1e3 * (0.1 * x_m - kHeight_m), 2.0) << x_m << ' ' << y_m;
+      EXPECT_EQ(Segment(with, x_m, y_m, -1.5), kNibbleFree);
+      EXPECT_EQ(Segment(with, x_m, y_m, -0.5), kNibbleOver);  // of the sensor that stood lower
+    }
+    EXPECT_NE(with.cells[CellAt(with, x_m, 1.25)].occupancy, Occupancy::kDriven);
+  }
+  EXPECT_NE(with.cells[CellAt(with, -6.65, 0.05)].occupancy, Occupancy::kDriven);
 }
 
 }  // namespace

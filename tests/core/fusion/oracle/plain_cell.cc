@@ -428,7 +428,8 @@ std::uint64_t PlainCell::PublishColumn(std::span<const Segment* const> in_order,
     for (const Segment* segment : in_order) {
       const std::int64_t own = lattice - segment->column_base;
       if (own >= 0 && own < 16 && segment->is_seen[static_cast<std::size_t>(own)]) {
-        says.push_back({segment->last, segment->driven, segment->column[static_cast<std::size_t>(own)]});
+        says.push_back(
+            {segment->last, segment->driven, segment->column[static_cast<std::size_t>(own)]});
       }
     }
     if (!says.empty()) {
