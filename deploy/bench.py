@@ -140,9 +140,10 @@ def bench_accuracy(bin_dir):
         name = "accuracy." + result["name"]
         emit(name + ".layers_right", result["layers_right"], f"of {result['cells']} cells", "goal", 0.99)
         emit(name + ".layers_real", result["layers_real"], f"of {result['cells']} cells", "none", None)
-        emit(name + ".altitude_rmse", result["altitude_rmse_m"], "m", "goal", 0.03)
+        emit(name + ".surfaces_found", result["surfaces_found"], f"of {result['surfaces']} surfaces", "none", None)
+        emit(name + ".altitude_rmse", result["altitude_rmse_m"], "m, of those found", "goal", 0.03)
         emit(name + ".altitude_within_30mm", result["altitude_within_30mm"],
-             f"of {result['altitudes']} surfaces", "none", None)
+             f"of {result['surfaces']} surfaces", "none", None)
         if result["moving_cells"]:
             emit(name + ".moving_gone", result["moving_gone"], f"of {result['moving_cells']} cells", "goal", 0.99)
         emit(name + ".static_kept", result["static_kept"], f"of {result['static_cells']} cells", "goal", 0.98)

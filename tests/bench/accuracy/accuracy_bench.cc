@@ -35,7 +35,8 @@ void Print(const std::string& name, const AccuracyScore& score) {
             << ", \"more\": " << score.cells_more
             << ", \"altitude_rmse_m\": " << score.altitude_rmse_m()
             << ", \"altitude_within_30mm\": " << score.altitude_within_30mm.value()
-            << ", \"altitudes\": " << score.altitudes
+            << ", \"surfaces_found\": " << score.surfaces_found.value()
+            << ", \"surfaces\": " << score.surfaces_found.whole
             << ", \"moving_gone\": " << score.moving_gone.value()
             << ", \"moving_gone_columns\": " << score.moving_gone_columns.value()
             << ", \"moving_gone_surface\": " << score.moving_gone_surface.value()

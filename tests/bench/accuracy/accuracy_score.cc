@@ -79,20 +79,17 @@ class Scorer {
     }
     const CellVerdict verdict = JudgeLayers(layers, truth);
     score_.layers_right.Add(verdict == CellVerdict::kRight);
-    score_.layers_real.Add(verdict == CellVerdict::kRight ||
-                           (verdict == CellVerdict::kMore && AreLayersReal(layers, truth)));
+    score_.layers_real.Add(AreLayersReal(layers, truth));
     score_.cells_missing += verdict == CellVerdict::kMissing ? 1U : 0U;
     score_.cells_fewer += verdict == CellVerdict::kFewer ? 1U : 0U;
     score_.cells_more += verdict == CellVerdict::kMore ? 1U : 0U;
   }
 
   void AddSurface(const TileLayer* layer, const SurfaceTruth& surface) {
-    if (layer != nullptr) {
-      const double error_m = AltitudeOf(*layer) - surface.altitude_m;
-      score_.altitude_square_sum_m2 += error_m * error_m;
-      ++score_.altitudes;
-      score_.altitude_within_30mm.Add(std::abs(error_m) <= 0.03);
-    }
+    const double error_m = layer == nullptr ? 0.0 : AltitudeOf(*layer) - surface.altitude_m;
+    score_.altitude_square_sum_m2 += error_m * error_m;
+    score_.surfaces_found.Add(layer != nullptr);
+    score_.altitude_within_30mm.Add(layer != nullptr && std::abs(error_m) <= 0.03);
     if (surface.is_free) {
       TraversabilityTable& table = score_.traversability;
       Count(layer, table.free_free, table.free_occupied, table.free_unknown);
@@ -144,7 +141,8 @@ class Scorer {
 }  // namespace
 
 double AccuracyScore::altitude_rmse_m() const {
-  return altitudes == 0 ? 0.0 : std::sqrt(altitude_square_sum_m2 / static_cast<double>(altitudes));
+  const auto found = static_cast<double>(surfaces_found.good);
+  return found == 0.0 ? 0.0 : std::sqrt(altitude_square_sum_m2 / found);
 }
 
 bool IsDecided(const CellTruth& truth) {
@@ -165,6 +163,12 @@ CellVerdict JudgeLayers(std::span<const TileLayer> layers, const CellTruth& trut
 
 bool AreLayersReal(std::span<const TileLayer> layers, const CellTruth& truth) {
   constexpr double kNear_m = 0.3;
+  for (const SurfaceTruth& surface : truth.surfaces) {
+    const TileLayer* layer = NearestLayer(layers, surface.altitude_m);
+    if (layer == nullptr || std::abs(AltitudeOf(*layer) - surface.altitude_m) >= kNear_m) {
+      return false;
+    }
+  }
   std::vector<double> left_m = truth.ground_m;
   for (const TileLayer& layer : layers) {
     const auto found = std::find_if(left_m.begin(), left_m.end(), [&](double ground_m) {

@@ -37,16 +37,16 @@ enum class CellVerdict : std::uint8_t { kRight, kMissing, kFewer, kMore };
 struct AccuracyScore {
   // Cells all of whose surfaces that any beam hit are counted ones.
   Share layers_right;
-  // The same, but further layers are right, too, where each lies within 0.3 m of a ground of its
-  // own that the world has there: fewer than three beams hit it, and the map knows it from between
-  // rays.
+  // Of the same, those that have each of these surfaces, and no layer that is not within 0.3 m of a
+  // ground of its own that the world has there: fewer than three beams may have hit it, and the map
+  // knows it from between rays.
   Share layers_real;
   std::uint64_t cells_missing = 0;
   std::uint64_t cells_fewer = 0;
   std::uint64_t cells_more = 0;
-  double altitude_square_sum_m2 = 0.0;
-  std::uint64_t altitudes = 0;
-  Share altitude_within_30mm;
+  Share surfaces_found;                 // of the counted ones: some layer lies within a metre
+  double altitude_square_sum_m2 = 0.0;  // of those found
+  Share altitude_within_30mm;           // of all
 
   Share moving_gone;          // in the column and on the surface
   Share moving_gone_columns;  // each alone
@@ -63,7 +63,7 @@ AccuracyScore ScoreMap(const DriveMap& map, const TruthMap& truth, const TruthOp
 // Of a cell whose surfaces are all counted.
 CellVerdict JudgeLayers(std::span<const TileLayer> layers, const CellTruth& truth);
 bool IsDecided(const CellTruth& truth);
-// No two layers on one ground of the world, and none beside.
+// Each surface has a layer, no two layers lie on one ground of the world, and none beside.
 bool AreLayersReal(std::span<const TileLayer> layers, const CellTruth& truth);
 // Is the layer nearest to `ground_m` occupied between two heights above it?
 bool IsOccupied(

@@ -143,7 +143,7 @@ TEST_F(KeyframeBuilderTest, OptionsOutOfRangeAreNamed) {
 TEST_F(KeyframeBuilderTest, WhatItJustDroveIsFreeWhateverFollowsIt) {
   // Up a ramp of 0.1 to the flat where it is now; something stands 3 m behind it.
   const auto world = [](const Eigen::Vector3d& d) {
-    const auto behind = d.x() < -1e-6 ? std::optional<double>(-3.0 / d.x()) : std::nullopt;
+    const auto behind = d.x() < -1e-6 ? std::optional<double>(-3.05 / d.x()) : std::nullopt;
     return Nearest(GroundRange(d, kHeight_m), behind);
   };
   std::vector<VehiclePlace> trail;

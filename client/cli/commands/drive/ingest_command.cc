@@ -67,7 +67,8 @@ class IngestCommand : public Command {
     arguments.Optional("--sensor-height", "M", options_.sensor_height_m,
                        "Above the ground [estimated]");
     arguments.Choice("--deskew", {"on", "off"}, deskew_, "Undo the vehicle's motion during a scan");
-    arguments.Optional("--start", "T", options_.start_s, "Seconds added to the scans' times [0]");
+    arguments.Optional("--start", "T", options_.start_s,
+                       "Seconds added to the scans' times [0]: who drives later has the last word");
   }
 
   Status Run(CommandContext& context) override {

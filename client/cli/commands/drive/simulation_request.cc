@@ -66,9 +66,17 @@ Result<SimulatedDrive> SimulationRequest::DriveBuiltIn(const DriveOptions& optio
                  StrCat("the ", world_,
                         " has its own way: --trajectory and --every are for city and FILE.obj"));
   }
+  if (parked_seed_ != 0 && *kind != WorldKind::kStreet) {
+    return Error(NoFreeSlots());
+  }
   Result<SimulatedWorld> world = MakeWorld(*kind);
   if (!world) return Error(world.error());
   return SimulatedDrive::Create(*std::move(world), options);
+}
+
+Status SimulationRequest::NoFreeSlots() const {
+  return {StatusCode::kInvalidArgument,
+          StrCat(world_, " has no free slots: --parked is for street and city")};
 }
 
 Result<SimulatedDrive> SimulationRequest::DriveAnyCity(const DriveOptions& options) const {
@@ -88,6 +96,7 @@ Result<SimulatedDrive> SimulationRequest::DriveMesh(const DriveOptions& options)
     return Error(StatusCode::kInvalidArgument,
                  StrCat(world_, ": a mesh does not say where to drive: give --trajectory FILE"));
   }
+  if (parked_seed_ != 0) return Error(NoFreeSlots());
   Result<Trajectory> trajectory = ReadTrajectory(trajectory_, {every_m_, options.scan_interval_s});
   if (!trajectory) return Error(trajectory.error());
   Result<ObjMesh> obj = ReadObj(world_);

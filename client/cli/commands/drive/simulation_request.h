@@ -20,6 +20,7 @@ class SimulationRequest {
 
  private:
   Result<DriveOptions> Options() const;
+  Status NoFreeSlots() const;
   Result<SimulatedDrive> DriveBuiltIn(const DriveOptions& options) const;
   Result<SimulatedDrive> DriveAnyCity(const DriveOptions& options) const;
   Result<SimulatedDrive> DriveMesh(const DriveOptions& options) const;
