@@ -8,10 +8,12 @@ void RecentDrives::Hear(SegmentSay& say) {
   if (last_word_ == kNone) {
     return;
   }
-  for (const SegmentSay& drive : drives_) {
-    const bool is_recent = say.time_ms - drive.driven_ms <= hold_ms_;
-    if (drive.session == say.session && drive.layer == say.layer && is_recent) {
-      DropHits(drive, say);
+  // Those that saw the layer last more than `hold_ms_` ago drove there before that.
+  for (auto drive = drives_.rbegin();
+       drive != drives_.rend() && say.time_ms - drive->time_ms <= hold_ms_; ++drive) {
+    const bool is_recent = say.time_ms - drive->driven_ms <= hold_ms_;
+    if (is_recent && drive->session == say.session && drive->layer == say.layer) {
+      DropHits(*drive, say);
     }
   }
   if (IsDrive(say)) {

@@ -47,7 +47,8 @@ int FoldedAll(std::span<const TimedSay> says, const MapProfile& profile) {
         says.begin(), says.begin() + static_cast<std::ptrdiff_t>(i), [&](const TimedSay& before) {
           return IsLastWord(before.units, profile) &&
                  before.last->key.session == says[i].last->key.session &&
-                 says[i].last->time_ms - before.driven->time_ms <= profile.driven_hold_ms;
+                 says[i].last->time_ms - std::min(before.driven->time_ms, before.last->time_ms) <=
+                     profile.driven_hold_ms;
         });
     sum = Folded(sum, follows_vehicle ? std::min(says[i].units, 0) : says[i].units, profile);
   }
