@@ -181,9 +181,9 @@ float GroundProfiles::SlopeFrom(std::span<const Return> from,
       const float slope = (r.z_m - first.z_m) / (r.range_m - first.range_m);
       const auto is_off = [&](const Return& between) {
         const float above_m = between.z_m - first.z_m - slope * (between.range_m - first.range_m);
-        const bool is_on_it = above_m > kStraight_m && !between.is_ground;  // or hangs above it
-        return std::abs(above_m) > kStraight_m && !is_on_it &&
-               above_m <= options.vehicle_clearance_m;
+        const bool is_other_ground =
+            between.is_ground && above_m > kStraight_m && above_m <= options.vehicle_clearance_m;
+        return above_m < -kStraight_m || is_other_ground;
       };
       const bool is_slope = slope <= options.max_ground_slope && std::none_of(&first, &r, is_off);
       return is_slope ? slope : 0.0F;

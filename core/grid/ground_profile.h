@@ -21,7 +21,7 @@ struct VehicleContact {
 
   // Height of the plane at (x, y), levelled frame.
   float HeightAt(float x_m, float y_m) const {
-    return -sensor_height_m - (normal.x() * x_m + normal.y() * y_m) / normal.z();
+    return VehiclePlace{.normal = normal}.GroundAt(x_m, y_m, sensor_height_m);
   }
 };
 

@@ -207,7 +207,8 @@ def street(bin_dir):
         assert result["occupied_on_path"] == 0
         assert result["standing"]["squares"] > 200 and in_columns["standing"] >= 0.95
         assert occupied >= 0.9
-        assert in_columns["moved"] <= 0.6, "what moves leaves trails"
+        # With a keyframe in 5 m few look into a square again once somebody left it.
+        assert in_columns["moved"] <= (0.6 if flags == "--every 5" else 0.5), "what moves leaves trails"
 
 
 class Shots:

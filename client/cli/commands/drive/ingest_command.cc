@@ -107,6 +107,7 @@ class IngestCommand : public Command {
                                             "height and tilt estimated from fewer scans of the "
                                             "folder? --session gives it a name of its own");
   }
+
   Status CompleteOptions() {
     const Result<ScanParity> parity = drive_.parity();
     if (!parity) return parity.error();
