@@ -1,7 +1,6 @@
-// One cell of the plain fusion: its observations, its segments, its layers.
+// One cell of the plain fusion: from its segments to its layers.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <set>
 #include <span>
@@ -9,26 +8,14 @@
 
 #include "core/fusion/observation/sigma_table.h"
 #include "core/fusion/tile_fusion.h"
+#include "tests/core/fusion/oracle/plain_survey.h"
 
 namespace atlas::testing {
-
-// One keyframe's word on one cell.
-struct PlainObservation {
-  const PlacedKeyframe* placed = nullptr;
-  std::int32_t altitude_mm = 0;
-  std::uint16_t distance_step = 0;
-  AltitudeSource source = AltitudeSource::kNone;
-  Occupancy occupancy = Occupancy::kUnknown;
-  std::uint64_t column = 0;
-  std::int32_t column_base = 0;
-
-  bool is_strong() const { return source != AltitudeSource::kExtrapolated; }
-};
 
 class PlainCell {
  public:
   PlainCell(const MapProfile& profile, const SigmaTable& sigmas)
-      : profile_(profile), sigmas_(sigmas) {}
+      : profile_(profile), sigmas_(sigmas), survey_(profile, sigmas) {}
 
   // The layers of a cell from its observations in canonical order, lowest first; adds to `used` a
   // key of each session that took part.
@@ -37,26 +24,7 @@ class PlainCell {
             std::vector<TileLayer>& out);
 
  private:
-  struct Segment {
-    const PlacedKeyframe* first = nullptr;
-    const PlacedKeyframe* last = nullptr;
-    const PlacedKeyframe* driven = nullptr;  // the last whose vehicle was there, while it holds
-    const PlainObservation* representative = nullptr;
-    std::int64_t weight = 0;
-    std::int64_t weighted_mm = 0;
-    std::int64_t observations = 0;
-    int occupancy = 0;
-    int column_base = 0;
-    std::array<int, 16> column{};
-    std::array<bool, 16> is_seen{};
-    int layer = -1;
-    bool is_kept = true;
-  };
-  struct Nearest {
-    Segment* segment = nullptr;
-    std::int64_t distance_mm = 0;
-    std::size_t alike = 0;  // segments of the kind
-  };
+  using Segment = PlainSegment;
   struct Layer {
     int chained = 0;  // its number in the chain
     std::int64_t altitude_mm = 0;
@@ -66,20 +34,6 @@ class PlainCell {
     bool is_measured = false;
   };
 
-  void FindSegments(std::span<const PlainObservation> observations);
-  Nearest FindNearest(std::int64_t altitude_mm, bool is_strong, std::size_t stretch_begin);
-  bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
-  Segment& SegmentFor(const PlainObservation& observation, const Nearest& nearest);
-  void AddTo(const PlainObservation& observation, std::int64_t weight, Segment& segment) const;
-  struct Say {
-    int units;
-    bool is_vehicle;
-    bool is_over_vehicle;
-  };
-  void Add(const Say& say, int& sum) const;
-  void ReleaseOld(Segment& segment) const;
-  static bool SpeaksOfVehicle(const PlainObservation& observation);
-  void AddColumn(const PlainObservation& observation, Segment& segment) const;
   void KeepLatest();
   bool IsAlone(const Segment& segment) const;
   void ChainLayers(bool all_make);
@@ -91,7 +45,8 @@ class PlainCell {
 
   const MapProfile& profile_;
   const SigmaTable& sigmas_;
-  std::vector<Segment> segments_;
+  PlainSurvey survey_;
+  std::span<Segment> segments_;
   std::vector<Segment*> makers_;
   std::vector<Layer> layers_;
 };
