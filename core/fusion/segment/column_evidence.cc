@@ -91,7 +91,7 @@ void AddNibbles(std::uint64_t nibbles,
   const Lanes before = std::bit_cast<Lanes>(evidence);
   const Lanes usual = All(clamp.usual);
   const Lanes sum = AddSaturating(before, added, usual);
-  // Where the vehicle itself was is for this stretch the last word; right above it a mere miss goes
+  // Where the vehicle itself was is the last word until released; right above it a mere miss goes
   // no deeper, and a hit adds up.
   const Lanes driven = -All(clamp.driven);
   const Lanes is_deep = before < -usual;
