@@ -6,7 +6,7 @@ namespace atlas {
 namespace {
 
 constexpr double kLength_m = 5.0;
-constexpr double kSpacing_m = 0.5;
+constexpr double kSpacing_m = 1.0;
 
 // World from the levelled frame: the sensor's place, upright, its yaw.
 Pose Leveled(const Pose& T_world_sensor) {

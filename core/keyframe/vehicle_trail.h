@@ -10,7 +10,7 @@
 
 namespace atlas {
 
-// Places half a metre apart along the last 5 m of `T_world_sensor`, the drive until the scan, its
+// Places a metre apart along the last 5 m of `T_world_sensor`, the drive until the scan, its
 // own pose last; the latest place first. Two poses more than 5 m apart end it: a jump.
 std::vector<VehiclePlace> TrailBefore(std::span<const Pose> T_world_sensor,
                                       const SensorMount& mount);
