@@ -141,6 +141,12 @@ std::uint64_t LowNibbles(std::uint64_t nibbles, int segments) {
   return segments == 16 ? nibbles : nibbles & ((std::uint64_t{1} << (4 * segments)) - 1);
 }
 
+// The low bits of the nibbles that are `state`.
+std::uint64_t Equal(std::uint64_t nibbles, std::uint8_t state) {
+  const std::uint64_t other = nibbles ^ (state * kLowBits);
+  return ~(other | (other >> 1) | (other >> 2) | (other >> 3)) & kLowBits;
+}
+
 std::uint64_t ColumnFromMasks(
     HalfMask passed, HalfMask hit, float ground_m, int anchor, const HalfSegments& halves) {
   const HalfMask missed = Missed(passed, halves.SegmentAt(ground_m));
@@ -149,9 +155,9 @@ std::uint64_t ColumnFromMasks(
   return (states & kLowBits) * kNibbleHit + ((states >> 1) & kLowBits) * kNibbleMiss;
 }
 
-// Marks cells of the vehicle itself: free from the ground to the segment that a sensor at a height
-// is in, whatever was traced there, and nearly so in that one, where the heads of those are that
-// follow.
+// Marks cells of the vehicle itself: free from the ground to the segment that its top is in,
+// whatever was traced there, and nearly so in that one, where the heads of those are that follow.
+// Of two places the higher counts.
 class BodyMarker {
  public:
   BodyMarker(const GridGeometry& grid,
@@ -161,7 +167,7 @@ class BodyMarker {
              LocalColumns& result)
       : grid_(grid), options_(options), halves_(halves), cells_(cells), result_(result) {}
 
-  void Mark(std::int32_t ix, std::int32_t iy, float sensor_z_m) {
+  void Mark(std::int32_t ix, std::int32_t iy, float top_m) {
     const std::size_t cell = grid_.Index(ix, iy);
     if (cells_[cell].source == AltitudeSource::kNone) {
       return;
@@ -171,9 +177,10 @@ class BodyMarker {
     const auto nibbles = [&](HalfMask mask) {
       return SpreadToNibbles(halves_.From(anchor, mask)) & kLowBits;
     };
-    const std::uint64_t body = nibbles(halves_.Below(sensor_z_m));
-    const std::uint64_t above = nibbles(halves_.SegmentAt(sensor_z_m) & kLowerHalves);
     std::uint64_t& column = result_.columns[cell];
+    const std::uint64_t body = nibbles(halves_.Below(top_m));
+    const std::uint64_t above =
+        nibbles(halves_.SegmentAt(top_m) & kLowerHalves) & ~Equal(column, kNibbleFree);
     column =
         LowNibbles((column & ~((body | above) * 15)) | body * kNibbleFree | above * kNibbleOver,
                    options_.segments);
@@ -228,13 +235,14 @@ LocalColumns TraceColumns(const LeveledScan& scan,
     }
   });
   BodyMarker marker(grid, options, halves, cells, result);
+  const float clearance_m = options.body.clearance_m;
   for (const VehiclePlace& place : trail) {
     options.body.ForEachCell(grid, place, [&](std::int32_t ix, std::int32_t iy, float, float) {
-      marker.Mark(ix, iy, place.sensor_m.z());
+      marker.Mark(ix, iy, place.sensor_m.z() + clearance_m);
     });
   }
-  options.body.ForEachCell(grid,
-                           [&](std::int32_t ix, std::int32_t iy) { marker.Mark(ix, iy, 0.0F); });
+  options.body.ForEachCell(
+      grid, [&](std::int32_t ix, std::int32_t iy) { marker.Mark(ix, iy, clearance_m); });
   return result;
 }
 

@@ -25,11 +25,13 @@ struct VehiclePlace {
   }
 };
 
-// A box around the sensor, levelled frame, from the ground to the sensor's height. Default: a car
-// with its mirrors; shorter than it is, for the sensor may stand at either end.
+// A box around the sensor, levelled frame, from the ground to `clearance_m` above the sensor.
+// Default: a car with its mirrors, shorter than it is, for the sensor may stand at either end, and
+// the room that it keeps above itself.
 struct VehicleBody {
   float half_length_m = 1.5F;
   float half_width_m = 1.1F;
+  float clearance_m = 0.3F;
 
   // Calls visit(ix, iy) for the cells of `grid` below it.
   template <typename Visit>

@@ -130,7 +130,7 @@ TEST(ColumnTracerTest, GroundReturnsClearAPlaceWithNothingBehindIt) {
   }
 }
 
-TEST(ColumnTracerTest, TheVehiclesOwnPlaceIsFreeFromTheGroundToTheSensor) {
+TEST(ColumnTracerTest, TheVehiclesOwnPlaceIsFreeFromTheGroundToItsTop) {
   for (const float height_m : {0.1F, 0.25F, 0.5F, 1.0F, 2.0F}) {
     ColumnWorld world(WithSegments(16, height_m));
     world.FarWall(-1.7F, 1.0F);
@@ -145,12 +145,31 @@ TEST(ColumnTracerTest, TheVehiclesOwnPlaceIsFreeFromTheGroundToTheSensor) {
             std::abs(x) < double{body.half_length_m} && std::abs(y) < double{body.half_width_m};
         for (int k = 0; k < 16; ++k) {
           const double z = (world.AnchorOf(ix, iy) + k + 0.5) * double{height_m};
-          const bool is_below_sensor = z + 0.4 * double{height_m} < 0.0;
-          EXPECT_EQ(world.State(x, y, z) == kNibbleFree, is_body && is_below_sensor)
+          const bool is_below_top = z + 0.4 * double{height_m} < double{body.clearance_m};
+          EXPECT_EQ(world.State(x, y, z) == kNibbleFree, is_body && is_below_top)
               << height_m << ": " << x << " " << y << " " << z;
         }
       }
     }
+  }
+}
+
+// Five metres behind it, on the same plain but for what poses and the road's roughness make of it.
+TEST(ColumnTracerTest, WhereTheVehicleStoodBeforeTheSameSegmentsAreFree) {
+  for (const float higher_m : {-0.2F, -0.001F, 0.001F, 0.2F}) {
+    ColumnWorld world;
+    world.Hit(-5.05F, 0.05F, -0.9F);  // a cyclist follows
+    world.Hit(-5.05F, 0.05F, 0.2F);   // and his head
+    world.Trail({.sensor_m = {-5.0F, 0.0F, higher_m}});
+    world.Trace();
+    for (const double x : {-6.45, -5.05, -3.55, -1.45, 0.05, 1.45}) {
+      for (const double z : {-1.5, -0.5}) {
+        EXPECT_EQ(world.State(x, 0.05, z), kNibbleFree) << higher_m << ": " << x << " " << z;
+      }
+      EXPECT_EQ(world.State(x, 0.05, 0.5), kNibbleOver) << higher_m << ": " << x;
+      EXPECT_NE(world.State(x, 0.05, 1.5), kNibbleOver) << higher_m << ": " << x;
+    }
+    EXPECT_NE(world.State(-7.0, 0.05, -0.5), kNibbleFree) << higher_m;
   }
 }
 

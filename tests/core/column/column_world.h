@@ -50,7 +50,10 @@ class ColumnWorld {
     }
   }
 
-  void Trace() { result_ = TraceColumns(scan_, rays_, cells_, {}, options_); }
+  // The vehicle stood there before.
+  void Trail(const VehiclePlace& place) { trail_.push_back(place); }
+
+  void Trace() { result_ = TraceColumns(scan_, rays_, cells_, trail_, options_); }
 
   const GridGeometry& grid() const { return rays_.grid(); }
   const LocalColumns& result() const { return result_; }
@@ -83,6 +86,7 @@ class ColumnWorld {
   RayTable rays_;
   std::vector<KeyframeCell> cells_;
   LeveledScan scan_;
+  std::vector<VehiclePlace> trail_;
   LocalColumns result_;
 };
 

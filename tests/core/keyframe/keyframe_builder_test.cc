@@ -157,14 +157,15 @@ TEST_F(KeyframeBuilderTest, WhatItJustDroveIsFreeWhateverFollowsIt) {
   const Keyframe with = Build(world, Eigen::Quaterniond::Identity(), trail);
   EXPECT_EQ(without.cells[CellAt(without, -3.05, 0.55)].occupancy, Occupancy::kObstacle);
   EXPECT_EQ(Segment(without, -3.05, 0.55, -0.5), kNibbleHit);
-  for (const double x_m : {-1.95, -3.05, -4.05, -6.35}) {
+  for (const double x_m : {-1.95, -3.05, -4.55, -6.35}) {
     for (const double y_m : {-1.05, 0.05, 1.05}) {
       const KeyframeCell& cell = with.cells[CellAt(with, x_m, y_m)];
       EXPECT_EQ(cell.occupancy, Occupancy::kDriven) << x_m << ' ' << y_m;
       EXPECT_EQ(cell.source, AltitudeSource::kMeasured);
       EXPECT_NEAR(cell.altitude_mm, 1e3 * (0.1 * x_m - kHeight_m), 2.0) << x_m << ' ' << y_m;
       EXPECT_EQ(Segment(with, x_m, y_m, -1.5), kNibbleFree);
-      EXPECT_EQ(Segment(with, x_m, y_m, -0.5), kNibbleOver);  // of the sensor that stood lower
+      // Its top was above the sensor of now, or where it stood lower in the segment below it.
+      EXPECT_EQ(Segment(with, x_m, y_m, -0.5), x_m > -4.5 ? kNibbleFree : kNibbleOver) << x_m;
     }
     EXPECT_NE(with.cells[CellAt(with, x_m, 1.25)].occupancy, Occupancy::kDriven);
   }
