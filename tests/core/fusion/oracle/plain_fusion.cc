@@ -13,8 +13,11 @@ namespace {
 // A keyframe against the map's cells, in cells x 2^31.
 class PlainResampler {
  public:
-  PlainResampler(const PlacedKeyframe& placed, const SigmaTable& sigmas, const MapProfile& profile)
-      : placed_(placed), sigmas_(sigmas), profile_(profile) {
+  PlainResampler(const PlacedKeyframe& placed,
+                 std::uint32_t stretch,
+                 const SigmaTable& sigmas,
+                 const MapProfile& profile)
+      : placed_(placed), stretch_(stretch), sigmas_(sigmas), profile_(profile) {
     const KeyframePlacement& p = placed.placement;
     const Int128 cos = p.cos_yaw;
     const Int128 sin = p.sin_yaw;
@@ -72,8 +75,9 @@ class PlainResampler {
     const std::int64_t slope =
         std::int64_t{p.slope_x} * (2 * ix + 1) + std::int64_t{p.slope_y} * (2 * iy + 1);
     const std::int64_t tilt_um = (slope * profile_.cell_size_um) >> 31;
-    PlainObservation observation;
+    PlainObservation& observation = out.emplace_back();
     observation.placed = &placed_;
+    observation.stretch = stretch_;
     observation.altitude_mm =
         static_cast<std::int32_t>(RoundDiv(p.z_um + 1'000 * cell.altitude_mm + tilt_um, 1'000));
     observation.distance_step = sigmas_.Step(static_cast<std::size_t>(squared));
@@ -85,10 +89,10 @@ class PlainResampler {
           RoundDiv(observation.altitude_mm - cell.altitude_mm, profile_.segment_height_mm) +
           keyframe.anchors[keyframe.BlockIndex(ix, iy)]);
     }
-    out.push_back(observation);
   }
 
   const PlacedKeyframe& placed_;
+  std::uint32_t stretch_;
   const SigmaTable& sigmas_;
   const MapProfile& profile_;
   std::int64_t u_origin_ = 0;
@@ -96,6 +100,11 @@ class PlainResampler {
   std::int64_t center_i_ = 0;  // the world cell that the sensor is in
   std::int64_t center_j_ = 0;
 };
+
+bool SameStretch(const PlacedKeyframe& a, const PlacedKeyframe& b, const MapProfile& profile) {
+  return a.key.sequence / profile.stretch_keyframes == b.key.sequence / profile.stretch_keyframes &&
+         a.key.session == b.key.session;
+}
 
 std::vector<const PlacedKeyframe*> InOrder(std::span<const PlacedKeyframe> keyframes) {
   std::vector<const PlacedKeyframe*> order;
@@ -120,8 +129,14 @@ Tile PlainFuseTile(const TileId& id,
   const std::int64_t side = profile.tile_cells;
   std::size_t cells = 0;
   std::vector<PlainResampler> resamplers;
+  std::uint32_t stretch = 0;
+  const PlacedKeyframe* previous = nullptr;
   for (const PlacedKeyframe* placed : InOrder(keyframes)) {
-    resamplers.emplace_back(*placed, sigmas, profile);
+    if (previous != nullptr && !SameStretch(*previous, *placed, profile)) {
+      ++stretch;
+    }
+    resamplers.emplace_back(*placed, stretch, sigmas, profile);
+    previous = placed;
   }
   Tile tile = EmptyTile(id, profile);
   PlainCell fuser(profile, sigmas);

@@ -12,9 +12,8 @@ namespace {
 
 constexpr std::size_t kMaxSegments = 32;  // of one stretch and kind in a cell
 
-bool SameStretch(const PlacedKeyframe& a, const PlacedKeyframe& b, const MapProfile& profile) {
-  return a.key.sequence / profile.stretch_keyframes == b.key.sequence / profile.stretch_keyframes &&
-         (a.key.session == b.key.session);
+std::int64_t DistanceMm(const PlainSegment& segment, std::int64_t altitude_mm) {
+  return std::abs(segment.representative->altitude_mm - altitude_mm);
 }
 
 }  // namespace
@@ -26,27 +25,29 @@ bool IsStretchsLastWord(int evidence, const MapProfile& profile) {
 std::span<PlainSegment> PlainSurvey::Find(std::span<const PlainObservation> observations) {
   segments_.clear();
   std::size_t stretch_begin = 0;
-  const PlacedKeyframe* previous = nullptr;
+  std::uint32_t stretch = 0;
   for (const PlainObservation& observation : observations) {
-    if (previous == nullptr || !SameStretch(*previous, *observation.placed, profile_)) {
+    if (observation.stretch != stretch) {
+      stretch = observation.stretch;
       stretch_begin = segments_.size();
     }
-    previous = observation.placed;
-    const Nearest ground = FindNearest(observation.altitude_mm, true, stretch_begin);
-    if (!observation.is_strong() && ground.segment != nullptr &&
-        ground.distance_mm < profile_.other_layer_mm) {
+    PlainSegment* const ground = FindNearest(observation.altitude_mm, true, stretch_begin);
+    const std::int64_t away_mm =
+        ground == nullptr ? profile_.other_layer_mm : DistanceMm(*ground, observation.altitude_mm);
+    if (!observation.is_strong() && away_mm < profile_.other_layer_mm) {
       PlainObservation lent = observation;  // its column, not its altitude
-      const std::int64_t error_mm =
-          std::abs(ground.segment->representative->altitude_mm - observation.altitude_mm);
       lent.occupancy =
-          error_mm <= profile_.same_layer_mm ? observation.occupancy : Occupancy::kUnknown;
-      AddTo(lent, 0, *ground.segment);
+          away_mm <= profile_.same_layer_mm ? observation.occupancy : Occupancy::kUnknown;
+      AddTo(lent, 0, *ground);
       continue;
     }
-    PlainSegment& segment =
-        SegmentFor(observation, observation.is_strong()
-                                    ? ground
-                                    : FindNearest(observation.altitude_mm, false, stretch_begin));
+    PlainSegment* const nearest = observation.is_strong()
+                                      ? ground
+                                      : FindNearest(observation.altitude_mm, false, stretch_begin);
+    const bool joins =
+        nearest != nullptr && (IsOneLayer(*nearest->representative, observation) ||
+                               CountAlike(*nearest->representative, stretch_begin) == kMaxSegments);
+    PlainSegment& segment = joins ? *nearest : NewSegment(observation);
     if (segment.representative == nullptr ||
         observation.distance_step < segment.representative->distance_step) {
       segment.representative = &observation;
@@ -58,26 +59,34 @@ std::span<PlainSegment> PlainSurvey::Find(std::span<const PlainObservation> obse
 
 // Of the stretch's segments of a kind the one seen last of those as close as one layer always may
 // be, else the nearest in altitude; of two equally near ones the one seen last.
-PlainSurvey::Nearest PlainSurvey::FindNearest(std::int64_t altitude_mm,
-                                              bool is_strong,
-                                              std::size_t stretch_begin) {
-  Nearest nearest;
+PlainSegment* PlainSurvey::FindNearest(std::int64_t altitude_mm,
+                                       bool is_strong,
+                                       std::size_t stretch_begin) {
+  PlainSegment* nearest = nullptr;
+  std::int64_t nearest_mm = 0;
   for (std::size_t i = stretch_begin; i < segments_.size(); ++i) {
     PlainSegment& segment = segments_[i];
     if (segment.representative->is_strong() != is_strong) {
       continue;
     }
-    ++nearest.alike;
-    const std::int64_t distance_mm = std::max<std::int64_t>(
-        std::abs(segment.representative->altitude_mm - altitude_mm), profile_.same_layer_mm);
-    if (nearest.segment == nullptr || distance_mm < nearest.distance_mm ||
-        (distance_mm == nearest.distance_mm &&
-         segment.last->key.sequence > nearest.segment->last->key.sequence)) {
-      nearest.segment = &segment;
-      nearest.distance_mm = distance_mm;
+    const std::int64_t distance_mm =
+        std::max<std::int64_t>(DistanceMm(segment, altitude_mm), profile_.same_layer_mm);
+    if (nearest == nullptr || distance_mm < nearest_mm ||
+        (distance_mm == nearest_mm && segment.last->key.sequence > nearest->last->key.sequence)) {
+      nearest = &segment;
+      nearest_mm = distance_mm;
     }
   }
   return nearest;
+}
+
+std::size_t PlainSurvey::CountAlike(const PlainObservation& observation,
+                                    std::size_t stretch_begin) const {
+  return static_cast<std::size_t>(
+      std::count_if(segments_.begin() + static_cast<std::ptrdiff_t>(stretch_begin), segments_.end(),
+                    [&](const PlainSegment& segment) {
+                      return segment.representative->is_strong() == observation.is_strong();
+                    }));
 }
 
 bool PlainSurvey::IsOneLayer(const PlainObservation& a, const PlainObservation& b) const {
@@ -88,12 +97,7 @@ bool PlainSurvey::IsOneLayer(const PlainObservation& a, const PlainObservation& 
                              {b.altitude_mm, sigmas_.Sigma100um(b.source, b.distance_step)}));
 }
 
-// A new one when the nearest would be another layer.
-PlainSegment& PlainSurvey::SegmentFor(const PlainObservation& observation, const Nearest& nearest) {
-  if (nearest.segment != nullptr && (nearest.alike == kMaxSegments ||
-                                     IsOneLayer(*nearest.segment->representative, observation))) {
-    return *nearest.segment;
-  }
+PlainSegment& PlainSurvey::NewSegment(const PlainObservation& observation) {
   PlainSegment& segment = segments_.emplace_back();
   segment.first = observation.placed;
   segment.column_base = ColumnBaseIndex(observation.altitude_mm, profile_) -
@@ -136,8 +140,8 @@ void PlainSurvey::ReleaseOld(PlainSegment& segment) const {
 
 bool PlainSurvey::SpeaksOfVehicle(const PlainObservation& observation) {
   bool speaks = observation.occupancy == Occupancy::kDriven;
-  for (int nibble = 0; nibble < 16; ++nibble) {
-    const std::uint8_t state = NibbleAt(observation.column, nibble);
+  for (std::uint64_t column = observation.column; column != 0; column >>= 4) {
+    const std::uint8_t state = NibbleAt(column, 0);
     speaks |= state == kNibbleFree || state == kNibbleOver;
   }
   return speaks;

@@ -15,12 +15,13 @@ namespace atlas::testing {
 // One keyframe's word on one cell.
 struct PlainObservation {
   const PlacedKeyframe* placed = nullptr;
+  std::uint64_t column = 0;
+  std::int32_t column_base = 0;
+  std::uint32_t stretch = 0;  // its number among those of the tile
   std::int32_t altitude_mm = 0;
   std::uint16_t distance_step = 0;
   AltitudeSource source = AltitudeSource::kNone;
   Occupancy occupancy = Occupancy::kUnknown;
-  std::uint64_t column = 0;
-  std::int32_t column_base = 0;
 
   bool is_strong() const { return source != AltitudeSource::kExtrapolated; }
 };
@@ -55,14 +56,11 @@ class PlainSurvey {
   std::span<PlainSegment> Find(std::span<const PlainObservation> observations);
 
  private:
-  struct Nearest {
-    PlainSegment* segment = nullptr;
-    std::int64_t distance_mm = 0;
-    std::size_t alike = 0;  // segments of the kind
-  };
-  Nearest FindNearest(std::int64_t altitude_mm, bool is_strong, std::size_t stretch_begin);
+  PlainSegment* FindNearest(std::int64_t altitude_mm, bool is_strong, std::size_t stretch_begin);
+  // The stretch's segments of the observation's kind.
+  std::size_t CountAlike(const PlainObservation& observation, std::size_t stretch_begin) const;
   bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
-  PlainSegment& SegmentFor(const PlainObservation& observation, const Nearest& nearest);
+  PlainSegment& NewSegment(const PlainObservation& observation);
   void AddTo(const PlainObservation& observation, std::int64_t weight, PlainSegment& segment) const;
   struct Say {
     int units;
