@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/small_sort.h"
+#include "core/fusion/combination/bounded_guards.h"
 
 namespace atlas {
 namespace {
@@ -17,9 +18,23 @@ constexpr std::uint32_t kOpenFusions = 16;
 constexpr std::int64_t kVisitMs = 60'000;
 constexpr std::uint32_t kVisitFusions = 2;
 
+// Preset bounded: what is set aside of a cell, of each band and vehicle, and of the tile, beside
+// what is settled.
+constexpr std::size_t kSpareSegments = 2;
+constexpr std::size_t kSpareShare = 8;  // one part in so many
+
 void SortByStretch(std::vector<SegmentView>& segments) {
   const auto is_before = [](const SegmentView& a, const SegmentView& b) {
     return a.stretch < b.stretch;
+  };
+  SmallStableSort(segments.begin(), segments.end(), is_before);
+}
+
+// As a stretch's survey has them: those that it saw last first.
+void SortAsSurveyed(std::vector<SegmentView>& segments) {
+  const auto is_before = [](const SegmentView& a, const SegmentView& b) {
+    return a.stretch != b.stretch ? a.stretch < b.stretch
+                                  : a.segment->last_frame > b.segment->last_frame;
   };
   SmallStableSort(segments.begin(), segments.end(), is_before);
 }
@@ -36,10 +51,16 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
     touched_ = CellSet(tile_.cell_begin.size() - 1);
     touched_.Fill();
   }
-  std::vector<PlannedStretch> wanted = Plan(change, profile);
-  SurveyForgottenAgain(wanted);
-  TakeStretches(wanted, profile);
   Settle(profile);
+  std::vector<PlannedStretch> wanted = Plan(change, profile);
+  if (const std::vector<bool> leaving = FindLeaving(wanted);
+      std::find(leaving.begin(), leaving.end(), true) != leaving.end()) {
+    RestoreSpare();
+    if (MayForgottenCount(leaving, profile)) {
+      SurveyForgottenAgain(wanted);
+    }
+  }
+  TakeStretches(wanted, profile);
 
   std::vector<FrameOnMap> expected;
   open_.clear();
@@ -81,23 +102,89 @@ std::vector<PlannedStretch> TileSurveys::Plan(const TileChange& change, const Ma
   return plan;
 }
 
-// What was forgotten did not count beside the settled segments as they were: where those change,
-// all that was forgotten is surveyed again.
-void TileSurveys::SurveyForgottenAgain(std::span<PlannedStretch> wanted) const {
-  std::size_t unchanged = 0;
-  for (const PlannedStretch& w : wanted) {
-    unchanged +=
-        w.old != PlannedStretch::kNone && !stretches_[w.old].open && w.kept == w.frames.size() ? 1u
-                                                                                               : 0u;
+// Which stretches leave the settled ones, by their places: those that go, change, or grow. One that
+// grows and has forgotten some of its segments starts over.
+std::vector<bool> TileSurveys::FindLeaving(std::span<PlannedStretch> wanted) const {
+  std::vector<bool> is_leaving(stretches_.size());
+  for (std::size_t i = 0; i < stretches_.size(); ++i) {
+    is_leaving[i] = !stretches_[i].open;
   }
-  const auto settled =
-      std::count_if(stretches_.begin(), stretches_.end(), [](const Stretch& s) { return !s.open; });
-  if (unchanged == static_cast<std::size_t>(settled)) {
+  for (PlannedStretch& w : wanted) {
+    if (w.old == PlannedStretch::kNone) {
+      continue;
+    }
+    if (w.kept == w.frames.size()) {
+      is_leaving[w.old] = false;
+    } else if (stretches_[w.old].has_forgotten) {
+      w.StartOver();
+    }
+  }
+  return is_leaving;
+}
+
+// What was set aside is settled again, as if it had never been: a change may let it count.
+void TileSurveys::RestoreSpare() {
+  std::vector<SettledSegments> spare = spare_.TakeAll();
+  if (spare.empty()) {
     return;
   }
+  std::vector<std::uint32_t> places(next_id_, SettledSegments::kGone);
+  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+    places[stretches_[i].id] = i;
+  }
+  SettledSegments merged;
+  for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
+    segments_.clear();
+    CollectSettled(cell);
+    for (SettledSegments& batch : spare) {
+      const std::span segments = batch.Segments(cell);
+      const std::span ids = batch.Stretches(cell);
+      for (std::size_t i = 0; i < segments.size(); ++i) {
+        if (places[ids[i]] != SettledSegments::kGone) {
+          segments_.push_back(View(segments[i], places[ids[i]]));
+        }
+      }
+    }
+    SortAsSurveyed(segments_);
+    for (const SegmentView& view : segments_) {
+      merged.Append(*view.segment, view.stretch);
+    }
+    merged.EndCell();
+  }
+  settled_ = std::move(merged);
+}
+
+bool TileSurveys::MayForgottenCount(const std::vector<bool>& is_leaving,
+                                    const MapProfile& profile) {
+  const bool any_forgotten = std::any_of(stretches_.begin(), stretches_.end(),
+                                         [](const Stretch& s) { return s.has_forgotten; });
+  if (!any_forgotten) {
+    return false;
+  }
+  for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
+    segments_.clear();
+    CollectSettled(cell);
+    const auto left =
+        std::stable_partition(segments_.begin(), segments_.end(),
+                              [&](const SegmentView& view) { return is_leaving[view.stretch]; });
+    if (MayCountAgain({segments_.begin(), left}, {left, segments_.end()}, profile)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Then nothing is forgotten any more, and nothing guarded.
+void TileSurveys::SurveyForgottenAgain(std::span<PlannedStretch> wanted) {
   for (PlannedStretch& w : wanted) {
     if (w.old != PlannedStretch::kNone && stretches_[w.old].has_forgotten) {
       w.StartOver();
+    }
+  }
+  for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
+    for (Segment& segment : settled_.Segments(cell)) {
+      segment.guards_vehicle = false;
+      segment.guards_band = false;
     }
   }
 }
@@ -109,8 +196,9 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
   for (std::uint32_t i = 0; i < wanted.size(); ++i) {
     PlannedStretch& w = wanted[i];
     const bool grows = w.kept < w.frames.size();
-    Stretch stretch{std::move(w.key), w.number, 0, 0, {}, {}, {}, false, 0, 0};
+    Stretch stretch{std::move(w.key), w.number, 0, 0, 0, {}, {}, {}, false, 0, 0};
     if (w.old == PlannedStretch::kNone) {
+      stretch.id = next_id_++;
       stretch.open.emplace(whole, profile);
     } else {
       stretch = std::move(stretches_[w.old]);
@@ -182,6 +270,7 @@ void TileSurveys::Settle(const MapProfile& profile) {
   }
   BoundedChoice choice(profile);
   SettledSegments merged;
+  SettledSegments spare;
   for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
     segments_.clear();
     CollectSettled(cell);
@@ -190,27 +279,53 @@ void TileSurveys::Settle(const MapProfile& profile) {
     }
     SortByStretch(segments_);
     if (profile.preset == FusionPreset::kBounded) {
-      Forget(choice);
+      SetAside(choice, profile, spare);
     }
     for (const SegmentView& view : segments_) {
       merged.Append(*view.segment, view.stretch);
     }
     merged.EndCell();
+    spare.EndCell();
   }
   settled_ = std::move(merged);
   for (const std::uint32_t i : settling) {
     stretches_[i].open.reset();
   }
+  if (!spare.is_empty()) {
+    spare_.Push(std::move(spare));
+    ForgetOldest();
+  }
 }
 
-// Leaves those of segments_ that count while they all are there.
-void TileSurveys::Forget(BoundedChoice& choice) {
+// Leaves those of segments_ that count while they all are there; some of the others go to `spare`.
+void TileSurveys::SetAside(BoundedChoice& choice,
+                           const MapProfile& profile,
+                           SettledSegments& spare) {
   const std::size_t kept = choice.MoveLatestToFront(segments_);
-  for (const SegmentView& view : std::span(segments_).subspan(kept)) {
+  const std::span rest = std::span(segments_).subspan(kept);
+  if (rest.empty()) {
+    return;
+  }
+  MarkGuards(std::span(segments_).first(kept), rest, profile);
+  for (const SegmentView& view : rest) {
     SetUsed(view, false);
+  }
+  const std::size_t spared = MoveSpareToFront(rest, kSpareSegments, profile);
+  for (const SegmentView& view : rest.first(spared)) {
+    spare.Append(*view.segment, stretches_[view.stretch].id);
+  }
+  for (const SegmentView& view : rest.subspan(spared)) {
     stretches_[view.stretch].has_forgotten = true;
   }
   segments_.resize(kept);
+}
+
+void TileSurveys::ForgetOldest() {
+  const std::vector<std::uint32_t> forgotten = spare_.DropOldest(settled_.bytes() / kSpareShare);
+  for (Stretch& stretch : stretches_) {
+    stretch.has_forgotten |=
+        std::find(forgotten.begin(), forgotten.end(), stretch.id) != forgotten.end();
+  }
 }
 
 const Tile& TileSurveys::Combine(const FusionContext& context) {
@@ -297,7 +412,7 @@ SegmentView TileSurveys::View(Segment& segment, std::uint32_t stretch) const {
 }
 
 std::size_t TileSurveys::bytes() const {
-  std::size_t bytes = sizeof(*this) + settled_.bytes() +
+  std::size_t bytes = sizeof(*this) + settled_.bytes() + spare_.bytes() +
                       tile_.layers.capacity() * sizeof(TileLayer) +
                       tile_.cell_begin.capacity() * sizeof(std::uint32_t);
   for (const Stretch& stretch : stretches_) {

@@ -5,8 +5,9 @@
 // equation 2 needs all observations of a session at once.
 //
 // A stretch is open while it grows; later its segments settle among those of the others. In preset
-// bounded, what can count no more is then forgotten, so that the size does not grow with the
-// passes; if a change could make it count again, its keyframes are asked for once more.
+// bounded, what counts no more is then set aside, compressed, and in the end forgotten, so that the
+// size does not grow with the passes. If a change could make what was forgotten count again, its
+// keyframes are asked for once more.
 #pragma once
 
 #include <cstddef>
@@ -22,6 +23,7 @@
 #include "core/fusion/stretch_plan.h"
 #include "core/fusion/survey/cell_set.h"
 #include "core/fusion/survey/settled_segments.h"
+#include "core/fusion/survey/spare_segments.h"
 #include "core/fusion/survey/stretch_survey.h"
 
 namespace atlas {
@@ -50,25 +52,30 @@ class TileSurveys {
   struct Stretch {
     SessionKey key;
     std::uint32_t number = 0;
+    std::uint32_t id = 0;       // its own as long as it stays
     std::uint32_t session = 0;  // equal for equal keys, rising
     std::uint32_t vehicle = 0;  // equal for equal vehicle names, rising
     std::vector<StretchMember> frames;
     std::vector<std::int64_t> times_ms;  // of the frames: they are looked up for every segment
     std::optional<StretchSurvey> open;   // else settled
-    bool has_forgotten = false;          // some of its segments, when it settled
+    bool has_forgotten = false;          // some of its segments are gone
     std::uint32_t used = 0;              // segments that are part of a layer
     std::uint32_t grown_at = 0;          // the count of Expect() calls then
   };
 
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);
-  void SurveyForgottenAgain(std::span<PlannedStretch> wanted) const;
+  std::vector<bool> FindLeaving(std::span<PlannedStretch> wanted) const;
+  void RestoreSpare();
+  bool MayForgottenCount(const std::vector<bool>& is_leaving, const MapProfile& profile);
+  void SurveyForgottenAgain(std::span<PlannedStretch> wanted);
   void TakeStretches(std::span<PlannedStretch> wanted, const MapProfile& profile);
   StretchSurvey Reopen(std::uint32_t number,
                        std::span<const StretchMember> frames,
                        const MapProfile& profile) const;
   bool IsToSettle(std::size_t i, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
-  void Forget(BoundedChoice& choice);
+  void SetAside(BoundedChoice& choice, const MapProfile& profile, SettledSegments& spare);
+  void ForgetOldest();
   void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);
   // Append a cell's segments to segments_.
   void CollectSettled(std::size_t cell);
@@ -79,7 +86,9 @@ class TileSurveys {
   TileId id_;
   std::uint32_t expected_count_ = 0;  // calls of Expect()
   std::vector<Stretch> stretches_;    // in canonical order
+  std::uint32_t next_id_ = 0;         // of stretches
   SettledSegments settled_;
+  SpareSegments spare_;                 // by the ids of stretches
   std::vector<std::uint32_t> open_;     // stretches that are
   std::vector<std::uint32_t> awaited_;  // stretches of the frames that must be added, last first
   Tile tile_;                           // without cells: there is none

@@ -1,5 +1,7 @@
 #include "core/fusion/survey/settled_segments.h"
 
+#include <algorithm>
+
 #include "core/fusion/survey/packed_arrays.h"
 
 namespace atlas {
@@ -39,12 +41,22 @@ void SettledSegments::Renumber(std::span<const std::uint32_t> numbers, CellSet& 
   stretches_.resize(kept);
 }
 
+std::vector<std::uint32_t> SettledSegments::FindStretches() const {
+  std::vector<std::uint32_t> found = stretches_;
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
 void SettledSegments::CopyTo(std::uint32_t stretch, StretchSurvey& survey) const {
   std::size_t begin = 0;
   for (std::size_t cell = 0; cell < cell_end_.size(); ++cell) {
     for (std::size_t i = cell_end_[cell]; i-- > begin;) {  // each comes before the last
       if (stretches_[i] == stretch) {
-        survey.AddSegment(cell, segments_[i]);
+        Segment segment = segments_[i];
+        segment.guards_vehicle = false;
+        segment.guards_band = false;
+        survey.AddSegment(cell, segment);
       }
     }
     begin = cell_end_[cell];

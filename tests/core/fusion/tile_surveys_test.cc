@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <map>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/base/str_cat.h"
 #include "tests/core/fusion/random_drives.h"
 #include "tests/core/support/test_scale.h"
 
@@ -115,6 +117,37 @@ TEST(TileSurveysTest, WhatFollowsIsAddedAndOnlyChangedStretchesAreSurveyedAgain)
   EXPECT_EQ(tile.Update(keyframes), 15u);
   keyframes.resize(32);
   EXPECT_EQ(tile.Update(keyframes), 0u);
+}
+
+// What a correction costs does not grow with what was ever recorded there: passes that count no
+// more stay forgotten.
+TEST(TileSurveysTest, ACorrectionAmongManyPassesCostsOneStretch) {
+  for (const std::uint32_t vehicles : {1u, 5u}) {
+    MapProfile profile = DrivesProfile(0);
+    profile.preset = FusionPreset::kBounded;
+    KeptTile tile(profile);
+    std::vector<PlacedKeyframe> keyframes;
+    constexpr std::uint32_t kPasses = 24;
+    constexpr std::uint32_t kFrames = 4;
+    for (std::uint32_t pass = 0; pass < kPasses; ++pass) {
+      const std::string vehicle = StrCat("car", pass % vehicles);
+      const std::string session = StrCat("pass", 100 + pass);
+      for (std::uint32_t i = 0; i < kFrames; ++i) {
+        keyframes.push_back(testing::PlacedFrame({vehicle, session, i}, {0.8, 0.8 + 0.1 * i},
+                                                 testing::StreetKeyframe(profile, 12, i)));
+        keyframes.back().time_ms = 1'000'000 * std::int64_t{pass} + 1'000 * i;
+        tile.Update(keyframes);
+      }
+    }
+    for (const std::uint32_t pass : {2u, 21u, 2u, 22u, 20u, 21u, 12u}) {
+      for (const std::int64_t moved_um : {30'000, -30'000}) {
+        for (std::uint32_t i = 0; i < kFrames; ++i) {
+          keyframes[pass * kFrames + i].placement.x_um += moved_um;
+        }
+        EXPECT_EQ(tile.Update(keyframes), kFrames) << vehicles << " vehicles, pass " << pass;
+      }
+    }
+  }
 }
 
 }  // namespace
