@@ -1,6 +1,7 @@
 #include "server/net/tcp_server.h"
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <exception>
 #include <utility>
@@ -120,7 +121,7 @@ class TcpServer::Impl {
   void Admit(tcp::socket socket) {
     std::erase_if(connections_, [](const auto& weak) { return weak.expired(); });
     if (connections_.size() >= options_.max_connections) {
-      spdlog::warn("connection refused: {} are open", connections_.size());
+      NoteRefusal();
       Refuse(std::move(socket));
       return;
     }
@@ -130,6 +131,17 @@ class TcpServer::Impl {
         std::make_shared<PeerConnection>(std::move(socket), handler_, budget_, options_);
     connections_.push_back(connection);
     connection->Start();
+  }
+
+  // One line a second, however many come.
+  void NoteRefusal() {
+    ++refused_;
+    const auto now = std::chrono::steady_clock::now();
+    if (now - refusal_noted_at_ < std::chrono::seconds(1)) {
+      return;
+    }
+    spdlog::warn("connections refused: {} by now, {} are open", refused_, connections_.size());
+    refusal_noted_at_ = now;
   }
 
   // Says why, as far as the socket takes it at once.
@@ -190,6 +202,8 @@ class TcpServer::Impl {
   tcp::acceptor acceptor_;
   asio::signal_set signals_;
   std::vector<std::weak_ptr<PeerConnection>> connections_;
+  std::uint64_t refused_ = 0;  // connections
+  std::chrono::steady_clock::time_point refusal_noted_at_;
   std::unique_ptr<asio::steady_timer> drain_limit_;
 };
 

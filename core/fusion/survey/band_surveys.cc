@@ -22,7 +22,6 @@ std::int32_t RowsWithin(std::size_t max_bytes,
                         const MapProfile& profile) {
   constexpr std::size_t kCellBytes = 128;        // of a stretch
   constexpr std::size_t kObservationBytes = 48;  // preset paper
-  constexpr std::size_t kMinRows = 16;           // fewer would ask for the keyframes too often
   std::size_t longest = 0;
   for (const FusionStretch& stretch : stretches) {
     longest = std::max(longest, stretch.frames.size());
@@ -31,7 +30,7 @@ std::int32_t RowsWithin(std::size_t max_bytes,
       stretches.size() * kCellBytes +
       (profile.preset == FusionPreset::kPaper ? longest * kObservationBytes : 0);
   return static_cast<std::int32_t>(std::clamp<std::size_t>(
-      max_bytes / (cell_bytes * profile.tile_cells), kMinRows, profile.tile_cells));
+      max_bytes / (cell_bytes * profile.tile_cells), std::size_t{1}, profile.tile_cells));
 }
 
 Result<BandSurveys> BandSurveys::Survey(const TileBand& band,

@@ -17,7 +17,7 @@ namespace atlas {
 // The largest radius of a frame's grid, at least 1: what a SigmaTable must reach.
 std::int32_t MaxRadiusCells(std::span<const FrameOnMap> frames);
 
-// How many rows of a tile can be surveyed at once within about `max_bytes`.
+// How many rows of a tile can be surveyed at once within about `max_bytes`, at least one.
 std::int32_t RowsWithin(std::size_t max_bytes,
                         std::span<const FusionStretch> stretches,
                         const MapProfile& profile);

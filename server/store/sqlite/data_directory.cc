@@ -2,8 +2,10 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include <fcntl.h>
@@ -49,6 +51,19 @@ void WriteHolder(int fd) {
   }
 }
 
+// A daemon that was killed holds its lock until the system has buried it.
+bool TryLock(int fd) {
+  constexpr int kTries = 20;
+  constexpr std::chrono::milliseconds kPause(50);
+  for (int i = 1; ::flock(fd, LOCK_EX | LOCK_NB) != 0; ++i) {
+    if (i == kTries) {
+      return false;
+    }
+    std::this_thread::sleep_for(kPause);
+  }
+  return true;
+}
+
 Status CheckContents(const fs::path& directory) {
   std::error_code error;
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
@@ -80,7 +95,7 @@ Result<DataDirectory> DataDirectory::Lock(const fs::path& directory) {
   if (fd < 0) {
     return Error(DiskError("data directory: cannot open", lock, errno));
   }
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+  if (!TryLock(fd)) {
     Status status(StatusCode::kConflict, StrCat("data directory ", directory.string(),
                                                 " is in use by process ", ReadHolder(fd)));
     ::close(fd);

@@ -1,11 +1,14 @@
 // What a new keyframe costs in the first, second, ... pass over the same place, from the upload to
 // the fused tiles, one at a time with one worker: one JSON line a pass.
-// Usage: passes_bench WORLD PRESET PASSES [VEHICLES]; with several they take turns
+// Usage: passes_bench WORLD PRESET PASSES [VEHICLES [correct]]; with several they take turns. With
+// `correct`: also what it costs after each pass to correct two keyframes of the first one, and two
+// of the latest.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/str_cat.h"
@@ -37,16 +40,63 @@ Result<std::vector<UploadRequest>> DrivePass(WorldKind world,
   return MakeUploads(*drive, profile, upload);
 }
 
-Status RunPass(
+using Placed = std::vector<PoseBatchRequest::Update>;
+
+// Two of a pass, a third of it apart.
+Placed PickTwo(const std::vector<UploadRequest>& pass) {
+  const UploadRequest& first = pass[pass.size() / 3];
+  const UploadRequest& second = pass[2 * pass.size() / 3];
+  return {{first.key, first.pose}, {second.key, second.pose}};
+}
+
+// There and back: the median, of the first time that a pass is touched and of the later ones.
+Result<std::pair<double, double>> CorrectThem(AtlasAtWork& atlas, const Placed& placed) {
+  constexpr int kTimes = 6;
+  std::vector<double> cpu_ms;
+  for (int time = 0; time < kTimes; ++time) {
+    PoseBatchRequest batch;
+    batch.author = "passes_bench";
+    batch.updates = placed;
+    for (auto& update : batch.updates) {
+      update.pose.x_um += time % 2 == 0 ? 300'000 : 0;
+    }
+    const auto cost = atlas.UpdatePoses(std::move(batch));
+    if (!cost) return Error(cost.error());
+    cpu_ms.push_back(cost->cpu_ms);
+  }
+  const double first_ms = cpu_ms.front();
+  return std::pair(first_ms, Quantile({cpu_ms.begin() + 1, cpu_ms.end()}, 0.5));
+}
+
+// One JSON line.
+Status PrintCorrections(AtlasAtWork& atlas,
+                        int pass,
+                        const MapProfile& profile,
+                        const Placed& oldest,
+                        const Placed& latest) {
+  const auto of_oldest = CorrectThem(atlas, oldest);
+  if (!of_oldest) return of_oldest.error();
+  const auto of_latest = CorrectThem(atlas, latest);
+  if (!of_latest) return of_latest.error();
+  std::cout << "{\"corrected_after_pass\": " << pass << ", \"preset\": \""
+            << FusionPresetName(profile.preset) << "\", \"oldest_first_ms\": " << of_oldest->first
+            << ", \"oldest_ms\": " << of_oldest->second
+            << ", \"latest_first_ms\": " << of_latest->first
+            << ", \"latest_ms\": " << of_latest->second << "}" << std::endl;
+  return {};
+}
+
+Result<Placed> RunPass(
     AtlasAtWork& atlas, WorldKind world, int pass, int vehicles, const MapProfile& profile) {
   auto requests = DrivePass(world, pass, vehicles, profile);
-  if (!requests) return requests.error();
+  if (!requests) return Error(requests.error());
+  Placed two = PickTwo(*requests);
   std::vector<double> cpu_ms;
   std::vector<double> wall_ms;
   std::uint64_t tiles = 0;
   for (UploadRequest& request : *requests) {
     const auto cost = atlas.Upload(std::move(request));
-    if (!cost) return cost.error();
+    if (!cost) return Error(cost.error());
     cpu_ms.push_back(cost->cpu_ms);
     wall_ms.push_back(cost->wall_ms);
     tiles += cost->tiles;
@@ -54,7 +104,7 @@ Status RunPass(
   double cpu_sum_ms = 0;
   for (const double ms : cpu_ms) cpu_sum_ms += ms;
   const auto status = atlas.service().ReadStatus();
-  if (!status) return status.error();
+  if (!status) return Error(status.error());
   const auto keyframes = static_cast<double>(cpu_ms.size());
   std::cout << "{\"pass\": " << pass << ", \"preset\": \"" << FusionPresetName(profile.preset)
             << "\", \"keyframes\": " << cpu_ms.size()
@@ -67,22 +117,35 @@ Status RunPass(
             << ", \"store_bytes\": " << status->counts.store_bytes
             << ", \"kept_bytes\": " << status->kept_bytes
             << ", \"rss_bytes\": " << status->rss_bytes << "}" << std::endl;
-  return {};
+  return two;
 }
 
-int Run(const std::string& world_name, const std::string& preset_name, int passes, int vehicles) {
+int Run(const std::string& world_name,
+        const std::string& preset_name,
+        int passes,
+        int vehicles,
+        bool corrects) {
   const auto world = WorldKindByName(world_name);
   const auto preset = FusionPresetByName(preset_name);
   if (!world || !preset || passes < 1 || vehicles < 1) {
     std::cerr << "usage: passes_bench street|overpass|garage strict|bounded|paper PASSES "
-                 "[VEHICLES]\n";
+                 "[VEHICLES [correct]]\n";
     return 2;
   }
   MapProfile profile;
   profile.preset = *preset;
   AtlasAtWork atlas(profile, {});
+  Placed oldest;
   for (int pass = 1; pass <= passes; ++pass) {
-    if (const Status status = RunPass(atlas, *world, pass, vehicles, profile); !status.ok()) {
+    const auto latest = RunPass(atlas, *world, pass, vehicles, profile);
+    Status status = latest ? Status() : latest.error();
+    if (pass == 1 && latest) {
+      oldest = *latest;
+    }
+    if (corrects && latest) {
+      status = PrintCorrections(atlas, pass, profile, oldest, *latest);
+    }
+    if (!status.ok()) {
       std::cerr << "pass " << pass << ": " << status.message() << "\n";
       return 1;
     }
@@ -96,8 +159,10 @@ int Run(const std::string& world_name, const std::string& preset_name, int passe
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   if (arguments.size() < 3) {
-    return atlas::testing::Run("", "", 0, 0);
+    return atlas::testing::Run("", "", 0, 0, false);
   }
   const int vehicles = arguments.size() > 3 ? std::atoi(arguments[3].c_str()) : 1;
-  return atlas::testing::Run(arguments[0], arguments[1], std::atoi(arguments[2].c_str()), vehicles);
+  const bool corrects = arguments.size() > 4 && arguments[4] == "correct";
+  return atlas::testing::Run(arguments[0], arguments[1], std::atoi(arguments[2].c_str()), vehicles,
+                             corrects);
 }

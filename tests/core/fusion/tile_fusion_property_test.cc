@@ -59,7 +59,11 @@ TEST(TileFusionPropertyTest, EqualsThePlainFusion) {
   std::size_t upper_layers = 0;
   std::ptrdiff_t columns = 0;
   for (std::uint32_t seed = 0; seed < testing::Scaled(60); ++seed) {
-    const MapProfile profile = DrivesProfile(seed);
+    MapProfile profile = DrivesProfile(seed);
+    if (seed % 5 == 3) {
+      profile.preset = FusionPreset::kPaper;
+      profile.sequence_gap = static_cast<std::uint16_t>(1 + seed % 3);
+    }
     const auto keyframes = RandomDrives(profile, seed);
     const TileId id{0, seed % 5 == 0 ? -1 : 0, 0};
     const Tile tile = FuseTile(id, keyframes, profile);
@@ -272,7 +276,8 @@ TEST(TileFusionPropertyTest, BandsOfATileAreTheTile) {
     EXPECT_EQ(*whole, *bands) << "seed " << seed;
     EXPECT_EQ(*whole, FuseTile({0, 0, 0}, keyframes, profile)) << "seed " << seed;
     EXPECT_LE(loads_of_one_band, static_cast<int>(frames.size()));
-    EXPECT_LE(loads - loads_of_one_band, 4 * static_cast<int>(frames.size()));
+    EXPECT_GT(loads, 2 * loads_of_one_band) << "a byte is enough for no more than a row";
+    EXPECT_LE(loads - loads_of_one_band, profile.tile_cells * static_cast<int>(frames.size()));
   }
 }
 

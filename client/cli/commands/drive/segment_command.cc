@@ -27,6 +27,7 @@ boost::json::object ReportJson(const DriveSegmentationReport& report, bool with_
   json["obstacle"] = report.obstacle;
   json["ms_per_scan"] = Rounded(report.ms_per_scan(), 3);
   json["scans"] = report.scans;
+  json["labelled_scans"] = report.score.scans();  // what the score is of
   return json;
 }
 

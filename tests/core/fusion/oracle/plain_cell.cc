@@ -53,15 +53,15 @@ void PlainCell::Fuse(std::span<const PlainObservation> observations,
   if (profile_.preset == FusionPreset::kBounded) {
     KeepLatest();
   }
-  const bool any_strong = std::any_of(segments_.begin(), segments_.end(), [](const Segment& s) {
-    return s.is_kept && s.representative->is_strong();
-  });
-  ChainLayers(!any_strong);
+  const bool any_strong = std::any_of(segments_.begin(), segments_.end(),
+                                      [](const Segment& s) { return s.is_kept && s.is_strong; });
+  const bool all_make = !any_strong || profile_.preset == FusionPreset::kPaper;
+  ChainLayers(all_make);
   for (Layer& layer : layers_) {
     SumLayer(layer);
   }
   KeepBestLayers();
-  if (any_strong) {
+  if (!all_make) {
     AdoptWeak();
   }
   for (std::size_t i = 0; i < layers_.size(); ++i) {
@@ -82,11 +82,11 @@ void PlainCell::KeepLatest() {
     segment.is_kept = false;
     preferred_first.push_back(&segment);
   }
-  std::stable_sort(
-      preferred_first.begin(), preferred_first.end(), [](const Segment* a, const Segment* b) {
-        return std::tuple(a->representative->is_strong(), a->last->time_ms, a->last->key) >
-               std::tuple(b->representative->is_strong(), b->last->time_ms, b->last->key);
-      });
+  std::stable_sort(preferred_first.begin(), preferred_first.end(),
+                   [](const Segment* a, const Segment* b) {
+                     return std::tuple(a->is_strong, a->last->time_ms, a->last->key) >
+                            std::tuple(b->is_strong, b->last->time_ms, b->last->key);
+                   });
   const auto band = [&](const Segment& s) {
     return FloorDiv(s.representative->altitude_mm, profile_.band_mm);
   };
@@ -107,7 +107,7 @@ void PlainCell::KeepLatest() {
 // No strong segment is of its deck.
 bool PlainCell::IsAlone(const Segment& segment) const {
   return std::none_of(segments_.begin(), segments_.end(), [&](const Segment& other) {
-    return other.is_kept && other.representative->is_strong() &&
+    return other.is_kept && other.is_strong &&
            std::abs(std::int64_t{other.representative->altitude_mm} -
                     segment.representative->altitude_mm) < profile_.other_layer_mm;
   });
@@ -119,13 +119,17 @@ void PlainCell::ChainLayers(bool all_make) {
   layers_.clear();
   for (Segment& segment : segments_) {
     segment.layer = -1;
-    if (segment.is_kept && (all_make || segment.representative->is_strong() ||
-                            (segment.occupancy > 0 && IsAlone(segment)))) {
+    if (segment.is_kept &&
+        (all_make || segment.is_strong || (segment.occupancy > 0 && IsAlone(segment)))) {
       makers_.push_back(&segment);
     }
   }
+  // Where altitudes are equal by stretch, and of each what it saw last first.
   std::stable_sort(makers_.begin(), makers_.end(), [](const Segment* a, const Segment* b) {
-    return a->representative->altitude_mm < b->representative->altitude_mm;
+    return std::tuple(a->representative->altitude_mm, a->representative->stretch,
+                      b->last->key.sequence) < std::tuple(b->representative->altitude_mm,
+                                                          b->representative->stretch,
+                                                          a->last->key.sequence);
   });
   const auto estimate = [&](const Segment& s) {
     return AltitudeEstimate{
@@ -140,9 +144,12 @@ void PlainCell::ChainLayers(bool all_make) {
     if (previous != nullptr) {
       const std::int64_t step = next.altitude_mm - estimate(*previous).altitude_mm;
       const std::int64_t span = next.altitude_mm - estimate(*lowest).altitude_mm;
-      is_same = span <= profile_.layer_span_mm &&
-                (step <= profile_.same_layer_mm ||
-                 (step < profile_.other_layer_mm && OverlapsAsOneLayer(estimate(*previous), next)));
+      const bool overlaps = OverlapsAsOneLayer(estimate(*previous), next);
+      is_same =
+          profile_.preset == FusionPreset::kPaper
+              ? overlaps
+              : span <= profile_.layer_span_mm && (step <= profile_.same_layer_mm ||
+                                                   (step < profile_.other_layer_mm && overlaps));
     }
     if (!is_same) {
       layers_.push_back({static_cast<int>(layers_.size())});
@@ -174,7 +181,7 @@ void PlainCell::SumLayer(Layer& layer) const {
         vehicle_moment += segment.weighted_mm - segment.weight * reference_mm;
         layer.observations += segment.observations;
         layer.time_ms = std::max(layer.time_ms, segment.last->time_ms);
-        layer.is_measured |= segment.representative->is_strong();
+        layer.is_measured |= segment.is_strong;
       }
     }
     if (vehicle_weight > kVehicleWeightCap) {
@@ -204,7 +211,7 @@ void PlainCell::KeepBestLayers() {
 
 void PlainCell::AdoptWeak() {
   for (Segment& segment : segments_) {
-    if (!segment.is_kept || segment.representative->is_strong() || segment.layer >= 0) {
+    if (!segment.is_kept || segment.is_strong || segment.layer >= 0) {
       continue;
     }
     std::int64_t nearest_mm = profile_.other_layer_mm;
@@ -236,7 +243,7 @@ TileLayer PlainCell::Publish(std::size_t index) const {
   std::vector<TimedSay> occupancies;
   for (const Segment* segment : in_order) {
     const bool is_wrong_guess =
-        layer.is_measured && !segment->representative->is_strong() &&
+        profile_.preset != FusionPreset::kPaper && layer.is_measured && !segment->is_strong &&
         std::abs(segment->representative->altitude_mm - layer.altitude_mm) > profile_.same_layer_mm;
     if (!is_wrong_guess) {
       occupancies.push_back({segment->last, segment->driven, segment->occupancy});

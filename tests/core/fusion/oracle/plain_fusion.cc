@@ -102,8 +102,9 @@ class PlainResampler {
 };
 
 bool SameStretch(const PlacedKeyframe& a, const PlacedKeyframe& b, const MapProfile& profile) {
-  return a.key.sequence / profile.stretch_keyframes == b.key.sequence / profile.stretch_keyframes &&
-         a.key.session == b.key.session;
+  return a.key.session == b.key.session &&
+         (profile.preset == FusionPreset::kPaper ||
+          a.key.sequence / profile.stretch_keyframes == b.key.sequence / profile.stretch_keyframes);
 }
 
 std::vector<const PlacedKeyframe*> InOrder(std::span<const PlacedKeyframe> keyframes) {

@@ -1,7 +1,7 @@
 // The rules of docs/algorithms/fusion.md written down a second time, as plainly as they read and in
 // one batch: the oracle that the product is compared with, field by field and in speed. Shares with
-// it only tables (SigmaTable, OverlapsAsOneLayer, nibbles) and types. Frozen: it changes only when
-// the rules do.
+// it only tables (SigmaTable, OverlapsAsOneLayer, nibbles), integer arithmetic, where a column
+// begins, and types. Changes only when the rules do.
 #pragma once
 
 #include <span>
@@ -10,7 +10,6 @@
 
 namespace atlas::testing {
 
-// Presets strict and bounded.
 Tile PlainFuseTile(const TileId& id,
                    std::span<const PlacedKeyframe> keyframes,
                    const MapProfile& profile);

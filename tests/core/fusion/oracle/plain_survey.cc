@@ -23,6 +23,9 @@ bool IsStretchsLastWord(int evidence, const MapProfile& profile) {
 }
 
 std::span<PlainSegment> PlainSurvey::Find(std::span<const PlainObservation> observations) {
+  if (profile_.preset == FusionPreset::kPaper) {
+    return FindByPaper(observations);
+  }
   segments_.clear();
   std::size_t stretch_begin = 0;
   std::uint32_t stretch = 0;
@@ -55,6 +58,50 @@ std::span<PlainSegment> PlainSurvey::Find(std::span<const PlainObservation> obse
     AddTo(observation, sigmas_.Weight(observation.source, observation.distance_step), segment);
   }
   return segments_;
+}
+
+std::span<PlainSegment> PlainSurvey::FindByPaper(std::span<const PlainObservation> observations) {
+  segments_.clear();
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= observations.size(); ++i) {
+    if (i == observations.size() || observations[i].stretch != observations[begin].stretch) {
+      FindRuns(observations.subspan(begin, i - begin));
+      begin = i;
+    }
+  }
+  return segments_;
+}
+
+// III-C: a segment is a run of keyframes that see the cell, its representative the nearest of them.
+// Eq. 2: an observation belongs to the last representative up to it or to the first after it, the
+// one that is closer in altitude.
+void PlainSurvey::FindRuns(std::span<const PlainObservation> session) {
+  const std::size_t first = segments_.size();
+  for (std::size_t i = 0; i < session.size(); ++i) {
+    const bool starts =
+        i == 0 || session[i].placed->key.sequence - session[i - 1].placed->key.sequence >
+                      profile_.sequence_gap;
+    PlainSegment& run = starts ? NewSegment(session[i]) : segments_.back();
+    if (starts || session[i].distance_step < run.representative->distance_step) {
+      run.representative = &session[i];
+    }
+  }
+  for (std::size_t i = first; i < segments_.size(); ++i) {
+    segments_[i].column_base = ColumnBase(*segments_[i].representative);
+  }
+  for (const PlainObservation& observation : session) {
+    std::size_t own = first;
+    for (std::size_t i = first; i < segments_.size(); ++i) {
+      own = segments_[i].representative <= &observation ? i : own;
+    }
+    if (segments_[own].representative <= &observation && own + 1 < segments_.size() &&
+        DistanceMm(segments_[own + 1], observation.altitude_mm) <
+            DistanceMm(segments_[own], observation.altitude_mm)) {
+      ++own;
+    }
+    AddTo(observation, sigmas_.Weight(observation.source, observation.distance_step),
+          segments_[own]);
+  }
 }
 
 // Of the stretch's segments of a kind the one seen last of those as close as one layer always may
@@ -100,15 +147,20 @@ bool PlainSurvey::IsOneLayer(const PlainObservation& a, const PlainObservation& 
 PlainSegment& PlainSurvey::NewSegment(const PlainObservation& observation) {
   PlainSegment& segment = segments_.emplace_back();
   segment.first = observation.placed;
-  segment.column_base = ColumnBaseIndex(observation.altitude_mm, profile_) -
-                        std::clamp((16 - profile_.column_segments) / 2, 1, 4);
+  segment.column_base = ColumnBase(observation);
   return segment;
+}
+
+int PlainSurvey::ColumnBase(const PlainObservation& representative) const {
+  return ColumnBaseIndex(representative.altitude_mm, profile_) -
+         std::clamp((16 - profile_.column_segments) / 2, 1, 4);
 }
 
 void PlainSurvey::AddTo(const PlainObservation& observation,
                         std::int64_t weight,
                         PlainSegment& segment) const {
   segment.last = observation.placed;
+  segment.is_strong |= observation.is_strong();
   ReleaseOld(segment);
   if (SpeaksOfVehicle(observation)) {
     segment.driven = observation.placed;

@@ -1,4 +1,5 @@
-// One cell of the plain fusion: from its observations to the segments of each stretch.
+// One cell of the plain fusion: from its observations to the segments of each stretch, in preset
+// paper of each session.
 #pragma once
 
 #include <array>
@@ -40,6 +41,7 @@ struct PlainSegment {
   std::array<int, 16> column{};
   std::array<bool, 16> is_seen{};
   int layer = -1;
+  bool is_strong = false;  // some of its observations are
   bool is_kept = true;
 };
 
@@ -56,11 +58,14 @@ class PlainSurvey {
   std::span<PlainSegment> Find(std::span<const PlainObservation> observations);
 
  private:
+  std::span<PlainSegment> FindByPaper(std::span<const PlainObservation> observations);
+  void FindRuns(std::span<const PlainObservation> session);
   PlainSegment* FindNearest(std::int64_t altitude_mm, bool is_strong, std::size_t stretch_begin);
   // The stretch's segments of the observation's kind.
   std::size_t CountAlike(const PlainObservation& observation, std::size_t stretch_begin) const;
   bool IsOneLayer(const PlainObservation& a, const PlainObservation& b) const;
   PlainSegment& NewSegment(const PlainObservation& observation);
+  int ColumnBase(const PlainObservation& representative) const;
   void AddTo(const PlainObservation& observation, std::int64_t weight, PlainSegment& segment) const;
   struct Say {
     int units;

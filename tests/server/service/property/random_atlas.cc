@@ -86,7 +86,9 @@ void Drawing::DrawProfile() {
   profile.segment_height_mm = OneIn(3) ? 1'000 : 500;
   profile.stretch_keyframes = 16;
   is_repeated_ = OneIn(3);
-  profile.preset = is_repeated_ || OneIn(3) ? FusionPreset::kBounded : FusionPreset::kStrict;
+  profile.preset = is_repeated_ || OneIn(3) ? FusionPreset::kBounded
+                   : OneIn(4)               ? FusionPreset::kPaper
+                                            : FusionPreset::kStrict;
   profile.band_segments = static_cast<std::uint8_t>(1 + Below(is_repeated_ ? 2 : 4));
   profile.band_vehicle_segments = static_cast<std::uint8_t>(1 + Below(3));
   const std::array<double, 4> far_m{0.0, 0.8, -1'234.0, 1'600'000.0};
