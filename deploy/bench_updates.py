@@ -77,6 +77,21 @@ def bench_passes(bin_dir, emit, _):
     draw_passes(curves, IMAGES / "passes.png")
 
 
+def bench_corrections(bin_dir, emit, _):
+    """Two keyframes corrected, of the oldest and the latest of up to 16 passes through the garage."""
+    for name, preset, vehicles in (("bounded", "bounded", 1), ("bounded_fleet", "bounded", 10),
+                                   ("strict", "strict", 1)):
+        rows = [row for row in rows_of(bin_dir / "passes_bench", "garage", preset, 16, vehicles, "correct")
+                if "corrected_after_pass" in row]
+        for row in rows:
+            passes = row["corrected_after_pass"]
+            if passes not in (4, 8, 16):
+                continue
+            for what in ("oldest_first", "oldest", "latest_first", "latest"):
+                emit(f"corrections.{name}.{passes}.{what}", row[what + "_ms"], "ms CPU an update",
+                     "after 4 passes", next(r for r in rows if r["corrected_after_pass"] == 4)[what + "_ms"])
+
+
 def bench_scaling(bin_dir, emit, _):
     """Ten keyframes corrected, in maps of 100, 1,000 and 10,000."""
     first = None
@@ -132,4 +147,4 @@ def draw_passes(curves, path):
 
 
 BENCHMARKS = {"speed": bench_speed, "closure": bench_closure, "online": bench_online,
-              "passes": bench_passes, "scaling": bench_scaling}
+              "passes": bench_passes, "corrections": bench_corrections, "scaling": bench_scaling}

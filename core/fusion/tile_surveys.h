@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "core/fusion/combination/bounded_choice.h"
@@ -96,5 +97,7 @@ class TileSurveys {
   CellSet touched_;                    // cells that changed since it was made
   std::vector<SegmentView> segments_;  // of a cell
 };
+
+static_assert(std::is_nothrow_move_constructible_v<TileSurveys>);  // vectors copy others
 
 }  // namespace atlas

@@ -4,6 +4,7 @@
 #include <cassert>
 
 #include "core/base/integer_math.h"
+#include "core/base/small_sort.h"
 
 namespace atlas {
 namespace {
@@ -127,7 +128,7 @@ std::size_t MoveSpareToFront(std::span<SegmentView> forgotten,
                              std::size_t spare,
                              const MapProfile& profile) {
   const Bands bands(profile);
-  std::stable_sort(forgotten.begin(), forgotten.end(), ComesBefore);
+  SmallStableSort(forgotten.begin(), forgotten.end(), ComesBefore);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < forgotten.size(); ++i) {
     const auto before = forgotten.first(kept);

@@ -29,7 +29,7 @@ std::vector<std::uint32_t> SpareSegments::DropOldest(std::size_t max_bytes) {
   while (batches_.size() > kAlwaysKept && bytes() > max_bytes) {
     const std::vector<std::uint32_t>& stretches = batches_.front().stretches;
     gone.insert(gone.end(), stretches.begin(), stretches.end());
-    batches_.pop_front();
+    batches_.erase(batches_.begin());
   }
   return gone;
 }

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <vector>
 
 #include "core/fusion/survey/settled_segments.h"
@@ -29,7 +28,7 @@ class SpareSegments {
     SettledSegments segments;  // packed
     std::vector<std::uint32_t> stretches;
   };
-  std::deque<Batch> batches_;  // the oldest first
+  std::vector<Batch> batches_;  // the oldest first
 };
 
 }  // namespace atlas
