@@ -1,7 +1,7 @@
 // How the cost of a pose update and the memory grow with the map: keyframes one a metre along a
-// winding way that comes back to where it was after 500 m, and batches of ten corrected ones. One
+// winding way that comes back to where it was after 50 m, and batches of ten corrected ones. One
 // JSON line.
-// Usage: scaling_bench KEYFRAMES
+// Usage: scaling_bench KEYFRAMES [SURVEY_MIB]: as atlasd's survey_mib, whose default is the default
 // The worlds of the keyframes are drawn (tests/core/support/keyframe_worlds.h), not simulated: what
 // they hold does not matter here, and ten thousand of them would take a while.
 #include <algorithm>
@@ -26,9 +26,11 @@ constexpr std::int32_t kRadiusCells = 200;
 constexpr std::uint32_t kWorlds = 50;  // that differ
 constexpr std::uint32_t kCorrected = 10;
 constexpr std::uint32_t kUpdates = 20;
-constexpr double kRow_m = 500.0;  // of a way to and fro, 3 m beside the last one each time
+constexpr double kRow_m = 50.0;  // of a way to and fro, 3 m beside the last one each time
+constexpr std::uint32_t kPlaceKeyframes = 100;  // two such rows
 
-// Rows of 500 keyframes, two passes of each row, then on to another place 100 m away.
+// Rows of 50 keyframes, two passes of each row, then on to another place 100 m away: the smallest
+// map is as dense as the largest.
 QuantizedPose PoseOf(std::uint32_t i, double shift_m) {
   const double along_m = i % static_cast<std::uint32_t>(kRow_m);
   const std::uint32_t row = i / static_cast<std::uint32_t>(kRow_m);
@@ -65,9 +67,12 @@ Status Fill(AtlasAtWork& atlas, const MapProfile& profile, std::uint32_t keyfram
   return {};
 }
 
-Status Run(std::uint32_t keyframes) {
+Status Run(std::uint32_t keyframes, std::size_t survey_mib) {
   const MapProfile profile;
-  AtlasAtWork atlas(profile, {});
+  FusionOptions fusion;
+  const std::size_t survey_bytes = survey_mib << 20;
+  fusion.building.surveys = {survey_bytes / 3 * 2, survey_bytes / 3};
+  AtlasAtWork atlas(profile, fusion);
   ATLAS_RETURN_IF_ERROR(Fill(atlas, profile, keyframes));
   const double filled_mb = PeakMegabytes();
   std::vector<double> cpu_ms;
@@ -75,9 +80,13 @@ Status Run(std::uint32_t keyframes) {
   for (std::uint32_t update = 0; update < kUpdates; ++update) {
     PoseBatchRequest batch;
     batch.author = "scaling_bench";
-    const std::uint32_t first = (keyframes - kCorrected) * update / kUpdates;  // all over the map
+    const double shift_m = 0.05 * (update + 1);  // in a small map it is some keyframes' second
+    const std::uint32_t place =
+        keyframes / kPlaceKeyframes * update / kUpdates;  // all over the map
+    const std::uint32_t first =
+        place * kPlaceKeyframes + 37 * update % (kPlaceKeyframes - kCorrected + 1);
     for (std::uint32_t i = first; i < first + kCorrected; ++i) {
-      batch.updates.push_back({KeyOf(i), PoseOf(i, 0.3)});
+      batch.updates.push_back({KeyOf(i), PoseOf(i, shift_m)});
     }
     const auto cost = atlas.UpdatePoses(std::move(batch));
     if (!cost) return cost.error();
@@ -100,12 +109,14 @@ Status Run(std::uint32_t keyframes) {
 }  // namespace atlas::testing
 
 int main(int argc, char** argv) {
-  const int keyframes = argc == 2 ? std::atoi(argv[1]) : 0;
-  if (keyframes < 20) {
-    std::cerr << "usage: scaling_bench KEYFRAMES (20 or more)\n";
+  const int keyframes = argc > 1 ? std::atoi(argv[1]) : 0;
+  const int survey_mib = argc > 2 ? std::atoi(argv[2]) : 1'536;
+  if (keyframes < static_cast<int>(atlas::testing::kPlaceKeyframes) || survey_mib < 0) {
+    std::cerr << "usage: scaling_bench KEYFRAMES (100 or more) [SURVEY_MIB]\n";
     return 2;
   }
-  const auto status = atlas::testing::Run(static_cast<std::uint32_t>(keyframes));
+  const auto status = atlas::testing::Run(static_cast<std::uint32_t>(keyframes),
+                                          static_cast<std::size_t>(survey_mib));
   if (!status.ok()) {
     std::cerr << "scaling_bench: " << status.message() << "\n";
     return 1;
