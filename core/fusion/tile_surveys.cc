@@ -18,10 +18,8 @@ constexpr std::uint32_t kOpenFusions = 16;
 constexpr std::int64_t kVisitMs = 60'000;
 constexpr std::uint32_t kVisitFusions = 2;
 
-// Preset bounded: what is set aside of a cell, of each band and vehicle, and of the tile, beside
-// what is settled.
+// Preset bounded: what is set aside of each band and vehicle of a cell.
 constexpr std::size_t kSpareSegments = 2;
-constexpr std::size_t kSpareShare = 8;  // one part in so many
 
 void SortByStretch(std::vector<SegmentView>& segments) {
   const auto is_before = [](const SegmentView& a, const SegmentView& b) {
@@ -124,27 +122,18 @@ std::vector<bool> TileSurveys::FindLeaving(std::span<PlannedStretch> wanted) con
 
 // What was set aside is settled again, as if it had never been: a change may let it count.
 void TileSurveys::RestoreSpare() {
-  std::vector<SettledSegments> spare = spare_.TakeAll();
-  if (spare.empty()) {
+  if (spare_.bytes() == 0) {
     return;
   }
-  std::vector<std::uint32_t> places(next_id_, SettledSegments::kGone);
-  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
-    places[stretches_[i].id] = i;
-  }
+  spare_.Unpack();
+  const std::vector<std::uint32_t> places = PlacesById();
   SettledSegments merged;
   for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
     segments_.clear();
+    rest_.clear();
     CollectSettled(cell);
-    for (SettledSegments& batch : spare) {
-      const std::span segments = batch.Segments(cell);
-      const std::span ids = batch.Stretches(cell);
-      for (std::size_t i = 0; i < segments.size(); ++i) {
-        if (places[ids[i]] != SettledSegments::kGone) {
-          segments_.push_back(View(segments[i], places[ids[i]]));
-        }
-      }
-    }
+    CollectSpare(cell, places);
+    segments_.insert(segments_.end(), rest_.begin(), rest_.end());
     SortAsSurveyed(segments_);
     for (const SegmentView& view : segments_) {
       merged.Append(*view.segment, view.stretch);
@@ -152,6 +141,27 @@ void TileSurveys::RestoreSpare() {
     merged.EndCell();
   }
   settled_ = std::move(merged);
+  spare_ = SettledSegments();
+}
+
+// Of each id the stretch's place, kGone of those that are not there any more.
+std::vector<std::uint32_t> TileSurveys::PlacesById() const {
+  std::vector<std::uint32_t> places(next_id_, SettledSegments::kGone);
+  for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
+    places[stretches_[i].id] = i;
+  }
+  return places;
+}
+
+// Appends a cell's spare segments to rest_.
+void TileSurveys::CollectSpare(std::size_t cell, std::span<const std::uint32_t> places) {
+  const std::span segments = spare_.Segments(cell);
+  const std::span ids = spare_.Stretches(cell);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (places[ids[i]] != SettledSegments::kGone) {
+      rest_.push_back(View(segments[i], places[ids[i]]));
+    }
+  }
 }
 
 bool TileSurveys::MayForgottenCount(const std::vector<bool>& is_leaving,
@@ -268,6 +278,10 @@ void TileSurveys::Settle(const MapProfile& profile) {
   if (settling.empty()) {
     return;
   }
+  if (spare_.bytes() != 0) {
+    spare_.Unpack();
+  }
+  const std::vector<std::uint32_t> places = PlacesById();
   BoundedChoice choice(profile);
   SettledSegments merged;
   SettledSegments spare;
@@ -279,6 +293,8 @@ void TileSurveys::Settle(const MapProfile& profile) {
     }
     SortByStretch(segments_);
     if (profile.preset == FusionPreset::kBounded) {
+      rest_.clear();
+      CollectSpare(cell, places);
       SetAside(choice, profile, spare);
     }
     for (const SegmentView& view : segments_) {
@@ -291,40 +307,34 @@ void TileSurveys::Settle(const MapProfile& profile) {
   for (const std::uint32_t i : settling) {
     stretches_[i].open.reset();
   }
+  spare_ = SettledSegments();
   if (!spare.is_empty()) {
-    spare_.Push(std::move(spare));
-    ForgetOldest();
+    spare_ = std::move(spare);
+    spare_.Pack();
   }
 }
 
-// Leaves those of segments_ that count while they all are there; some of the others go to `spare`.
+// Leaves those of segments_ that count while they all are there. Of the others and those of rest_
+// some go to `spare`, and what is left is forgotten.
 void TileSurveys::SetAside(BoundedChoice& choice,
                            const MapProfile& profile,
                            SettledSegments& spare) {
   const std::size_t kept = choice.MoveLatestToFront(segments_);
-  const std::span rest = std::span(segments_).subspan(kept);
-  if (rest.empty()) {
-    return;
-  }
-  MarkGuards(std::span(segments_).first(kept), rest, profile);
-  for (const SegmentView& view : rest) {
+  for (const SegmentView& view : std::span(segments_).subspan(kept)) {
     SetUsed(view, false);
-  }
-  const std::size_t spared = MoveSpareToFront(rest, kSpareSegments, profile);
-  for (const SegmentView& view : rest.first(spared)) {
-    spare.Append(*view.segment, stretches_[view.stretch].id);
-  }
-  for (const SegmentView& view : rest.subspan(spared)) {
-    stretches_[view.stretch].has_forgotten = true;
+    rest_.push_back(view);
   }
   segments_.resize(kept);
-}
-
-void TileSurveys::ForgetOldest() {
-  const std::vector<std::uint32_t> forgotten = spare_.DropOldest(settled_.bytes() / kSpareShare);
-  for (Stretch& stretch : stretches_) {
-    stretch.has_forgotten |=
-        std::find(forgotten.begin(), forgotten.end(), stretch.id) != forgotten.end();
+  const std::size_t spared = MoveSpareToFront(rest_, kSpareSegments, profile);
+  const std::span forgotten = std::span(rest_).subspan(spared);
+  segments_.insert(segments_.end(), rest_.begin(), rest_.end() - std::ssize(forgotten));
+  MarkGuards(segments_, forgotten, profile);
+  segments_.resize(kept);
+  for (const SegmentView& view : std::span(rest_).first(spared)) {
+    spare.Append(*view.segment, stretches_[view.stretch].id);
+  }
+  for (const SegmentView& view : forgotten) {
+    stretches_[view.stretch].has_forgotten = true;
   }
 }
 

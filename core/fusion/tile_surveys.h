@@ -24,7 +24,6 @@
 #include "core/fusion/stretch_plan.h"
 #include "core/fusion/survey/cell_set.h"
 #include "core/fusion/survey/settled_segments.h"
-#include "core/fusion/survey/spare_segments.h"
 #include "core/fusion/survey/stretch_survey.h"
 
 namespace atlas {
@@ -75,8 +74,9 @@ class TileSurveys {
                        const MapProfile& profile) const;
   bool IsToSettle(std::size_t i, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
+  std::vector<std::uint32_t> PlacesById() const;
   void SetAside(BoundedChoice& choice, const MapProfile& profile, SettledSegments& spare);
-  void ForgetOldest();
+  void CollectSpare(std::size_t cell, std::span<const std::uint32_t> places);
   void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);
   // Append a cell's segments to segments_.
   void CollectSettled(std::size_t cell);
@@ -89,13 +89,14 @@ class TileSurveys {
   std::vector<Stretch> stretches_;    // in canonical order
   std::uint32_t next_id_ = 0;         // of stretches
   SettledSegments settled_;
-  SpareSegments spare_;                 // by the ids of stretches
+  SettledSegments spare_;               // packed; by the ids of stretches
   std::vector<std::uint32_t> open_;     // stretches that are
   std::vector<std::uint32_t> awaited_;  // stretches of the frames that must be added, last first
   Tile tile_;                           // without cells: there is none
   bool is_packed_ = false;
   CellSet touched_;                    // cells that changed since it was made
   std::vector<SegmentView> segments_;  // of a cell
+  std::vector<SegmentView> rest_;      // of a cell, that do not count
 };
 
 static_assert(std::is_nothrow_move_constructible_v<TileSurveys>);  // vectors copy others

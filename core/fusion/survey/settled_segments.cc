@@ -1,7 +1,5 @@
 #include "core/fusion/survey/settled_segments.h"
 
-#include <algorithm>
-
 #include "core/fusion/survey/packed_arrays.h"
 
 namespace atlas {
@@ -39,13 +37,6 @@ void SettledSegments::Renumber(std::span<const std::uint32_t> numbers, CellSet& 
   }
   segments_.resize(kept);
   stretches_.resize(kept);
-}
-
-std::vector<std::uint32_t> SettledSegments::FindStretches() const {
-  std::vector<std::uint32_t> found = stretches_;
-  std::sort(found.begin(), found.end());
-  found.erase(std::unique(found.begin(), found.end()), found.end());
-  return found;
 }
 
 void SettledSegments::CopyTo(std::uint32_t stretch, StretchSurvey& survey) const {

@@ -39,8 +39,6 @@ class SettledSegments {
 
   // Stretch i becomes numbers[i], or is removed if that is kGone: its cells go into `touched`.
   void Renumber(std::span<const std::uint32_t> numbers, CellSet& touched);
-  // The stretches that have any, rising.
-  std::vector<std::uint32_t> FindStretches() const;
   // Puts the segments of a stretch into `survey`, of the same cells and empty, as guards of
   // nothing: they may change.
   void CopyTo(std::uint32_t stretch, StretchSurvey& survey) const;
