@@ -5,15 +5,6 @@
 #include "core/base/small_sort.h"
 
 namespace atlas {
-namespace {
-
-// floor(altitude / band), in 32 bits: it is asked of every segment.
-std::int32_t BandOf(const SegmentView& view, std::int32_t band_mm) {
-  const std::int32_t altitude_mm = view.segment->altitude_mm;
-  return altitude_mm / band_mm - (altitude_mm % band_mm < 0 ? 1 : 0);
-}
-
-}  // namespace
 
 std::size_t BoundedChoice::MoveLatestToFront(std::span<SegmentView> segments) {
   FindCandidates(segments);
@@ -22,11 +13,9 @@ std::size_t BoundedChoice::MoveLatestToFront(std::span<SegmentView> segments) {
   }
   SmallStableSort(candidates_.begin(), candidates_.end(),
                   [&](const Candidate& a, const Candidate& b) {
-                    return WasSeenEarlier(segments[b.index], segments[a.index]);
+                    return IsChosenBefore(segments[a.index], segments[b.index]);
                   });
-  chosen_.fill(kNone);
-  Choose(segments, true);
-  Choose(segments, false);
+  Choose(segments);
   return MoveRestBack(segments);
 }
 
@@ -45,10 +34,11 @@ void BoundedChoice::FindCandidates(std::span<const SegmentView> segments) {
   std::erase_if(candidates_, [&](const Candidate& c) { return counts[Slot(c.band)] <= limit; });
 }
 
-void BoundedChoice::Choose(std::span<const SegmentView> segments, bool is_strong) {
+void BoundedChoice::Choose(std::span<const SegmentView> segments) {
+  chosen_.fill(kNone);
   for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
     Candidate& candidate = candidates_[i];
-    if (segments[candidate.index].segment->is_strong == is_strong && HasRoom(candidate, segments)) {
+    if (HasRoom(candidate, segments)) {
       std::uint32_t& last = chosen_[Slot(candidate.band)];
       candidate.counts = true;
       candidate.next = last;

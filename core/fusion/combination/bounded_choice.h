@@ -14,15 +14,20 @@
 
 namespace atlas {
 
+// The order in which a choice takes segments: strong ones first, of each kind the latest.
+inline bool IsChosenBefore(const SegmentView& a, const SegmentView& b) {
+  return a.segment->is_strong != b.segment->is_strong ? a.segment->is_strong : WasSeenEarlier(b, a);
+}
+
 // Reused from cell to cell.
 class BoundedChoice {
  public:
   // `profile` must outlive the choice.
   explicit BoundedChoice(const MapProfile& profile) : profile_(profile) {}
 
-  // Strong ones first and of each kind the latest, a segment counts while its band holds fewer than
-  // `band_segments`, and fewer than `band_vehicle_segments` of its vehicle. Moves those that count
-  // to the front, the order kept, and says how many they are.
+  // In that order a segment counts while its band holds fewer than `band_segments`, and fewer than
+  // `band_vehicle_segments` of its vehicle. Moves those that count to the front, the order kept,
+  // and says how many they are.
   std::size_t MoveLatestToFront(std::span<SegmentView> segments);
 
  private:
@@ -39,12 +44,12 @@ class BoundedChoice {
 
   static std::size_t Slot(std::int32_t band) { return static_cast<std::uint32_t>(band) % kSlots; }
   void FindCandidates(std::span<const SegmentView> segments);
-  void Choose(std::span<const SegmentView> segments, bool is_strong);
+  void Choose(std::span<const SegmentView> segments);
   bool HasRoom(const Candidate& candidate, std::span<const SegmentView> segments) const;
   std::size_t MoveRestBack(std::span<SegmentView> segments);
 
   const MapProfile& profile_;
-  std::vector<Candidate> candidates_;           // the latest first
+  std::vector<Candidate> candidates_;           // as they are chosen
   std::array<std::uint32_t, kSlots> chosen_{};  // the last candidate of each slot, or kNone
   std::vector<bool> is_dropped_;                // by segment
   std::vector<SegmentView> rest_;

@@ -1,6 +1,6 @@
 // Preset bounded: how long what was forgotten stays without say.
 //
-// A forgotten segment cannot count while enough that come before it (BoundedChoice's order) are
+// A forgotten segment cannot count while enough that come before it (IsChosenBefore) are
 // there: as many of its vehicle in its band as a vehicle may have, or of all vehicles as the band
 // may hold. These are its guards, and they know that they guard something, not what: enough to see
 // that none of it comes back when some of them go.

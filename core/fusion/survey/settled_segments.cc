@@ -54,6 +54,14 @@ void SettledSegments::CopyTo(std::uint32_t stretch, StretchSurvey& survey) const
   }
 }
 
+void SettledSegments::ReleaseGuards() {
+  packed_ = Bytes();
+  for (Segment& segment : segments_) {
+    segment.guards_vehicle = false;
+    segment.guards_band = false;
+  }
+}
+
 void SettledSegments::Pack() {
   if (packed_.empty()) {
     packed_ = PackArrays(cell_end_, segments_, stretches_);

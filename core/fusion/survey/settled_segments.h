@@ -43,6 +43,9 @@ class SettledSegments {
   // nothing: they may change.
   void CopyTo(std::uint32_t stretch, StretchSurvey& survey) const;
 
+  // None of them guards anything any more.
+  void ReleaseGuards();
+
   // As StretchSurvey's.
   void Pack();
   void Unpack();

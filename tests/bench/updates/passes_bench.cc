@@ -49,7 +49,8 @@ Placed PickTwo(const std::vector<UploadRequest>& pass) {
   return {{first.key, first.pose}, {second.key, second.pose}};
 }
 
-// There and back: the median, of the first time that a pass is touched and of the later ones.
+// There and back: the time of the first correction, in which the pass is touched for the first
+// time, and the median of the later ones; milliseconds of CPU.
 Result<std::pair<double, double>> CorrectThem(AtlasAtWork& atlas, const Placed& placed) {
   constexpr int kTimes = 6;
   std::vector<double> cpu_ms;

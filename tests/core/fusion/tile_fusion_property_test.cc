@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/str_cat.h"
+#include "core/fusion/survey/fusion_stretch.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/tile/tile_codec.h"
 #include "tests/core/fusion/oracle/plain_fusion.h"
@@ -269,15 +270,24 @@ TEST(TileFusionPropertyTest, BandsOfATileAreTheTile) {
       ++loads;
       return copy;
     };
-    const auto whole = FuseTile({0, 0, 0}, frames, source, profile);
-    const int loads_of_one_band = loads;
-    const auto bands = FuseTile({0, 0, 0}, frames, source, profile, 1);
-    ASSERT_TRUE(whole && bands);
-    EXPECT_EQ(*whole, *bands) << "seed " << seed;
-    EXPECT_EQ(*whole, FuseTile({0, 0, 0}, keyframes, profile)) << "seed " << seed;
-    EXPECT_LE(loads_of_one_band, static_cast<int>(frames.size()));
-    EXPECT_GT(loads, 2 * loads_of_one_band) << "a byte is enough for no more than a row";
-    EXPECT_LE(loads - loads_of_one_band, profile.tile_cells * static_cast<int>(frames.size()));
+    const auto loads_of = [&](std::size_t max_bytes) {
+      const int before = loads;
+      const auto tile = FuseTile({0, 0, 0}, frames, source, profile, max_bytes);
+      EXPECT_EQ(tile.value(), FuseTile({0, 0, 0}, keyframes, profile)) << "seed " << seed;
+      return loads - before;
+    };
+    const int count = static_cast<int>(frames.size());
+    const int loads_of_one_band = loads_of(std::size_t{128} << 20);
+    EXPECT_LE(loads_of_one_band, count);
+
+    const std::size_t row_bytes = CutStretches({0, 0, 0}, frames, profile).size() * 128 * 64;
+    const int loads_of_16_rows = loads_of(16 * row_bytes);
+    EXPECT_GT(loads_of_16_rows, loads_of_one_band) << "that is enough for a fourth of the tile";
+    EXPECT_LE(loads_of_16_rows, 4 * count);
+
+    const int loads_of_a_row = loads_of(1);
+    EXPECT_GT(loads_of_a_row, loads_of_16_rows) << "a byte is enough for no more than a row";
+    EXPECT_LE(loads_of_a_row, profile.tile_cells * count);
   }
 }
 

@@ -1,0 +1,175 @@
+#include "core/fusion/settled_stretches.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "core/base/small_sort.h"
+#include "core/fusion/combination/bounded_guards.h"
+
+namespace atlas {
+namespace {
+
+// What is set aside of each band and vehicle of a cell.
+constexpr std::size_t kSpareSegments = 2;
+
+std::size_t CellsOfTile(const MapProfile& profile) {
+  return static_cast<std::size_t>(profile.tile_cells) * profile.tile_cells;
+}
+
+// As a stretch's survey has them: those that it saw last first.
+void SortAsSurveyed(std::vector<SegmentView>& segments) {
+  const auto is_before = [](const SegmentView& a, const SegmentView& b) {
+    return a.stretch != b.stretch ? a.stretch < b.stretch
+                                  : a.segment->last_frame > b.segment->last_frame;
+  };
+  SmallStableSort(segments.begin(), segments.end(), is_before);
+}
+
+}  // namespace
+
+void SettledStretches::Collect(std::size_t cell,
+                               std::span<const TileStretch> stretches,
+                               std::vector<SegmentView>& segments) {
+  const std::span its = settled_.Segments(cell);
+  const std::span places = settled_.Stretches(cell);
+  for (std::size_t i = 0; i < its.size(); ++i) {
+    segments.push_back(ViewOf(its[i], places[i], stretches));
+  }
+}
+
+void SettledStretches::Settle(std::span<const std::uint32_t> settling,
+                              std::span<TileStretch> stretches,
+                              const MapProfile& profile) {
+  if (!spare_places_.empty()) {
+    spare_.Unpack();
+  }
+  BoundedChoice choice(profile);
+  SettledSegments merged;
+  SettledSegments spare;
+  for (std::size_t cell = 0; cell < CellsOfTile(profile); ++cell) {
+    segments_.clear();
+    Collect(cell, stretches, segments_);
+    for (const std::uint32_t place : settling) {
+      CollectOpen(cell, place, stretches, segments_);
+    }
+    SortByStretch(segments_);
+    if (profile.preset == FusionPreset::kBounded) {
+      rest_.clear();
+      CollectSpare(cell, stretches);
+      SetAside(stretches, choice, profile, spare);
+    }
+    for (const SegmentView& view : segments_) {
+      merged.Append(*view.segment, view.stretch);
+    }
+    merged.EndCell();
+    spare.EndCell();
+  }
+  settled_ = std::move(merged);
+  for (const std::uint32_t place : settling) {
+    stretches[place].open.reset();
+  }
+  spare_ = SettledSegments();
+  spare_places_.clear();
+  if (!spare.is_empty()) {
+    spare_ = std::move(spare);
+    spare_.Pack();
+    spare_places_.resize(stretches.size());
+    std::iota(spare_places_.begin(), spare_places_.end(), 0u);
+  }
+}
+
+// Leaves those of segments_ that count while they all are there. Of the others and those of rest_
+// some go to `spare`, and what is left is forgotten.
+void SettledStretches::SetAside(std::span<TileStretch> stretches,
+                                BoundedChoice& choice,
+                                const MapProfile& profile,
+                                SettledSegments& spare) {
+  const std::size_t kept = choice.MoveLatestToFront(segments_);
+  for (const SegmentView& view : std::span(segments_).subspan(kept)) {
+    SetUsed(view, false, stretches);
+    rest_.push_back(view);
+  }
+  segments_.resize(kept);
+  const std::size_t spared = MoveSpareToFront(rest_, kSpareSegments, profile);
+  const std::span forgotten = std::span(rest_).subspan(spared);
+  segments_.insert(segments_.end(), rest_.begin(), rest_.end() - std::ssize(forgotten));
+  MarkGuards(segments_, forgotten, profile);
+  segments_.resize(kept);
+  for (const SegmentView& view : std::span(rest_).first(spared)) {
+    spare.Append(*view.segment, view.stretch);
+  }
+  for (const SegmentView& view : forgotten) {
+    stretches[view.stretch].has_forgotten = true;
+  }
+}
+
+// Appends a cell's spare segments to rest_.
+void SettledStretches::CollectSpare(std::size_t cell, std::span<const TileStretch> stretches) {
+  const std::span segments = spare_.Segments(cell);
+  const std::span places = spare_.Stretches(cell);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    rest_.push_back(ViewOf(segments[i], spare_places_[places[i]], stretches));
+  }
+}
+
+bool SettledStretches::PrepareToLose(const std::vector<bool>& is_leaving,
+                                     std::span<const TileStretch> stretches,
+                                     const MapProfile& profile) {
+  Restore(stretches, CellsOfTile(profile));
+  if (std::none_of(stretches.begin(), stretches.end(),
+                   [](const TileStretch& s) { return s.has_forgotten; })) {
+    return false;
+  }
+  const auto may_count = [&](std::size_t cell) {
+    segments_.clear();
+    Collect(cell, stretches, segments_);
+    const auto left =
+        std::stable_partition(segments_.begin(), segments_.end(),
+                              [&](const SegmentView& view) { return is_leaving[view.stretch]; });
+    return MayCountAgain({segments_.begin(), left}, {left, segments_.end()}, profile);
+  };
+  std::size_t cell = 0;
+  while (cell < CellsOfTile(profile) && !may_count(cell)) {
+    ++cell;
+  }
+  if (cell == CellsOfTile(profile)) {
+    return false;
+  }
+  settled_.ReleaseGuards();
+  return true;
+}
+
+// As if nothing had ever been set aside.
+void SettledStretches::Restore(std::span<const TileStretch> stretches, std::size_t cells) {
+  if (spare_places_.empty()) {
+    return;
+  }
+  spare_.Unpack();
+  SettledSegments merged;
+  for (std::size_t cell = 0; cell < cells; ++cell) {
+    segments_.clear();
+    rest_.clear();
+    Collect(cell, stretches, segments_);
+    CollectSpare(cell, stretches);
+    segments_.insert(segments_.end(), rest_.begin(), rest_.end());
+    SortAsSurveyed(segments_);
+    for (const SegmentView& view : segments_) {
+      merged.Append(*view.segment, view.stretch);
+    }
+    merged.EndCell();
+  }
+  settled_ = std::move(merged);
+  spare_ = SettledSegments();
+  spare_places_.clear();
+}
+
+// Nothing is set aside of a stretch that leaves.
+void SettledStretches::Renumber(std::span<const std::uint32_t> places, CellSet& touched) {
+  settled_.Renumber(places, touched);
+  for (std::uint32_t& place : spare_places_) {
+    place = place == kGone ? kGone : places[place];
+  }
+}
+
+}  // namespace atlas

@@ -1,0 +1,68 @@
+// What the settled stretches of a tile saw.
+//
+// In preset bounded these are the segments that count; what counts no more is set aside,
+// compressed, and in the end forgotten, so that the size does not grow with the passes. What was
+// forgotten is guarded (core/fusion/combination/bounded_guards.h): as long as enough guards stay it
+// cannot count.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/fusion/combination/bounded_choice.h"
+#include "core/fusion/survey/cell_set.h"
+#include "core/fusion/survey/settled_segments.h"
+#include "core/fusion/tile_stretch.h"
+
+namespace atlas {
+
+// Stretches are known by their places among the tile's, in canonical order; cells row by row.
+class SettledStretches {
+ public:
+  static constexpr std::uint32_t kGone = SettledSegments::kGone;
+
+  // Appends a cell's segments.
+  void Collect(std::size_t cell,
+               std::span<const TileStretch> stretches,
+               std::vector<SegmentView>& segments);
+
+  // Takes the segments of `settling`, open ones, and closes them.
+  void Settle(std::span<const std::uint32_t> settling,
+              std::span<TileStretch> stretches,
+              const MapProfile& profile);
+
+  // To be called before any of them leaves. Settles again what was set aside: it may count now.
+  // Says whether what was forgotten may count, too: then it must be surveyed, and nothing is
+  // guarded any more.
+  bool PrepareToLose(const std::vector<bool>& is_leaving,
+                     std::span<const TileStretch> stretches,
+                     const MapProfile& profile);
+  // Puts the segments of the stretch at `place`, about to leave, into `survey`, which is empty.
+  void CopyTo(std::uint32_t place, StretchSurvey& survey) const { settled_.CopyTo(place, survey); }
+  // The stretch at place i is at places[i] from now on, or leaves if that is kGone: the cells that
+  // it saw go into `touched`.
+  void Renumber(std::span<const std::uint32_t> places, CellSet& touched);
+
+  std::size_t bytes() const { return settled_.bytes() + spare_.bytes(); }
+  // As StretchSurvey's.
+  void Pack() { settled_.Pack(); }
+  void Unpack() { settled_.Unpack(); }
+
+ private:
+  void CollectSpare(std::size_t cell, std::span<const TileStretch> stretches);
+  void SetAside(std::span<TileStretch> stretches,
+                BoundedChoice& choice,
+                const MapProfile& profile,
+                SettledSegments& spare);
+  void Restore(std::span<const TileStretch> stretches, std::size_t cells);
+
+  SettledSegments settled_;
+  SettledSegments spare_;                    // packed; the places are those when it was made
+  std::vector<std::uint32_t> spare_places_;  // of these the present ones
+  std::vector<SegmentView> segments_;        // of a cell
+  std::vector<SegmentView> rest_;            // of a cell, that do not count
+};
+
+}  // namespace atlas
