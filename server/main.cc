@@ -89,6 +89,9 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
   const std::size_t survey_bytes = static_cast<std::size_t>(config.survey_mib) << 20;
   options.fusion.building.surveys = {survey_bytes / 3 * 2, survey_bytes / 3};
+  options.fusion.building.survey_files.directory = config.data / "surveys";
+  options.fusion.building.survey_files.max_bytes = static_cast<std::size_t>(config.survey_disk_mib)
+                                                   << 20;
   options.scratch_directory = config.data;
   return options;
 }

@@ -172,4 +172,29 @@ void SettledStretches::Renumber(std::span<const std::uint32_t> places, CellSet& 
   }
 }
 
+void SettledStretches::Save(ByteWriter& out) const {
+  for (const SettledSegments* segments : {&settled_, &spare_}) {
+    const Bytes packed = segments->PackedCopy();
+    out.Varint(packed.size());
+    out.Raw(packed);
+  }
+  out.Varint(spare_places_.size());
+  for (const std::uint32_t place : spare_places_) {
+    out.U32(place);
+  }
+}
+
+SettledStretches SettledStretches::Load(ByteReader& in) {
+  SettledStretches loaded;
+  for (SettledSegments* segments : {&loaded.settled_, &loaded.spare_}) {
+    const ByteSpan packed = in.Raw(in.Varint());
+    *segments = SettledSegments(Bytes(packed.begin(), packed.end()));
+  }
+  const std::uint64_t places = in.Varint();
+  for (std::uint64_t i = 0; i < places && in.ok(); ++i) {
+    loaded.spare_places_.push_back(in.U32());
+  }
+  return loaded;
+}
+
 }  // namespace atlas

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/bytes.h"
 #include "core/fusion/combination/bounded_choice.h"
 #include "core/fusion/survey/cell_set.h"
 #include "core/fusion/survey/settled_segments.h"
@@ -49,6 +50,9 @@ class SettledStretches {
   // As StretchSurvey's.
   void Pack() { settled_.Pack(); }
   void Unpack() { settled_.Unpack(); }
+  // As TileStretch's.
+  void Save(ByteWriter& out) const;
+  static SettledStretches Load(ByteReader& in);
 
  private:
   void CollectSpare(std::size_t cell, std::span<const TileStretch> stretches);

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/bytes.h"
 #include "core/fusion/segment/segment_view.h"
 #include "core/fusion/stretch_plan.h"
 #include "core/fusion/survey/stretch_survey.h"
@@ -28,6 +29,10 @@ struct TileStretch {
   std::uint32_t grown_at = 0;          // the tile's count of changes then
 
   std::size_t bytes() const;
+  // To be loaded by the same build again.
+  void Save(ByteWriter& out) const;
+  // Of the tile `id`, packed. If there is none, in.ok() is false.
+  static TileStretch Load(ByteReader& in, const TileId& id, const MapProfile& profile);
 };
 
 // A segment of the stretch at `place`.

@@ -281,4 +281,31 @@ void TileSurveys::Unpack() {
   }
 }
 
+Bytes TileSurveys::Save() const {
+  ByteWriter out;
+  out.Varint(expected_count_);
+  settled_.Save(out);
+  out.Varint(stretches_.size());
+  for (const TileStretch& stretch : stretches_) {
+    stretch.Save(out);
+  }
+  return out.Take();
+}
+
+Result<TileSurveys> TileSurveys::Load(ByteSpan bytes, const TileId& id, const MapProfile& profile) {
+  ByteReader in(bytes);
+  TileSurveys surveys(id);
+  surveys.is_packed_ = true;
+  surveys.expected_count_ = static_cast<std::uint32_t>(in.Varint());
+  surveys.settled_ = SettledStretches::Load(in);
+  const std::uint64_t count = in.Varint();
+  for (std::uint64_t i = 0; i < count && in.ok(); ++i) {
+    surveys.stretches_.push_back(TileStretch::Load(in, id, profile));
+  }
+  if (!in.ok() || in.remaining() != 0) {
+    return Error(StatusCode::kInvalidData, "surveys: cut or damaged");
+  }
+  return surveys;
+}
+
 }  // namespace atlas

@@ -14,6 +14,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/bytes.h"
+#include "core/base/status.h"
 #include "core/fusion/combination/cell_combiner.h"
 #include "core/fusion/fusion_context.h"
 #include "core/fusion/observation/frame_on_map.h"
@@ -44,6 +46,11 @@ class TileSurveys {
   // Compresses the surveys, to a fifth or so: Unpack() comes before anything else but bytes().
   void Pack();
   void Unpack();
+
+  // What Load() of the same build makes them of again, for the same profile: packed.
+  Bytes Save() const;
+  // kInvalidData: these are not bytes of Save().
+  static Result<TileSurveys> Load(ByteSpan bytes, const TileId& id, const MapProfile& profile);
 
  private:
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);

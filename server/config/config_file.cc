@@ -17,11 +17,12 @@ struct Key {
   bool is_number;  // else a text
 };
 
-constexpr std::array<Key, 10> kKeys = {{{"listen", false},
+constexpr std::array<Key, 11> kKeys = {{{"listen", false},
                                         {"data", false},
                                         {"workers", true},
                                         {"cache_mib", true},
                                         {"survey_mib", true},
+                                        {"survey_disk_mib", true},
                                         {"log_level", false},
                                         {"map.cell_size", true},
                                         {"map.segments", true},

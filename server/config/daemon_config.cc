@@ -31,6 +31,8 @@ constexpr Setting kSettings[] = {
     {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "MIB", "memory for decoded keyframes"},
     {"survey_mib", "--survey-mib", "ATLASD_SURVEY_MIB", "MIB",
      "memory for what tiles keep from one fusion to the next"},
+    {"survey_disk_mib", "--survey-disk-mib", "ATLASD_SURVEY_DISK_MIB", "MIB",
+     "disk for the same, where memory has no room and after a restart"},
     {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error"},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell"},
     {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
@@ -50,6 +52,7 @@ std::map<std::string, std::string> Defaults() {
           {"workers", StrCat(config.workers)},
           {"cache_mib", StrCat(config.cache_mib)},
           {"survey_mib", StrCat(config.survey_mib)},
+          {"survey_disk_mib", StrCat(config.survey_disk_mib)},
           {"log_level", config.log_level},
           {"map.cell_size", StrCat(map.cell_size_m())},
           {"map.segments", StrCat(int{map.column_segments})},
@@ -137,6 +140,9 @@ Status Apply(const std::string& key, const std::string& text, DaemonConfig& conf
   }
   if (key == "survey_mib") {
     return ApplyCount(key, text, 0, 1'048'576, config.survey_mib);
+  }
+  if (key == "survey_disk_mib") {
+    return ApplyCount(key, text, 0, 16'777'216, config.survey_disk_mib);
   }
   if (key == "log_level") {
     return ApplyLogLevel(text, config);

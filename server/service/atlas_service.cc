@@ -235,8 +235,12 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
   if (!counts) {
     return Error(counts.error());
   }
-  return ServiceStatus{*counts, fusion_.damage().size(), fusion_.tiles_built(),
-                       fusion_.kept_bytes(), ResidentBytes()};
+  return ServiceStatus{*counts,
+                       fusion_.damage().size(),
+                       fusion_.tiles_built(),
+                       fusion_.kept_bytes(),
+                       fusion_.kept_disk_bytes(),
+                       ResidentBytes()};
 }
 
 Result<std::uint64_t> AtlasService::ReadRevision() {

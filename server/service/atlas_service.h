@@ -48,6 +48,7 @@ struct ServiceStatus {
   std::uint64_t damaged_tiles = 0;  // dirty, and damage keeps them from being fused
   std::uint64_t tiles_built = 0;    // of any level, since the service began
   std::uint64_t kept_bytes = 0;     // surveys kept for the next time, those that are compressed too
+  std::uint64_t kept_disk_bytes = 0;  // and those on disk
   std::uint64_t rss_bytes = 0;
 };
 

@@ -24,6 +24,16 @@ struct AtlasIdentity {
   std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup
 };
 
+// The store was opened, and what is written from there on goes on from this revision. An atlas that
+// was put back from a copy begins another line: what was kept elsewhere of a later revision is not
+// of it, and its starts tell.
+struct AtlasStart {
+  std::array<std::uint8_t, 16> id{};  // random
+  std::uint64_t revision = 0;
+
+  friend bool operator==(const AtlasStart&, const AtlasStart&) = default;
+};
+
 struct PositionPrior {
   std::int64_t x_um = 0;
   std::int64_t y_um = 0;

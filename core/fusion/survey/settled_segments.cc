@@ -62,9 +62,13 @@ void SettledSegments::ReleaseGuards() {
   }
 }
 
+Bytes SettledSegments::PackedCopy() const {
+  return packed_.empty() ? PackArrays(cell_end_, segments_, stretches_) : packed_;
+}
+
 void SettledSegments::Pack() {
   if (packed_.empty()) {
-    packed_ = PackArrays(cell_end_, segments_, stretches_);
+    packed_ = PackedCopy();
   }
   cell_end_ = std::vector<std::uint32_t>();
   segments_ = std::vector<Segment>();

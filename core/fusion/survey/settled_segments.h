@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/base/bytes.h"
@@ -18,6 +19,10 @@ namespace atlas {
 class SettledSegments {
  public:
   static constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
+
+  SettledSegments() = default;
+  // Of a PackedCopy() of as many cells: Unpack() comes before anything else.
+  explicit SettledSegments(Bytes packed) : packed_(std::move(packed)) {}
 
   // To be filled cell by cell: Append() its segments, then EndCell().
   void Append(const Segment& segment, std::uint32_t stretch) {
@@ -49,6 +54,7 @@ class SettledSegments {
   // As StretchSurvey's.
   void Pack();
   void Unpack();
+  Bytes PackedCopy() const;
 
  private:
   std::size_t Begin(std::size_t cell) const {

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cstdlib>
 #include <limits>
+#include <utility>
 
 #include "core/fusion/survey/packed_arrays.h"
 #include "core/tile/column_lattice.h"
@@ -29,6 +30,15 @@ StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
       heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone),
       touched_(heads_.size()) {}
 
+StretchSurvey::StretchSurvey(const TileBand& band,
+                             const MapProfile& profile,
+                             std::vector<StretchFrame> frames,
+                             Bytes packed)
+    : StretchSurvey(band, profile) {
+  frames_ = std::move(frames);
+  packed_ = std::move(packed);
+}
+
 std::size_t StretchSurvey::bytes() const {
   return sizeof(*this) + frames_.capacity() * sizeof(StretchFrame) +
          heads_.capacity() * sizeof(std::uint32_t) + segments_.capacity() * sizeof(Segment) +
@@ -43,9 +53,13 @@ void StretchSurvey::FindCells(CellSet& cells) const {
   }
 }
 
+Bytes StretchSurvey::PackedCopy() const {
+  return packed_.empty() ? PackArrays(heads_, segments_) : packed_;
+}
+
 void StretchSurvey::Pack() {
   if (packed_.empty()) {
-    packed_ = PackArrays(heads_, segments_);
+    packed_ = PackedCopy();
   }
   heads_ = std::vector<std::uint32_t>();
   segments_ = std::vector<Segment>();

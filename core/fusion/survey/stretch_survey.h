@@ -36,6 +36,11 @@ class StretchSurvey {
   static constexpr std::uint32_t kMaxCellSegments = 32;
 
   StretchSurvey(const TileBand& band, const MapProfile& profile);
+  // Of a PackedCopy() and the frames that it had: Unpack() comes before anything else.
+  StretchSurvey(const TileBand& band,
+                const MapProfile& profile,
+                std::vector<StretchFrame> frames,
+                Bytes packed);
 
   // Adds a keyframe's observations. Sequence numbers must rise from call to call.
   void Add(const FrameOnMap& frame, const Keyframe& keyframe, const SigmaTable& sigmas);
@@ -60,6 +65,8 @@ class StretchSurvey {
   // anything else. What did not change since it was packed last is not compressed again.
   void Pack();
   void Unpack();
+  // What Pack() would keep, for a survey of the same build.
+  Bytes PackedCopy() const;
 
   // First segment of a cell, the next by Segment::next, or Segment::kNone. Cells row by row.
   std::uint32_t First(std::size_t cell) const { return heads_[cell]; }

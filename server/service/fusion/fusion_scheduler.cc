@@ -32,7 +32,7 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
       clock_(std::move(clock)),
       log_(std::move(log)),
       options_(options),
-      refresher_(store, options.building) {
+      refresher_(store, options.building, log_) {
   for (unsigned i = 0; i < options_.workers; ++i) {
     threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
       RunWorker(stop, {owner, {}});
@@ -49,6 +49,15 @@ void FusionScheduler::Stop() {
     thread.request_stop();
   }
   threads_.clear();  // joins
+  const auto begin = std::chrono::steady_clock::now();
+  const std::size_t kept_bytes = refresher_.kept_bytes();
+  refresher_.MoveToDisk();
+  if (const std::size_t moved_bytes = kept_bytes - refresher_.kept_bytes(); moved_bytes > 0) {
+    const std::chrono::duration<double> took_s = std::chrono::steady_clock::now() - begin;
+    log_(LogLevel::kInfo,
+         StrCat("fusion: ", moved_bytes >> 20, " MiB of surveys moved to ",
+                refresher_.kept_disk_bytes() >> 20, " MiB on disk in ", took_s.count(), " s"));
+  }
 }
 
 void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
@@ -58,6 +67,8 @@ void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
         GiveBack(worker) ? NextClaims(worker.owner) : std::vector<TileClaim>();
     if (!claims.empty()) {
       BuildClaims(worker, claims, stop);
+    } else if (refresher_.StoreIdle()) {
+      continue;
     } else if (!changes_.is_closed()) {
       changes_.WaitPast(seen, std::chrono::steady_clock::now() + kLookAgain, stop);
     } else {

@@ -46,10 +46,12 @@ class FusionScheduler {
   FusionScheduler& operator=(const FusionScheduler&) = delete;
   ~FusionScheduler();
 
-  // Finishes the tiles at hand, gives the other leases back and joins the threads.
+  // Finishes the tiles at hand, gives the other leases back, joins the threads, and writes what is
+  // kept to disk.
   void Stop();
   std::uint64_t tiles_built() const { return tiles_built_; }
   std::size_t kept_bytes() const { return refresher_.kept_bytes(); }
+  std::size_t kept_disk_bytes() const { return refresher_.kept_disk_bytes(); }
   // Tiles that damage keeps from being fused.
   const DamageList& damage() const { return damage_; }
 

@@ -8,15 +8,24 @@
 
 namespace atlas {
 
-TileRefresher::TileRefresher(AtlasStore& store, const TileRefresherOptions& options)
+TileRefresher::TileRefresher(AtlasStore& store,
+                             const TileRefresherOptions& options,
+                             const LogSink& log)
     : store_(store),
       profile_(store.identity().profile),
       sigmas_(profile_, Keyframe::kMaxRadiusCells),
       group_bytes_(options.group_bytes),
       keyframes_(options.keyframe_bytes),
       tiles_(options.tile_bytes),
-      surveys_(options.surveys),
+      survey_files_(options.survey_files, profile_, store.starts(), log),
+      surveys_(options.surveys, survey_files_),
       builder_(store, keyframes_, tiles_, options.group_bytes) {}
+
+void TileRefresher::MoveToDisk() {
+  if (survey_files_.is_on()) {
+    surveys_.MoveToDisk();
+  }
+}
 
 void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) {
   std::vector<Job> jobs;
@@ -85,7 +94,7 @@ void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
     if (content) {
       tiles_.Insert(content->payload_hash, std::make_shared<const Tile>(tile));
     }
-    surveys_.Put({std::move(job.surveys), job.revision});
+    surveys_.Put({std::move(job.surveys), job.revision, 0});
     on_built(id, BuiltTile{job.revision, std::move(content)});
   }
 }

@@ -21,6 +21,7 @@ struct TileRefresherOptions {
   std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded keyframes, all workers together
   std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
   SurveyCacheLimits surveys;                            // kept from one time to the next
+  SurveyFilesOptions survey_files;                      // and where memory has no room for them
   std::size_t group_bytes = std::size_t{128} << 20;     // surveys of the tiles at hand, a worker
 };
 
@@ -28,13 +29,19 @@ class TileRefresher {
  public:
   using OnBuilt = std::function<void(const TileId& id, Result<BuiltTile> built)>;
 
-  TileRefresher(AtlasStore& store, const TileRefresherOptions& options);
+  TileRefresher(AtlasStore& store, const TileRefresherOptions& options, const LogSink& log);
 
   // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's.
   void Build(std::span<const TileId> ids, const OnBuilt& on_built);
 
-  // What is kept from one time to the next.
+  // What is kept from one time to the next, in memory and on disk.
   std::size_t kept_bytes() const { return surveys_.bytes(); }
+  std::size_t kept_disk_bytes() const { return survey_files_.bytes(); }
+  // For a worker without work: writes something of what is kept in memory to disk; false when there
+  // is nothing to do.
+  bool StoreIdle() { return survey_files_.is_on() && surveys_.StoreIdle(); }
+  // To be called last: what is kept in memory goes to disk.
+  void MoveToDisk();
 
  private:
   // A level-0 tile under way.
@@ -56,6 +63,7 @@ class TileRefresher {
   const std::size_t group_bytes_;
   KeyframeCache keyframes_;
   TileCache tiles_;
+  SurveyFiles survey_files_;
   SurveyCache surveys_;
   TileBuilder builder_;  // for what is not done here
 };

@@ -68,7 +68,8 @@ Status CheckContents(const fs::path& directory) {
   std::error_code error;
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();
-    if (name != "lock" && !name.starts_with("atlas.db") && name != "lost+found") {
+    if (name != "lock" && !name.starts_with("atlas.db") && name != "surveys" &&
+        name != "lost+found") {
       return Status(StatusCode::kInvalidArgument,
                     StrCat("data directory ", directory.string(), " holds '", name,
                            "' but no atlas; expected an atlas, or an empty or missing directory"));

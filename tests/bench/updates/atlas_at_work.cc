@@ -39,6 +39,7 @@ std::filesystem::path NewDirectory() {
 
 AtlasAtWork::AtlasAtWork(const MapProfile& profile, const FusionOptions& fusion)
     : directory_(NewDirectory()), fusion_(fusion) {
+  fusion_.building.survey_files.directory = directory_ / "surveys";  // as atlasd
   SqliteStoreOptions options;
   options.directory = directory_;
   options.new_profile = profile;
@@ -55,6 +56,11 @@ void AtlasAtWork::Start() {
   service.fusion = fusion_;
   service_ = std::make_unique<AtlasService>(
       *store_, NowMs, [](LogLevel, const std::string&) {}, service);
+}
+
+void AtlasAtWork::Restart() {
+  service_.reset();
+  Start();
 }
 
 AtlasAtWork::~AtlasAtWork() {
@@ -118,6 +124,7 @@ Result<UpdateCost> AtlasAtWork::UploadAll(std::vector<UploadRequest> requests) {
 
 Result<UpdateCost> AtlasAtWork::BuildCold(const std::vector<TileId>& tiles) {
   service_.reset();
+  std::filesystem::remove_all(fusion_.building.survey_files.directory);
   const auto marked =
       Await<std::uint32_t>([&](auto done) { store_->MarkDirty(tiles, std::move(done)); });
   if (!marked) {

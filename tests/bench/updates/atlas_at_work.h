@@ -32,7 +32,10 @@ class AtlasAtWork {
   Result<UpdateCost> UpdatePoses(PoseBatchRequest request);
   // All at once.
   Result<UpdateCost> UploadAll(std::vector<UploadRequest> requests);
-  // Builds tiles again after a restart: nothing is kept, what they are made of is not cached.
+  // As a daemon that ends in order and starts again.
+  void Restart();
+  // Builds tiles again after a restart: nothing is kept in memory or on disk, what they are made of
+  // is not cached.
   Result<UpdateCost> BuildCold(const std::vector<TileId>& tiles);
 
   AtlasStore& store() { return *store_; }

@@ -1,8 +1,8 @@
 // What a new keyframe costs in the first, second, ... pass over the same place, from the upload to
 // the fused tiles, one at a time with one worker: one JSON line a pass.
-// Usage: passes_bench WORLD PRESET PASSES [VEHICLES [correct]]; with several they take turns. With
-// `correct`: also what it costs after each pass to correct two keyframes of the first one, and two
-// of the latest.
+// Usage: passes_bench WORLD PRESET PASSES [VEHICLES [correct|restart]]; with several they take
+// turns. With `correct`: also what it costs after each pass to correct two keyframes of the first
+// one, and two of the latest. With `restart`: the daemon is started again before each pass.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -111,6 +111,8 @@ Result<Placed> RunPass(
             << "\", \"keyframes\": " << cpu_ms.size()
             << ", \"tiles_per_keyframe\": " << static_cast<double>(tiles) / keyframes
             << ", \"cpu_ms\": " << cpu_sum_ms / keyframes
+            << ", \"cpu_ms_first\": " << cpu_ms.front()
+            << ", \"wall_ms_first\": " << wall_ms.front()
             << ", \"wall_ms_p50\": " << Quantile(wall_ms, 0.5)
             << ", \"wall_ms_p99\": " << Quantile(wall_ms, 0.99)
             << ", \"keyframe_bytes\": " << status->counts.keyframe_bytes
@@ -125,12 +127,15 @@ int Run(const std::string& world_name,
         const std::string& preset_name,
         int passes,
         int vehicles,
-        bool corrects) {
+        const std::string& mode) {
   const auto world = WorldKindByName(world_name);
   const auto preset = FusionPresetByName(preset_name);
-  if (!world || !preset || passes < 1 || vehicles < 1) {
+  const bool corrects = mode == "correct";
+  const bool restarts = mode == "restart";
+  if (!world || !preset || passes < 1 || vehicles < 1 ||
+      (!mode.empty() && !corrects && !restarts)) {
     std::cerr << "usage: passes_bench street|overpass|garage strict|bounded|paper PASSES "
-                 "[VEHICLES [correct]]\n";
+                 "[VEHICLES [correct|restart]]\n";
     return 2;
   }
   MapProfile profile;
@@ -138,6 +143,9 @@ int Run(const std::string& world_name,
   AtlasAtWork atlas(profile, {});
   Placed oldest;
   for (int pass = 1; pass <= passes; ++pass) {
+    if (restarts) {
+      atlas.Restart();
+    }
     const auto latest = RunPass(atlas, *world, pass, vehicles, profile);
     Status status = latest ? Status() : latest.error();
     if (pass == 1 && latest) {
@@ -160,10 +168,9 @@ int Run(const std::string& world_name,
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   if (arguments.size() < 3) {
-    return atlas::testing::Run("", "", 0, 0, false);
+    return atlas::testing::Run("", "", 0, 0, "");
   }
   const int vehicles = arguments.size() > 3 ? std::atoi(arguments[3].c_str()) : 1;
-  const bool corrects = arguments.size() > 4 && arguments[4] == "correct";
   return atlas::testing::Run(arguments[0], arguments[1], std::atoi(arguments[2].c_str()), vehicles,
-                             corrects);
+                             arguments.size() > 4 ? arguments[4] : "");
 }

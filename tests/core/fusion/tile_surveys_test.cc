@@ -43,6 +43,13 @@ class KeptTile {
 
   TileSurveys& surveys() { return surveys_; }
 
+  void SaveAndLoad() {
+    const Bytes saved = surveys_.Save();
+    surveys_ = TileSurveys::Load(saved, {0, 0, 0}, profile_).value();
+    EXPECT_EQ(surveys_.Save(), saved);
+    surveys_.Unpack();
+  }
+
  private:
   // What is not as it was told last, and something that is, as if it had moved there and back.
   TileChange ChangeTo(const std::vector<PlacedKeyframe>& keyframes) {
@@ -93,13 +100,46 @@ TEST(TileSurveysTest, FollowAnyChange) {
         current.back().placement.x_um += static_cast<std::int64_t>(random() % 300'000);
       }
       tile.Update(current);
-      if (random() % 2 == 0) {
-        tile.surveys().Pack();
-        tile.surveys().Unpack();
+      switch (random() % 4) {
+        case 0:
+          tile.surveys().Pack();
+          tile.surveys().Unpack();
+          break;
+        case 1:
+          tile.SaveAndLoad();
+          break;
+        case 2:
+          tile.surveys().Save();  // they stay as they are
+          break;
+        default:
+          break;
       }
     }
     EXPECT_EQ(tile.Update(current), 0u) << "nothing changed, seed " << seed;
   }
+}
+
+TEST(TileSurveysTest, WhatIsLoadedNeedsNoKeyframes) {
+  const MapProfile profile = DrivesProfile(0);
+  KeptTile tile(profile);
+  const auto keyframes = RandomDrives(profile, 7);
+  EXPECT_GT(tile.Update(keyframes), 0u);
+  tile.SaveAndLoad();
+  EXPECT_EQ(tile.Update(keyframes), 0u);
+}
+
+TEST(TileSurveysTest, CutBytesAreNotLoaded) {
+  const MapProfile profile = DrivesProfile(0);
+  KeptTile tile(profile);
+  tile.Update(RandomDrives(profile, 7));
+  Bytes saved = tile.surveys().Save();
+  for (std::size_t size = 0; size < saved.size(); size += 1 + saved.size() / 500) {
+    const auto cut = TileSurveys::Load(ByteSpan(saved).first(size), {0, 0, 0}, profile);
+    ASSERT_FALSE(cut.has_value()) << size;
+    EXPECT_EQ(cut.error().code(), StatusCode::kInvalidData);
+  }
+  saved.push_back(0);
+  EXPECT_FALSE(TileSurveys::Load(saved, {0, 0, 0}, profile).has_value());
 }
 
 TEST(TileSurveysTest, WhatFollowsIsAddedAndOnlyChangedStretchesAreSurveyedAgain) {

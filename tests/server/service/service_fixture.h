@@ -82,6 +82,7 @@ class ServiceTest : public ::testing::Test {
     // Less than the drive, as a rule: caches must not matter.
     service.fusion.building.keyframe_bytes = 1u << 20;
     service.fusion.building.surveys = surveys_;
+    service.fusion.building.survey_files = survey_files_;
     service.past_cache_bytes = 1u << 20;
     service.scratch_directory = directory_;
     service_ = std::make_unique<AtlasService>(
@@ -126,6 +127,7 @@ class ServiceTest : public ::testing::Test {
 
   MapProfile profile_ = TestProfile();  // of new atlases
   SurveyCacheLimits surveys_{100'000, 100'000};
+  SurveyFilesOptions survey_files_;  // none
   std::filesystem::path directory_;
   std::unique_ptr<AtlasStore> store_;
   std::unique_ptr<AtlasService> service_;

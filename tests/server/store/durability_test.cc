@@ -86,6 +86,38 @@ TEST_F(DurabilityTest, IdentityIsKept) {
   EXPECT_EQ(store_->identity().atlas_id[0], 1);
 }
 
+TEST_F(DurabilityTest, EveryStartIsNotedWithTheRevisionItGoesOnFrom) {
+  Open();
+  ASSERT_EQ(store_->starts().size(), 1u);
+  const AtlasStart first = store_->starts()[0];
+  EXPECT_EQ(first.revision, 0u);
+  ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
+  const std::uint64_t revision = store_->ReadCounts()->revision;
+  Open();
+  ASSERT_EQ(store_->starts().size(), 2u);
+  EXPECT_EQ(store_->starts()[0], first);
+  EXPECT_NE(store_->starts()[1].id, first.id);
+  EXPECT_EQ(store_->starts()[1].revision, revision);
+}
+
+TEST_F(DurabilityTest, AHundredStartsAreKept) {
+  for (int i = 0; i < 103; ++i) {
+    Open();
+  }
+  EXPECT_EQ(store_->starts().size(), 100u);
+}
+
+TEST_F(DurabilityTest, WhatCameBeforeADamagedStartIsForgotten) {
+  Open();
+  Open();
+  Open();
+  const AtlasStart third = store_->starts()[2];
+  Tamper("UPDATE starts SET revision = 7 WHERE number = 2");
+  Open();
+  ASSERT_EQ(store_->starts().size(), 2u);
+  EXPECT_EQ(store_->starts()[0], third);
+}
+
 TEST_F(DurabilityTest, WithoutAProfileNothingIsCreated) {
   options_.new_profile.reset();
   EXPECT_EQ(OpenCode(), StatusCode::kNotFound);
@@ -217,6 +249,26 @@ TEST_F(DiskTest, AFullDiskRefusesWritesKeepsReadsAndRecovers) {
   ASSERT_TRUE(after.has_value()) << after.error().message();
   Open();
   EXPECT_EQ(store_->ReadCounts()->keyframes, accepted + 1);
+}
+
+TEST_F(DiskTest, AnAtlasOnAFullDiskIsOpened) {
+  Open();
+  std::uint64_t accepted = 0;
+  for (std::uint32_t i = 0; Put(Big(i)).has_value(); ++i) {
+    ++accepted;
+  }
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, accepted);
+}
+
+// Only that it was opened is not noted.
+TEST_F(DurabilityTest, AnAtlasThatCannotNoteItsStartIsOpened) {
+  OpenWithOneTile();
+  Tamper("CREATE TRIGGER no_start BEFORE INSERT ON starts BEGIN SELECT raise(ABORT, 'full'); END");
+  Open();
+  EXPECT_TRUE(store_->starts().empty());
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 1u);
+  EXPECT_TRUE(Put(MakeKeyframe(2, {kA})).has_value());
 }
 
 TEST_F(DiskTest, NoAtlasIsHalfMadeOnAFullDisk) {

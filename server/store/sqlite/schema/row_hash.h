@@ -21,6 +21,7 @@ enum class RowKind : std::uint8_t {
   kSessionState = 8,
   kCompaction = 9,
   kTombstone = 10,
+  kStart = 11,
 };
 
 // Integers as 8 bytes little-endian, text and bytes with their length before them.

@@ -109,6 +109,7 @@ void AtlasPlayer::Open(const DaemonSetup& setup) {
   service.fusion.workers = setup.workers;
   service.fusion.tiles_per_claim = setup.tiles_per_claim;
   service.fusion.building = setup.building;
+  service.fusion.building.survey_files.directory = directory_ / "data" / "surveys";
   service.past_cache_bytes = setup.building.keyframe_bytes;
   service.scratch_directory = directory_;
   service_ = std::make_unique<AtlasService>(

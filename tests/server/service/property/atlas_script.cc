@@ -47,7 +47,8 @@ std::ostream& operator<<(std::ostream& out, const DaemonSetup& setup) {
              << " tiles a claim, groups of " << setup.max_group << ", " << setup.max_readers
              << " readers, bytes: keyframes " << setup.building.keyframe_bytes << ", surveys "
              << setup.building.surveys.plain_bytes << " and packed "
-             << setup.building.surveys.packed_bytes << ", group " << setup.building.group_bytes;
+             << setup.building.surveys.packed_bytes << " and on disk "
+             << setup.building.survey_files.max_bytes << ", group " << setup.building.group_bytes;
 }
 
 std::ostream& operator<<(std::ostream& out, const Step& step) {

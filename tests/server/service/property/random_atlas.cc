@@ -168,6 +168,8 @@ DaemonSetup Drawing::DrawSetup() {
   setup.building.keyframe_bytes = OneOf(std::array<std::size_t, 3>{0, 30'000, kMuch});
   setup.building.surveys.plain_bytes = OneOf(std::array<std::size_t, 3>{0, 100'000, kMuch});
   setup.building.surveys.packed_bytes = OneOf(std::array<std::size_t, 3>{0, 50'000, kMuch});
+  setup.building.survey_files.max_bytes = OneOf(std::array<std::size_t, 3>{0, 50'000, kMuch});
+  setup.building.survey_files.min_free_bytes = 0;
   setup.building.group_bytes = OneOf(std::array<std::size_t, 4>{1, 100'000, kMuch, kMuch});
   setup.max_group = OneOf(std::array<std::size_t, 3>{1, 3, 64});
   setup.max_readers = 1 + Below(4);

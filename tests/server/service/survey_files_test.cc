@@ -1,0 +1,328 @@
+// Surveys on disk: what they save, and that nothing is ever made of the wrong ones.
+#include "server/service/fusion/survey_files.h"
+
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include <sqlite3.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace atlas {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> FilesIn(const fs::path& directory) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string Contents(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void Overwrite(const fs::path& path, const std::string& contents) {
+  std::ofstream(path, std::ios::binary) << contents;
+}
+
+class SurveyFilesTest : public ServiceTest {
+ protected:
+  SurveyFilesTest() {
+    survey_files_.directory = directory_ / "surveys";
+    survey_files_.min_free_bytes = 0;
+  }
+
+  fs::path database() const { return directory_ / "data" / "atlas.db"; }
+
+  void Execute(const std::string& sql) const {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(database().c_str(), &db), SQLITE_OK);
+    sqlite3_busy_timeout(db, 10'000);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(db);
+  }
+
+  // Of an atlas that was fed the same, and keeps nothing.
+  AtlasDigest DigestOfAnother(const std::vector<UploadRequest>& uploads) {
+    const SurveyFilesOptions files = std::exchange(survey_files_, {});
+    Open(1, "another");
+    for (const UploadRequest& upload : uploads) {
+      EXPECT_TRUE(Upload(upload).has_value());
+    }
+    const AtlasDigest digest = Digest();
+    survey_files_ = files;
+    return digest;
+  }
+
+  // What the files and the atlas say after a restart and another keyframe.
+  AtlasDigest DigestAfterRestart() {
+    Open(1);
+    EXPECT_TRUE(Upload(DriveUpload(8)).has_value());
+    return Digest();
+  }
+};
+
+TEST_F(SurveyFilesTest, AfterARestartNoKeyframeIsReadAgain) {
+  Open(1);
+  UploadDrive(8);
+  Digest();
+  Close();
+  ASSERT_FALSE(FilesIn(survey_files_.directory).empty());
+  Execute("UPDATE keyframes SET blob = zeroblob(blob_bytes)");  // whoever reads one is told
+  const AtlasDigest digest = DigestAfterRestart();
+  EXPECT_EQ(service_->ReadStatus()->counts.dirty_tiles, 0u);
+  std::vector<UploadRequest> uploads;
+  for (std::uint32_t i = 0; i < 9; ++i) {
+    uploads.push_back(DriveUpload(i));
+  }
+  EXPECT_EQ(digest.sha256, DigestOfAnother(uploads).sha256);
+}
+
+TEST_F(SurveyFilesTest, WhatMemoryHasNoRoomForIsOnDisk) {
+  surveys_ = {0, 0};
+  Open(1);
+  UploadDrive(8);
+  Digest();
+  const auto status = service_->ReadStatus();
+  ASSERT_TRUE(status.has_value());
+  EXPECT_EQ(status->kept_bytes, 0u);
+  EXPECT_GT(status->kept_disk_bytes, 0u);
+}
+
+// The keyframes that came after the copy are not those that come now, though both have the same
+// numbers and the atlas the same revision.
+TEST_F(SurveyFilesTest, AnAtlasPutBackFromAnOlderCopyIsItsOwn) {
+  for (const bool is_restarted : {false, true}) {
+    Close();
+    fs::remove_all(directory_ / "data");
+    fs::remove_all(survey_files_.directory);
+    Open(1);
+    UploadDrive(4);
+    Digest();
+    const fs::path copy = directory_ / (is_restarted ? "after.db" : "running.db");
+    Execute("VACUUM INTO '" + copy.string() + "'");
+    if (is_restarted) {
+      Open(1);
+    }
+    for (std::uint32_t i = 4; i < 8; ++i) {
+      ASSERT_TRUE(Upload(DriveUpload(i)).has_value());
+    }
+    Digest();
+    Close();
+    fs::copy_file(copy, database(), fs::copy_options::overwrite_existing);
+    Open(1);
+    std::vector<UploadRequest> uploads;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      uploads.push_back(DriveUpload(i));
+    }
+    for (std::uint32_t i = 4; i < 9; ++i) {
+      uploads.push_back(DriveUpload(i));
+      uploads.back().blob =
+          EncodeKeyframe(testing::StreetKeyframe(TestProfile(), 24, 500 + i));  // another world
+      ASSERT_TRUE(Upload(uploads.back()).has_value());
+    }
+    const AtlasDigest digest = Digest();
+    fs::remove_all(directory_ / "another");
+    EXPECT_EQ(digest.sha256, DigestOfAnother(uploads).sha256) << is_restarted;
+  }
+}
+
+TEST_F(SurveyFilesTest, DamagedFilesAreNotBelieved) {
+  Open(1);
+  UploadDrive(8);
+  Digest();
+  Close();
+  std::vector<UploadRequest> uploads;
+  for (std::uint32_t i = 0; i < 9; ++i) {
+    uploads.push_back(DriveUpload(i));
+  }
+  const AtlasDigest expected = DigestOfAnother(uploads);
+  Close();
+  fs::copy(directory_ / "data", directory_ / "data_before", fs::copy_options::recursive);
+  fs::copy(survey_files_.directory, directory_ / "surveys_before");
+  std::mt19937 random(1);
+  for (int round = 0; round < 12; ++round) {
+    fs::remove_all(directory_ / "data");
+    fs::remove_all(survey_files_.directory);
+    fs::copy(directory_ / "data_before", directory_ / "data", fs::copy_options::recursive);
+    fs::copy(directory_ / "surveys_before", survey_files_.directory);
+    for (const fs::path& path : FilesIn(survey_files_.directory)) {
+      std::string bytes = Contents(path);
+      const std::size_t at = random() % (round % 2 == 0 ? 64 : bytes.size());
+      if (round % 3 == 2) {
+        bytes.resize(at);
+      } else {
+        bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
+      }
+      Overwrite(path, bytes);
+    }
+    EXPECT_EQ(DigestAfterRestart().sha256, expected.sha256) << "round " << round;
+    Close();
+  }
+}
+
+TEST_F(SurveyFilesTest, FilesMayVanishAtAnyTime) {
+  surveys_ = {0, 0};  // each is read each time
+  Open(1);
+  UploadDrive(4);
+  Digest();
+  fs::remove_all(survey_files_.directory);
+  for (std::uint32_t i = 4; i < 8; ++i) {
+    ASSERT_TRUE(Upload(DriveUpload(i)).has_value());
+  }
+  std::vector<UploadRequest> uploads;
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    uploads.push_back(DriveUpload(i));
+  }
+  EXPECT_EQ(Digest().sha256, DigestOfAnother(uploads).sha256);
+}
+
+// Files of its own in a directory, without a service.
+class FilesAlone {
+ public:
+  FilesAlone(const SurveyFilesOptions& options, std::vector<AtlasStart> starts)
+      : files_(
+            options, TestProfile(), std::move(starts), [this](LogLevel, const std::string& line) {
+              lines_.push_back(line);
+            }) {}
+
+  bool Write(const TileId& id, std::uint64_t revision) {
+    KeptSurveys kept{TileSurveys(id), revision, 0};
+    return files_.Write(kept);
+  }
+  bool Has(const TileId& id) { return files_.Read(id).has_value(); }
+  SurveyFiles& files() { return files_; }
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  std::vector<std::string> lines_;
+  SurveyFiles files_;
+};
+
+AtlasStart Start(std::uint8_t number, std::uint64_t revision) {
+  AtlasStart start;
+  start.id.fill(number);
+  start.revision = revision;
+  return start;
+}
+
+constexpr TileId kTile{0, 3, -4};
+
+TEST_F(SurveyFilesTest, AFileIsBelievedWhileTheAtlasGoesOnFromIt) {
+  {
+    FilesAlone files(survey_files_, {Start(1, 0)});
+    EXPECT_TRUE(files.Write(kTile, 7));
+    EXPECT_TRUE(files.Has(kTile));
+    EXPECT_FALSE(files.Has({0, 3, -5}));
+  }
+  const auto is_believed = [&](std::vector<AtlasStart> starts) {
+    const fs::path saved = directory_ / "saved";
+    fs::remove_all(saved);
+    fs::copy(survey_files_.directory, saved);
+    FilesAlone files(survey_files_, std::move(starts));
+    const bool has = files.Has(kTile);
+    EXPECT_TRUE(has || !files.files().is_on() || FilesIn(survey_files_.directory).empty())
+        << "others are removed";
+    fs::remove_all(survey_files_.directory);
+    fs::copy(saved, survey_files_.directory);
+    return has;
+  };
+  EXPECT_TRUE(is_believed({Start(1, 0), Start(2, 7)}));
+  EXPECT_TRUE(is_believed({Start(1, 0), Start(2, 9), Start(3, 9)}));
+  EXPECT_FALSE(is_believed({Start(1, 0), Start(2, 6)})) << "a copy of before was put back";
+  EXPECT_FALSE(is_believed({Start(2, 0), Start(3, 9)})) << "another atlas, or so long ago";
+  EXPECT_FALSE(is_believed({}));
+}
+
+TEST_F(SurveyFilesTest, AFileUnderAnothersNameIsNotBelieved) {
+  const TileId other{0, 3, -5};
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  ASSERT_TRUE(files.Write(kTile, 7));
+  const fs::path path = FilesIn(survey_files_.directory).front();
+  const std::string bytes = Contents(path);
+  ASSERT_TRUE(files.Write(other, 7));
+  for (const fs::path& file : FilesIn(survey_files_.directory)) {
+    Overwrite(file, bytes);
+  }
+  EXPECT_TRUE(files.Has(kTile));
+  EXPECT_FALSE(files.Has(other));
+}
+
+TEST_F(SurveyFilesTest, TheLeastRecentlyUsedGoFirst) {
+  std::size_t file_bytes = 0;
+  {
+    FilesAlone files(survey_files_, {Start(1, 0)});
+    ASSERT_TRUE(files.Write(kTile, 7));
+    file_bytes = files.files().bytes();
+  }
+  fs::remove_all(survey_files_.directory);
+  survey_files_.max_bytes = 3 * file_bytes + file_bytes / 2;
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  for (std::int32_t x = 0; x < 3; ++x) {
+    ASSERT_TRUE(files.Write({0, x, 0}, 7));
+  }
+  EXPECT_TRUE(files.Has({0, 0, 0}));
+  ASSERT_TRUE(files.Write({0, 3, 0}, 7));
+  EXPECT_TRUE(files.Has({0, 0, 0}));
+  EXPECT_FALSE(files.Has({0, 1, 0}));
+  EXPECT_LE(files.files().bytes(), survey_files_.max_bytes);
+  EXPECT_EQ(FilesIn(survey_files_.directory).size(), 3u);
+}
+
+TEST_F(SurveyFilesTest, WhatIsOnDiskIsNotWrittenTwice) {
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  KeptSurveys kept{TileSurveys(kTile), 7, 0};
+  EXPECT_TRUE(files.files().Write(kept));
+  EXPECT_FALSE(files.files().Write(kept));
+  kept.revision = 8;
+  EXPECT_TRUE(files.files().Write(kept));
+}
+
+TEST_F(SurveyFilesTest, WhatIsOnDiskOfOthersStays) {
+  fs::create_directories(survey_files_.directory);
+  Overwrite(survey_files_.directory / "letter.txt", "dear");
+  Overwrite(survey_files_.directory / "1.survey", "half");
+  Overwrite(survey_files_.directory / "1.0.survey-new", "half");
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  const auto left = FilesIn(survey_files_.directory);
+  ASSERT_EQ(left.size(), 1u);
+  EXPECT_EQ(left.front().filename(), "letter.txt");
+}
+
+TEST_F(SurveyFilesTest, OthersNeedAFullDiskMore) {
+  survey_files_.min_free_bytes = ~std::uintmax_t{0};
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  EXPECT_FALSE(files.Write(kTile, 7));
+  EXPECT_TRUE(FilesIn(survey_files_.directory).empty());
+  EXPECT_TRUE(files.lines().empty());
+}
+
+TEST_F(SurveyFilesTest, ADirectoryThatCannotBeMadeIsToldOnce) {
+  Overwrite(survey_files_.directory, "a file");
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  EXPECT_FALSE(files.files().is_on());
+  EXPECT_FALSE(files.Write(kTile, 7));
+  ASSERT_EQ(files.lines().size(), 1u);
+  EXPECT_NE(files.lines()[0].find("surveys are not kept on disk: cannot make"), std::string::npos);
+}
+
+TEST_F(SurveyFilesTest, AWriteThatFailsIsToldOnceAMinute) {
+  FilesAlone files(survey_files_, {Start(1, 0)});
+  fs::remove_all(survey_files_.directory);
+  Overwrite(survey_files_.directory, "a file");
+  EXPECT_FALSE(files.Write(kTile, 7));
+  EXPECT_FALSE(files.Write(kTile, 8));
+  ASSERT_EQ(files.lines().size(), 1u);
+  EXPECT_NE(files.lines()[0].find("Not a directory"), std::string::npos) << files.lines()[0];
+}
+
+}  // namespace
+}  // namespace atlas
