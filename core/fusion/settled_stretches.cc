@@ -5,13 +5,9 @@
 #include <utility>
 
 #include "core/base/small_sort.h"
-#include "core/fusion/combination/bounded_guards.h"
 
 namespace atlas {
 namespace {
-
-// What is set aside of each band and vehicle of a cell.
-constexpr std::size_t kSpareSegments = 2;
 
 std::size_t CellsOfTile(const MapProfile& profile) {
   return static_cast<std::size_t>(profile.tile_cells) * profile.tile_cells;
@@ -44,31 +40,42 @@ void SettledStretches::Settle(std::span<const std::uint32_t> settling,
   if (!spare_places_.empty()) {
     spare_.Unpack();
   }
+  marks_.Unpack();
   BoundedChoice choice(profile);
+  Forgetting forgetting(profile);
   SettledSegments merged;
   SettledSegments spare;
+  CellMarks marks;
   for (std::size_t cell = 0; cell < CellsOfTile(profile); ++cell) {
     segments_.clear();
+    rest_.clear();
     Collect(cell, stretches, segments_);
     for (const std::uint32_t place : settling) {
       CollectOpen(cell, place, stretches, segments_);
     }
     SortByStretch(segments_);
     if (profile.preset == FusionPreset::kBounded) {
-      rest_.clear();
       CollectSpare(cell, stretches);
-      SetAside(stretches, choice, profile, spare);
+      const std::span known = marks_.Marks(cell);
+      cell_marks_.assign(known.begin(), known.end());
+      SetAside(choice, forgetting, stretches);
+      marks.AppendCell(cell_marks_);
     }
     for (const SegmentView& view : segments_) {
       merged.Append(*view.segment, view.stretch);
     }
     merged.EndCell();
+    for (const SegmentView& view : rest_) {
+      spare.Append(*view.segment, view.stretch);
+    }
     spare.EndCell();
   }
   settled_ = std::move(merged);
   for (const std::uint32_t place : settling) {
     stretches[place].open.reset();
   }
+  marks_ = std::move(marks);
+  marks_.Pack();
   spare_ = SettledSegments();
   spare_places_.clear();
   if (!spare.is_empty()) {
@@ -79,29 +86,22 @@ void SettledStretches::Settle(std::span<const std::uint32_t> settling,
   }
 }
 
-// Leaves those of segments_ that count while they all are there. Of the others and those of rest_
-// some go to `spare`, and what is left is forgotten.
-void SettledStretches::SetAside(std::span<TileStretch> stretches,
-                                BoundedChoice& choice,
-                                const MapProfile& profile,
-                                SettledSegments& spare) {
+// Leaves those of segments_ that count while they all are there, and of the others and those of
+// rest_ in rest_ what must not be forgotten; of what is forgotten, cell_marks_ knows.
+void SettledStretches::SetAside(BoundedChoice& choice,
+                                Forgetting& forgetting,
+                                std::span<TileStretch> stretches) {
   const std::size_t kept = choice.MoveLatestToFront(segments_);
   for (const SegmentView& view : std::span(segments_).subspan(kept)) {
     SetUsed(view, false, stretches);
     rest_.push_back(view);
   }
   segments_.resize(kept);
-  const std::size_t spared = MoveSpareToFront(rest_, kSpareSegments, profile);
-  const std::span forgotten = std::span(rest_).subspan(spared);
-  segments_.insert(segments_.end(), rest_.begin(), rest_.end() - std::ssize(forgotten));
-  MarkGuards(segments_, forgotten, profile);
-  segments_.resize(kept);
-  for (const SegmentView& view : std::span(rest_).first(spared)) {
-    spare.Append(*view.segment, view.stretch);
-  }
-  for (const SegmentView& view : forgotten) {
+  const std::size_t spared = forgetting.MoveSpareToFront(segments_, rest_, cell_marks_);
+  for (const SegmentView& view : std::span(rest_).subspan(spared)) {
     stretches[view.stretch].has_forgotten = true;
   }
+  rest_.resize(spared);
 }
 
 // Appends a cell's spare segments to rest_.
@@ -113,31 +113,29 @@ void SettledStretches::CollectSpare(std::size_t cell, std::span<const TileStretc
   }
 }
 
-bool SettledStretches::PrepareToLose(const std::vector<bool>& is_leaving,
+bool SettledStretches::PrepareToLose(const std::vector<bool>& is_staying,
                                      std::span<const TileStretch> stretches,
                                      const MapProfile& profile) {
   Restore(stretches, CellsOfTile(profile));
-  if (std::none_of(stretches.begin(), stretches.end(),
-                   [](const TileStretch& s) { return s.has_forgotten; })) {
+  if (marks_.is_empty()) {
     return false;
   }
-  const auto may_count = [&](std::size_t cell) {
+  CellMarks marks = marks_;
+  marks.Unpack();
+  Forgetting forgetting(profile);
+  for (std::size_t cell = 0; cell < CellsOfTile(profile); ++cell) {
+    if (marks.Marks(cell).empty()) {
+      continue;
+    }
     segments_.clear();
     Collect(cell, stretches, segments_);
-    const auto left =
-        std::stable_partition(segments_.begin(), segments_.end(),
-                              [&](const SegmentView& view) { return is_leaving[view.stretch]; });
-    return MayCountAgain({segments_.begin(), left}, {left, segments_.end()}, profile);
-  };
-  std::size_t cell = 0;
-  while (cell < CellsOfTile(profile) && !may_count(cell)) {
-    ++cell;
+    std::erase_if(segments_, [&](const SegmentView& view) { return !is_staying[view.stretch]; });
+    if (forgetting.MayCount(marks.Marks(cell), segments_)) {
+      marks_ = CellMarks();
+      return true;
+    }
   }
-  if (cell == CellsOfTile(profile)) {
-    return false;
-  }
-  settled_.ReleaseGuards();
-  return true;
+  return false;
 }
 
 // As if nothing had ever been set aside.
@@ -178,6 +176,8 @@ void SettledStretches::Save(ByteWriter& out) const {
     out.Varint(packed.size());
     out.Raw(packed);
   }
+  out.Varint(marks_.packed().size());
+  out.Raw(marks_.packed());
   out.Varint(spare_places_.size());
   for (const std::uint32_t place : spare_places_) {
     out.U32(place);
@@ -190,6 +190,8 @@ SettledStretches SettledStretches::Load(ByteReader& in) {
     const ByteSpan packed = in.Raw(in.Varint());
     *segments = SettledSegments(Bytes(packed.begin(), packed.end()));
   }
+  const ByteSpan marks = in.Raw(in.Varint());
+  loaded.marks_ = CellMarks(Bytes(marks.begin(), marks.end()));
   const std::uint64_t places = in.Varint();
   for (std::uint64_t i = 0; i < places && in.ok(); ++i) {
     loaded.spare_places_.push_back(in.U32());

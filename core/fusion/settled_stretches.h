@@ -1,9 +1,8 @@
 // What the settled stretches of a tile saw.
 //
-// In preset bounded these are the segments that count; what counts no more is set aside,
-// compressed, and in the end forgotten, so that the size does not grow with the passes. What was
-// forgotten is guarded (core/fusion/combination/bounded_guards.h): as long as enough guards stay it
-// cannot count.
+// In preset bounded these are the segments that count. What counts no more is set aside,
+// compressed, and in the end forgotten but for a mark (core/fusion/combination/forgotten_mark.h),
+// so that the size does not grow with the passes.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +12,8 @@
 
 #include "core/base/bytes.h"
 #include "core/fusion/combination/bounded_choice.h"
+#include "core/fusion/combination/forgotten_mark.h"
+#include "core/fusion/survey/cell_marks.h"
 #include "core/fusion/survey/cell_set.h"
 #include "core/fusion/survey/settled_segments.h"
 #include "core/fusion/tile_stretch.h"
@@ -34,10 +35,10 @@ class SettledStretches {
               std::span<TileStretch> stretches,
               const MapProfile& profile);
 
-  // To be called before any of them leaves. Settles again what was set aside: it may count now.
-  // Says whether what was forgotten may count, too: then it must be surveyed, and nothing is
-  // guarded any more.
-  bool PrepareToLose(const std::vector<bool>& is_leaving,
+  // To be called before any of them leaves; `is_staying`, by place, says which do not. Settles
+  // again what was set aside: it may count now. Says whether what was forgotten may count, too:
+  // then all of it must be surveyed. Open ones keep nothing out: they change without a question.
+  bool PrepareToLose(const std::vector<bool>& is_staying,
                      std::span<const TileStretch> stretches,
                      const MapProfile& profile);
   // Puts the segments of the stretch at `place`, about to leave, into `survey`, which is empty.
@@ -46,7 +47,7 @@ class SettledStretches {
   // it saw go into `touched`.
   void Renumber(std::span<const std::uint32_t> places, CellSet& touched);
 
-  std::size_t bytes() const { return settled_.bytes() + spare_.bytes(); }
+  std::size_t bytes() const { return settled_.bytes() + spare_.bytes() + marks_.bytes(); }
   // As StretchSurvey's.
   void Pack() { settled_.Pack(); }
   void Unpack() { settled_.Unpack(); }
@@ -56,17 +57,17 @@ class SettledStretches {
 
  private:
   void CollectSpare(std::size_t cell, std::span<const TileStretch> stretches);
-  void SetAside(std::span<TileStretch> stretches,
-                BoundedChoice& choice,
-                const MapProfile& profile,
-                SettledSegments& spare);
+  void SetAside(BoundedChoice& choice, Forgetting& forgetting, std::span<TileStretch> stretches);
   void Restore(std::span<const TileStretch> stretches, std::size_t cells);
 
   SettledSegments settled_;
   SettledSegments spare_;                    // packed; the places are those when it was made
   std::vector<std::uint32_t> spare_places_;  // of these the present ones
-  std::vector<SegmentView> segments_;        // of a cell
-  std::vector<SegmentView> rest_;            // of a cell, that do not count
+  CellMarks marks_;                          // packed
+
+  std::vector<SegmentView> segments_;      // of a cell
+  std::vector<SegmentView> rest_;          // of a cell, that do not count
+  std::vector<ForgottenMark> cell_marks_;  // of a cell
 };
 
 }  // namespace atlas

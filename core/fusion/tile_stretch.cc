@@ -65,10 +65,9 @@ void TileStretch::Save(ByteWriter& out) const {
 }
 
 TileStretch TileStretch::Load(ByteReader& in, const TileId& id, const MapProfile& profile) {
-  constexpr std::size_t kMaxName = 64;
   TileStretch stretch;
-  stretch.key.vehicle = in.String(kMaxName);
-  stretch.key.session = in.String(kMaxName);
+  stretch.key.vehicle = in.String(kMaxNameSize);
+  stretch.key.session = in.String(kMaxNameSize);
   stretch.number = static_cast<std::uint32_t>(in.Varint());
   stretch.session = static_cast<std::uint32_t>(in.Varint());
   stretch.vehicle = static_cast<std::uint32_t>(in.Varint());

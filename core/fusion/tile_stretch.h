@@ -20,7 +20,7 @@ struct TileStretch {
   SessionKey key;
   std::uint32_t number = 0;   // StretchNumber's
   std::uint32_t session = 0;  // equal for equal keys, rising
-  std::uint32_t vehicle = 0;  // equal for equal vehicle names, rising
+  std::uint32_t vehicle = 0;  // the tile's number of its name
   std::vector<StretchMember> frames;
   std::vector<std::int64_t> times_ms;  // of the frames: they are looked up for every segment
   std::optional<StretchSurvey> open;   // else settled

@@ -29,9 +29,12 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
   }
   Settle(profile);
   std::vector<PlannedStretch> wanted = Plan(change, profile);
-  if (const std::vector<bool> leaving = FindLeaving(wanted);
-      std::find(leaving.begin(), leaving.end(), true) != leaving.end() &&
-      settled_.PrepareToLose(leaving, stretches_, profile)) {
+  const std::vector<bool> is_staying = FindStaying(wanted);
+  const auto is_leaving = [&](const TileStretch& stretch) {
+    return !stretch.open && !is_staying[static_cast<std::size_t>(&stretch - stretches_.data())];
+  };
+  if (std::any_of(stretches_.begin(), stretches_.end(), is_leaving) &&
+      settled_.PrepareToLose(is_staying, stretches_, profile)) {
     SurveyForgottenAgain(wanted);
   }
   TakeStretches(wanted, profile);
@@ -76,24 +79,21 @@ std::vector<PlannedStretch> TileSurveys::Plan(const TileChange& change, const Ma
   return plan;
 }
 
-// Which stretches leave the settled ones, by their places: those that go, change, or grow. One that
-// grows and has forgotten some of its segments starts over.
-std::vector<bool> TileSurveys::FindLeaving(std::span<PlannedStretch> wanted) const {
-  std::vector<bool> is_leaving(stretches_.size());
-  for (std::size_t i = 0; i < stretches_.size(); ++i) {
-    is_leaving[i] = !stretches_[i].open;
-  }
+// Which stretches stay as they are, by their places. One that grows and has forgotten some of its
+// segments starts over.
+std::vector<bool> TileSurveys::FindStaying(std::span<PlannedStretch> wanted) const {
+  std::vector<bool> is_staying(stretches_.size());
   for (PlannedStretch& w : wanted) {
     if (w.old == PlannedStretch::kNone) {
       continue;
     }
     if (w.kept == w.frames.size()) {
-      is_leaving[w.old] = false;
+      is_staying[w.old] = true;
     } else if (stretches_[w.old].has_forgotten) {
       w.StartOver();
     }
   }
-  return is_leaving;
+  return is_staying;
 }
 
 void TileSurveys::SurveyForgottenAgain(std::span<PlannedStretch> wanted) const {
@@ -113,6 +113,7 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
     const bool grows = w.kept < w.frames.size();
     TileStretch stretch{std::move(w.key), w.number, 0, 0, {}, {}, {}, false, 0, 0};
     if (w.old == PlannedStretch::kNone) {
+      stretch.vehicle = NumberOf(stretch.key.vehicle);
       stretch.open.emplace(whole, profile);
     } else {
       stretch = std::move(stretches_[w.old]);
@@ -123,11 +124,8 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
       settled_places[w.old] = stretch.open ? SettledStretches::kGone : i;
     }
     stretch.session = 0;
-    stretch.vehicle = 0;
     if (!next.empty()) {
-      const TileStretch& before = next.back();
-      stretch.session = before.session + (before.key == stretch.key ? 0u : 1u);
-      stretch.vehicle = before.vehicle + (before.key.vehicle == stretch.key.vehicle ? 0u : 1u);
+      stretch.session = next.back().session + (next.back().key == stretch.key ? 0u : 1u);
     }
     stretch.frames = std::move(w.frames);
     stretch.times_ms.clear();
@@ -144,6 +142,15 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
   }
   settled_.Renumber(settled_places, touched_);
   stretches_ = std::move(next);
+}
+
+std::uint32_t TileSurveys::NumberOf(const std::string& vehicle) {
+  const auto its = std::find(vehicles_.begin(), vehicles_.end(), vehicle);
+  const auto number = static_cast<std::uint32_t>(its - vehicles_.begin());
+  if (its == vehicles_.end()) {
+    vehicles_.push_back(vehicle);
+  }
+  return number;
 }
 
 StretchSurvey TileSurveys::Reopen(std::uint32_t place,
@@ -240,6 +247,9 @@ std::size_t TileSurveys::bytes() const {
   for (const TileStretch& stretch : stretches_) {
     bytes += stretch.bytes();
   }
+  for (const std::string& vehicle : vehicles_) {
+    bytes += sizeof(vehicle) + vehicle.capacity();
+  }
   return bytes;
 }
 
@@ -284,6 +294,10 @@ void TileSurveys::Unpack() {
 Bytes TileSurveys::Save() const {
   ByteWriter out;
   out.Varint(expected_count_);
+  out.Varint(vehicles_.size());
+  for (const std::string& vehicle : vehicles_) {
+    out.String(vehicle);
+  }
   settled_.Save(out);
   out.Varint(stretches_.size());
   for (const TileStretch& stretch : stretches_) {
@@ -297,6 +311,10 @@ Result<TileSurveys> TileSurveys::Load(ByteSpan bytes, const TileId& id, const Ma
   TileSurveys surveys(id);
   surveys.is_packed_ = true;
   surveys.expected_count_ = static_cast<std::uint32_t>(in.Varint());
+  const std::uint64_t vehicles = in.Varint();
+  for (std::uint64_t i = 0; i < vehicles && in.ok(); ++i) {
+    surveys.vehicles_.emplace_back(in.String(kMaxNameSize));
+  }
   surveys.settled_ = SettledStretches::Load(in);
   const std::uint64_t count = in.Varint();
   for (std::uint64_t i = 0; i < count && in.ok(); ++i) {

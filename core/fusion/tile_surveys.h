@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -54,9 +55,10 @@ class TileSurveys {
 
  private:
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);
-  std::vector<bool> FindLeaving(std::span<PlannedStretch> wanted) const;
+  std::vector<bool> FindStaying(std::span<PlannedStretch> wanted) const;
   void SurveyForgottenAgain(std::span<PlannedStretch> wanted) const;
   void TakeStretches(std::span<PlannedStretch> wanted, const MapProfile& profile);
+  std::uint32_t NumberOf(const std::string& vehicle);
   StretchSurvey Reopen(std::uint32_t place,
                        std::span<const StretchMember> frames,
                        const MapProfile& profile) const;
@@ -67,6 +69,7 @@ class TileSurveys {
   TileId id_;
   std::uint32_t expected_count_ = 0;    // calls of Expect()
   std::vector<TileStretch> stretches_;  // in canonical order
+  std::vector<std::string> vehicles_;   // by their numbers; none is ever removed
   SettledStretches settled_;
   std::vector<std::uint32_t> open_;     // places of the stretches that are
   std::vector<std::uint32_t> awaited_;  // those of the frames that must be added, last first

@@ -8,8 +8,6 @@
 namespace atlas {
 namespace {
 
-constexpr std::size_t kMaxNameLength = 64;
-
 bool IsNameCharacter(char c) {
   return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' ||
          c == '_' || c == '-';
@@ -18,7 +16,7 @@ bool IsNameCharacter(char c) {
 }  // namespace
 
 Status ValidateName(std::string_view what, std::string_view name) {
-  if (name.empty() || name.size() > kMaxNameLength ||
+  if (name.empty() || name.size() > kMaxNameSize ||
       !std::all_of(name.begin(), name.end(), IsNameCharacter)) {
     return Status(StatusCode::kInvalidArgument,
                   StrCat(what, " name '", name.substr(0, 80),
@@ -28,7 +26,7 @@ Status ValidateName(std::string_view what, std::string_view name) {
 }
 
 std::string NameFrom(std::string_view text) {
-  std::string name(text.substr(0, kMaxNameLength));
+  std::string name(text.substr(0, kMaxNameSize));
   std::replace_if(
       name.begin(), name.end(), [](char c) { return !IsNameCharacter(c); }, '-');
   return name;

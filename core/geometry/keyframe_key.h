@@ -11,6 +11,8 @@
 
 namespace atlas {
 
+inline constexpr std::size_t kMaxNameSize = 64;
+
 // Vehicle and session names: [A-Za-z0-9._-]{1,64}.
 Status ValidateName(std::string_view what, std::string_view name);
 // Any text as a name: '-' for what a name may not hold, cut to its length. Empty stays empty.

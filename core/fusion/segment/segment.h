@@ -30,8 +30,6 @@ struct alignas(64) Segment {
   AltitudeSource source : 2 = AltitudeSource::kNone;  // the representative's
   bool is_strong : 1 = false;                         // some altitude was measured or interpolated
   bool is_used : 1 = false;                           // it was part of a layer when combined last
-  bool guards_vehicle : 1 = false;                    // core/fusion/combination/bounded_guards.h
-  bool guards_band : 1 = false;
   ColumnLanes column{};
 };
 static_assert(sizeof(Segment) == 64);  // one line of a cache: it is read for every observation

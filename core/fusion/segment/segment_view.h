@@ -13,7 +13,7 @@ struct SegmentView {
   std::int64_t driven_ms = 0;     // of its driven_frame, if it has one
   std::uint32_t stretch = 0;      // its place in canonical order
   std::uint32_t session = 0;      // FusionStretch's number
-  std::uint32_t vehicle = 0;      // FusionStretch's number
+  std::uint32_t vehicle = 0;      // equal for equal vehicle names
 };
 
 // By the keyframe that saw it last: its time, then vehicle, session and sequence.

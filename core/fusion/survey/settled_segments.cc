@@ -44,21 +44,10 @@ void SettledSegments::CopyTo(std::uint32_t stretch, StretchSurvey& survey) const
   for (std::size_t cell = 0; cell < cell_end_.size(); ++cell) {
     for (std::size_t i = cell_end_[cell]; i-- > begin;) {  // each comes before the last
       if (stretches_[i] == stretch) {
-        Segment segment = segments_[i];
-        segment.guards_vehicle = false;
-        segment.guards_band = false;
-        survey.AddSegment(cell, segment);
+        survey.AddSegment(cell, segments_[i]);
       }
     }
     begin = cell_end_[cell];
-  }
-}
-
-void SettledSegments::ReleaseGuards() {
-  packed_ = Bytes();
-  for (Segment& segment : segments_) {
-    segment.guards_vehicle = false;
-    segment.guards_band = false;
   }
 }
 

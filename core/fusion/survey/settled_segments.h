@@ -44,12 +44,8 @@ class SettledSegments {
 
   // Stretch i becomes numbers[i], or is removed if that is kGone: its cells go into `touched`.
   void Renumber(std::span<const std::uint32_t> numbers, CellSet& touched);
-  // Puts the segments of a stretch into `survey`, of the same cells and empty, as guards of
-  // nothing: they may change.
+  // Puts the segments of a stretch into `survey`, of the same cells and empty.
   void CopyTo(std::uint32_t stretch, StretchSurvey& survey) const;
-
-  // None of them guards anything any more.
-  void ReleaseGuards();
 
   // As StretchSurvey's.
   void Pack();

@@ -190,5 +190,71 @@ TEST(TileSurveysTest, ACorrectionAmongManyPassesCostsOneStretch) {
   }
 }
 
+// Passes that see several segments in most bands of a cell, three of them corrected at once, again
+// and again.
+TEST(TileSurveysTest, ThreePassesAtOnceCostThreeStretches) {
+  for (const std::uint32_t vehicles : {1u, 3u, 12u}) {
+    MapProfile profile = DrivesProfile(0);
+    profile.preset = FusionPreset::kBounded;
+    KeptTile tile(profile);
+    std::vector<PlacedKeyframe> keyframes;
+    constexpr std::uint32_t kPasses = 30;
+    for (std::uint32_t pass = 0; pass < kPasses; ++pass) {
+      keyframes.push_back(
+          testing::PlacedFrame({StrCat("car", pass % vehicles), StrCat("pass", 100 + pass), 0},
+                               {0.8, 0.8}, testing::RandomKeyframe(profile, 12, pass)));
+      keyframes.back().time_ms = 1'000'000 * std::int64_t{pass};
+      tile.Update(keyframes);
+    }
+    std::mt19937 random(vehicles);
+    const auto below = [&](std::uint32_t n) {
+      return static_cast<std::uint32_t>(random() % n);
+    };
+    for (int batch = 0; batch < 60; ++batch) {
+      for (int i = 0; i < 3; ++i) {
+        const std::uint32_t pass = below(2) == 0 ? kPasses - 1 - below(5) : below(kPasses);
+        keyframes[pass].placement.x_um += 1'000;
+      }
+      EXPECT_LE(tile.Update(keyframes), 3u) << vehicles << " vehicles, batch " << batch;
+      for (int idle = 0; idle < 3; ++idle) {
+        tile.Update(keyframes);  // they settle
+      }
+    }
+  }
+}
+
+// What little a cell may hold is pushed out all the time, and comes back all the time.
+TEST(TileSurveysTest, WhatWasForgottenComesBackWhenItCounts) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(20); ++seed) {
+    MapProfile profile = DrivesProfile(seed);
+    profile.preset = FusionPreset::kBounded;
+    profile.band_segments = static_cast<std::uint8_t>(1 + seed % 4);
+    profile.band_vehicle_segments = static_cast<std::uint8_t>(1 + seed % 2);
+    ASSERT_TRUE(profile.Validate().ok());
+    KeptTile tile(profile);
+    std::mt19937 random(seed);
+    std::vector<PlacedKeyframe> keyframes;
+    for (std::uint32_t pass = 0; pass < 100; ++pass) {
+      keyframes.push_back(testing::PlacedFrame(
+          {StrCat("car", random() % (1 + seed % 5)), StrCat("pass", 100 + pass), 0}, {0.8, 0.8},
+          testing::RandomKeyframe(profile, 8, pass)));
+      keyframes.back().time_ms = 100'000 * static_cast<std::int64_t>(random() % 60);
+      for (auto& keyframe : keyframes) {
+        if (random() % 20 == 0) {
+          keyframe.placement.x_um += 1'000;
+        }
+      }
+      if (random() % 15 == 0) {  // the latest are retracted
+        const auto cut_ms = 100'000 * static_cast<std::int64_t>(random() % 60);
+        std::erase_if(keyframes, [&](const PlacedKeyframe& k) { return k.time_ms > cut_ms; });
+      }
+      tile.Update(keyframes);
+      if (random() % 5 == 0) {
+        tile.SaveAndLoad();
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace atlas

@@ -1,0 +1,65 @@
+// Preset bounded: what is still known of segments that were forgotten, so that nobody has to ask
+// their keyframes whether they count again.
+//
+// In its band a segment cannot count while as many of its vehicle as a vehicle may have come before
+// it (IsChosenBefore), or as many of all vehicles as the band may hold. So it is enough to know, of
+// all that were forgotten in a band of a cell, which would come first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/fusion/segment/segment_view.h"
+#include "core/geometry/map_profile.h"
+
+namespace atlas {
+
+// Of the forgotten segments of a vehicle, or of any, in a band: none comes before this.
+struct ForgottenMark {
+  static constexpr std::uint32_t kAnyVehicle = 0xFFFF'FFFF;
+
+  std::int64_t last_time_ms = 0;
+  std::uint32_t vehicle = kAnyVehicle;  // as the views'
+  std::int32_t band = 0;
+  bool is_strong = false;
+};
+
+// Reused from cell to cell.
+class Forgetting {
+ public:
+  // `profile` must outlive this.
+  explicit Forgetting(const MapProfile& profile) : profile_(profile) {}
+
+  // Of a cell, `counting` are the segments that count, `rest` the others, `marks` what was
+  // forgotten before. Moves those of `rest` to the front that must not be forgotten, and says how
+  // many they are: what is forgotten cannot count even without any three stretches of the others.
+  // Adds it to `marks`; of a band a handful stay at most.
+  std::size_t MoveSpareToFront(std::span<const SegmentView> counting,
+                               std::span<SegmentView> rest,
+                               std::vector<ForgottenMark>& marks);
+
+  // Whether something that `marks` of a cell stand for may count beside `present`.
+  bool MayCount(std::span<const ForgottenMark> marks, std::span<const SegmentView> present);
+
+ private:
+  // How many segments of a stretch come before a mark in its band.
+  struct Tally {
+    std::uint32_t stretch = 0;
+    std::uint32_t vehicle = 0;
+    std::size_t segments = 0;
+  };
+
+  void TallyBefore(const ForgottenMark& mark, std::span<const SegmentView> present);
+  // Whether those keep the mark out, even without any `spare` stretches of them.
+  bool IsVehicleFull(std::uint32_t vehicle, std::size_t spare) const;
+  bool IsBandFull(std::size_t spare) const;
+
+  const MapProfile& profile_;
+  std::vector<SegmentView> present_;
+  std::vector<ForgottenMark> before_;
+  std::vector<Tally> tallies_;  // the largest first
+};
+
+}  // namespace atlas
