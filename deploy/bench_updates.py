@@ -92,6 +92,15 @@ def bench_corrections(bin_dir, emit, _):
                      "after 4 passes", next(r for r in rows if r["corrected_after_pass"] == 4)[what + "_ms"])
 
 
+def bench_restarts(bin_dir, emit, _):
+    """The first keyframe after a restart, in the garage, after up to 15 passes of one vehicle."""
+    rows = list(rows_of(bin_dir / "passes_bench", "garage", "bounded", 16, 1, "restart"))
+    for row in rows:
+        if row["pass"] in (2, 4, 8, 16):
+            for what in ("cpu_ms_first", "wall_ms_first"):
+                emit(f"restarts.{row['pass']}.{what}", row[what], "ms", "pass 2", rows[1][what])
+
+
 def bench_scaling(bin_dir, emit, _):
     """Ten keyframes corrected, in maps of 100, 1,000 and 10,000; as configured, and with little memory."""
     for survey_mib in (1536, 96):
@@ -148,4 +157,5 @@ def draw_passes(curves, path):
 
 
 BENCHMARKS = {"speed": bench_speed, "closure": bench_closure, "online": bench_online,
-              "passes": bench_passes, "corrections": bench_corrections, "scaling": bench_scaling}
+              "passes": bench_passes, "corrections": bench_corrections,
+              "restarts": bench_restarts, "scaling": bench_scaling}

@@ -1,7 +1,7 @@
 // What the settled stretches of a tile saw.
 //
 // In preset bounded these are the segments that count. What counts no more is set aside,
-// compressed, and in the end forgotten but for a mark (core/fusion/combination/forgotten_mark.h),
+// compressed, and in the end forgotten but for a mark (core/fusion/combination/forgetting.h),
 // so that the size does not grow with the passes.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 #include "core/base/bytes.h"
 #include "core/fusion/combination/bounded_choice.h"
-#include "core/fusion/combination/forgotten_mark.h"
+#include "core/fusion/combination/forgetting.h"
 #include "core/fusion/survey/cell_marks.h"
 #include "core/fusion/survey/cell_set.h"
 #include "core/fusion/survey/settled_segments.h"

@@ -15,8 +15,9 @@ struct GivenSetting {
   std::string origin;  // "atlasd.toml: line 3", "ATLASD_WORKERS", "--workers"
 };
 
-// By key: "listen", "data", "workers", "cache_mib", "log_level", "map.cell_size", "map.segments",
-// "map.segment_height", "map.preset". kInvalidArgument names file and line, kNotFound the file.
+// By key: "listen", "data", "workers", "cache_mib", "survey_mib", "survey_disk_mib", "log_level",
+// "map.cell_size", "map.segments", "map.segment_height", "map.preset". kInvalidArgument names file
+// and line, kNotFound the file.
 Result<std::map<std::string, GivenSetting>> ReadConfigFile(const std::filesystem::path& path);
 
 }  // namespace atlas

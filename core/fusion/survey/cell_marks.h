@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/bytes.h"
-#include "core/fusion/combination/forgotten_mark.h"
+#include "core/fusion/segment/forgotten_mark.h"
 #include "core/fusion/survey/packed_arrays.h"
 
 namespace atlas {

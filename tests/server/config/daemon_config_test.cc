@@ -75,6 +75,7 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
   EXPECT_EQ(config.workers, 0);
   EXPECT_EQ(config.cache_mib, 128);
   EXPECT_EQ(config.survey_mib, 1536);
+  EXPECT_EQ(config.survey_disk_mib, 4096);
   EXPECT_EQ(config.log_level, "info");
   EXPECT_EQ(config.NewProfile().value(), MapProfile());
   EXPECT_THAT(Refusal({}), HasSubstr("--data"));
@@ -82,7 +83,7 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
 
 TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
   const std::string file = File(
-      "data = '/file'\nworkers = 1\ncache_mib = 9\nsurvey_mib = 0\nlisten = "
+      "data = '/file'\nworkers = 1\ncache_mib = 9\nsurvey_mib = 0\nsurvey_disk_mib = 7\nlisten = "
       "'127.0.0.1:1'\nlog_level = 'error'\n"
       "[map]\ncell_size = 0.2\nsegments = 4\nsegment_height = 0.5\npreset = 'strict'\n");
   SetVariable("ATLASD_WORKERS", "2");
@@ -94,6 +95,7 @@ TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
   EXPECT_EQ(config.data, "/file");
   EXPECT_EQ(config.cache_mib, 9);
   EXPECT_EQ(config.survey_mib, 0);
+  EXPECT_EQ(config.survey_disk_mib, 7);
   EXPECT_EQ(config.log_level, "error");
   EXPECT_EQ(config.workers, 2);
   EXPECT_EQ(config.host, "::1");
@@ -233,6 +235,7 @@ TEST_F(DaemonConfigTest, HelpNamesTheDefaultsThatCount) {
   EXPECT_EQ(DefaultInHelp(help, "--workers N"), std::to_string(config.workers));
   EXPECT_EQ(DefaultInHelp(help, "--cache-mib MIB"), std::to_string(config.cache_mib));
   EXPECT_EQ(DefaultInHelp(help, "--survey-mib MIB"), std::to_string(config.survey_mib));
+  EXPECT_EQ(DefaultInHelp(help, "--survey-disk-mib MIB"), std::to_string(config.survey_disk_mib));
   EXPECT_EQ(DefaultInHelp(help, "--log-level LEVEL"), config.log_level);
   EXPECT_DOUBLE_EQ(std::stod(DefaultInHelp(help, "--cell-size M")), map.cell_size_m());
   EXPECT_EQ(DefaultInHelp(help, "--segments N"), std::to_string(map.column_segments));

@@ -1,5 +1,5 @@
-// Preset bounded: what is still known of segments that were forgotten, so that nobody has to ask
-// their keyframes whether they count again.
+// Preset bounded: which segments may be forgotten, and whether what was forgotten may count again,
+// without asking its keyframes.
 //
 // In its band a segment cannot count while as many of its vehicle as a vehicle may have come before
 // it (IsChosenBefore), or as many of all vehicles as the band may hold. So it is enough to know, of
@@ -11,20 +11,11 @@
 #include <span>
 #include <vector>
 
+#include "core/fusion/segment/forgotten_mark.h"
 #include "core/fusion/segment/segment_view.h"
 #include "core/geometry/map_profile.h"
 
 namespace atlas {
-
-// Of the forgotten segments of a vehicle, or of any, in a band: none comes before this.
-struct ForgottenMark {
-  static constexpr std::uint32_t kAnyVehicle = 0xFFFF'FFFF;
-
-  std::int64_t last_time_ms = 0;
-  std::uint32_t vehicle = kAnyVehicle;  // as the views'
-  std::int32_t band = 0;
-  bool is_strong = false;
-};
 
 // Reused from cell to cell.
 class Forgetting {

@@ -1,4 +1,4 @@
-#include "core/fusion/combination/forgotten_mark.h"
+#include "core/fusion/combination/forgetting.h"
 
 #include <algorithm>
 
