@@ -1,123 +1,22 @@
 #include "server/service/fusion/survey_files.h"
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <fstream>
-#include <initializer_list>
 #include <iterator>
 #include <system_error>
 #include <utility>
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include "core/base/hash.h"
 #include "core/base/str_cat.h"
+#include "server/service/fusion/survey_file.h"
 
 namespace atlas {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3130'5652'5553'4152;  // "RASURV01"
-constexpr std::size_t kHeaderBytes = 64;
 constexpr const char* kSuffix = ".survey";
 constexpr const char* kUnfinished = ".survey-new";
 constexpr std::chrono::minutes kPause{1};
 
-Result<Bytes> ReadWhole(const fs::path& path, std::size_t max_bytes) {
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error) {
-    return Error(StatusCode::kNotFound, StrCat(path.string(), ": ", error.message()));
-  }
-  Bytes bytes(static_cast<std::size_t>(std::min<std::uintmax_t>(size, max_bytes)));
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!file) {
-    return Error(StatusCode::kUnavailable, StrCat("cannot read ", path.string()));
-  }
-  return bytes;
-}
-
-std::error_code LastError() {
-  return {errno, std::generic_category()};
-}
-
-bool WriteAll(int fd, ByteSpan bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
-    if (written < 0 && errno != EINTR) {
-      return false;
-    }
-    bytes = bytes.subspan(static_cast<std::size_t>(std::max<ssize_t>(written, 0)));
-  }
-  return true;
-}
-
-// Waits for the disk: else the next transaction of the atlas, whose upload waits for its
-// acknowledgement, would have to.
-std::error_code WriteParts(const fs::path& path, std::initializer_list<ByteSpan> parts) {
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) {
-    return LastError();
-  }
-  const bool is_written =
-      std::all_of(parts.begin(), parts.end(), [fd](ByteSpan part) { return WriteAll(fd, part); }) &&
-      ::fdatasync(fd) == 0;
-  const std::error_code error = is_written ? std::error_code() : LastError();
-  ::close(fd);
-  return error;
-}
-
-// Of the running program: surveys are those of its code, and packed as it lays them out. 0 if it
-// cannot be found out.
-std::uint64_t BuildHash() {
-  static const std::uint64_t hash = [] {
-    constexpr std::size_t kMaxProgram = std::size_t{4} << 30;
-    const auto program = ReadWhole("/proc/self/exe", kMaxProgram);
-    return program ? Hash64(*program) : 0;
-  }();
-  return hash;
-}
-
 }  // namespace
-
-struct SurveyFiles::Header {
-  std::uint64_t build = 0;
-  std::array<std::uint8_t, 16> start{};  // during which it was written
-  std::uint64_t revision = 0;
-  std::uint64_t key = 0;
-  std::uint64_t payload_bytes = 0;
-
-  // Of all but the hash at its end, which is of this and of the payload.
-  Bytes Encode() const {
-    ByteWriter out;
-    out.U64(kMagic);
-    out.U64(build);
-    out.Raw(start);
-    out.U64(revision);
-    out.U64(key);
-    out.U64(payload_bytes);
-    return out.Take();
-  }
-
-  static std::optional<Header> Decode(ByteSpan bytes) {
-    ByteReader in(bytes);
-    Header header;
-    const bool is_ours = in.U64() == kMagic;
-    header.build = in.U64();
-    const ByteSpan start = in.Raw(header.start.size());
-    header.revision = in.U64();
-    header.key = in.U64();
-    header.payload_bytes = in.U64();
-    if (!is_ours || !in.ok()) {
-      return std::nullopt;
-    }
-    std::copy(start.begin(), start.end(), header.start.begin());
-    return header;
-  }
-};
 
 SurveyFiles::SurveyFiles(const SurveyFilesOptions& options,
                          const MapProfile& profile,
@@ -158,12 +57,10 @@ void SurveyFiles::FindFiles() {
       continue;  // not ours
     }
     std::error_code ignored;
-    const auto size = static_cast<std::size_t>(fs::file_size(path, ignored));
-    const auto bytes = ReadWhole(path, kHeaderBytes);
-    const auto header = bytes ? Header::Decode(*bytes) : std::nullopt;
-    if (header && path == PathOf(header->key) && size == kHeaderBytes + header->payload_bytes &&
-        IsOfThisAtlas(*header)) {
-      found.push_back({fs::last_write_time(path, ignored), {header->key, size}});
+    const auto header = ReadSurveyFileHeader(path);
+    if (header && path == PathOf(header->key) && IsOfThisAtlas(*header)) {
+      found.push_back(
+          {fs::last_write_time(path, ignored), {header->key, SurveyFileBytes(*header)}});
     } else {
       fs::remove(path, ignored);
     }
@@ -180,7 +77,7 @@ void SurveyFiles::FindFiles() {
 }
 
 // Whether the atlas went on from the state that it was in when the file was written.
-bool SurveyFiles::IsOfThisAtlas(const Header& header) const {
+bool SurveyFiles::IsOfThisAtlas(const SurveyFileHeader& header) const {
   const auto start = std::find_if(starts_.begin(), starts_.end(),
                                   [&](const AtlasStart& s) { return s.id == header.start; });
   if (header.build != BuildHash() || start == starts_.end()) {
@@ -202,18 +99,11 @@ std::optional<KeptSurveys> SurveyFiles::Read(const TileId& id) {
     }
     by_age_.splice(by_age_.begin(), by_age_, found->second);
   }
-  const auto bytes = ReadWhole(PathOf(id.Key()), options_.max_bytes);
-  if (bytes && bytes->size() > kHeaderBytes) {
-    const ByteSpan head = ByteSpan(*bytes).first(kHeaderBytes - 8);
-    const ByteSpan payload = ByteSpan(*bytes).subspan(kHeaderBytes);
-    const auto header = Header::Decode(head);
-    ByteReader hash(ByteSpan(*bytes).subspan(kHeaderBytes - 8, 8));
-    if (header && header->key == id.Key() && IsOfThisAtlas(*header) &&
-        hash.U64() == (Hash64(head) ^ Hash64(payload))) {
-      auto surveys = TileSurveys::Load(payload, id, profile_);
-      if (surveys) {
-        return KeptSurveys{*std::move(surveys), header->revision, header->revision};
-      }
+  const auto file = ReadSurveyFile(PathOf(id.Key()));
+  if (file && file->header.key == id.Key() && IsOfThisAtlas(file->header)) {
+    auto surveys = TileSurveys::Load(file->payload, id, profile_);
+    if (surveys) {
+      return KeptSurveys{*std::move(surveys), file->header.revision, file->header.revision};
     }
   }
   const std::lock_guard lock(mutex_);
@@ -226,15 +116,22 @@ bool SurveyFiles::Write(KeptSurveys& kept) {
     return false;
   }
   const Bytes payload = kept.surveys.Save();
-  const std::uint64_t key = kept.surveys.id().Key();
-  const Status status = WriteFile(key, kept.revision, payload);
+  const SurveyFileHeader header{BuildHash(), starts_.back().id, kept.revision,
+                                kept.surveys.id().Key(), payload.size()};
+  std::uint64_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    number = writes_++;
+  }
+  const fs::path unfinished = options_.directory / StrCat(header.key, ".", number, kUnfinished);
+  const Status status = WriteSurveyFile(PathOf(header.key), unfinished, header, payload);
   if (!status.ok()) {
     Report(status.message());
     return false;
   }
   kept.revision_on_disk = kept.revision;
   const std::lock_guard lock(mutex_);
-  Insert({key, kHeaderBytes + payload.size()});
+  Insert({header.key, SurveyFileBytes(header)});
   return true;
 }
 
@@ -248,29 +145,6 @@ bool SurveyFiles::HasRoom() {
   std::error_code error;
   const fs::space_info space = fs::space(options_.directory, error);
   return error || space.available >= options_.min_free_bytes;
-}
-
-Status SurveyFiles::WriteFile(std::uint64_t key, std::uint64_t revision, ByteSpan payload) {
-  const Bytes head = Header{BuildHash(), starts_.back().id, revision, key, payload.size()}.Encode();
-  ByteWriter hash;
-  hash.U64(Hash64(head) ^ Hash64(payload));
-  std::uint64_t number = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    number = writes_++;
-  }
-  const fs::path unfinished = options_.directory / StrCat(key, ".", number, kUnfinished);
-  std::error_code error = WriteParts(unfinished, {head, hash.bytes(), payload});
-  if (!error) {
-    fs::rename(unfinished, PathOf(key), error);
-  }
-  if (!error) {
-    return {};
-  }
-  std::error_code ignored;
-  fs::remove(unfinished, ignored);
-  return Status(StatusCode::kUnavailable,
-                StrCat("cannot write ", PathOf(key).string(), ": ", error.message()));
 }
 
 // Under the lock, as is Remove().

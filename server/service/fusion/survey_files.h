@@ -18,10 +18,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "core/base/bytes.h"
-#include "core/base/status.h"
 #include "core/geometry/map_profile.h"
 #include "server/service/fusion/kept_surveys.h"
+#include "server/service/fusion/survey_file.h"
 #include "server/service/log_sink.h"
 #include "server/store/store_types.h"
 
@@ -54,17 +53,15 @@ class SurveyFiles {
   std::size_t bytes() const;
 
  private:
-  struct Header;
   struct Entry {
     std::uint64_t key = 0;
     std::size_t bytes = 0;
   };
 
   void FindFiles();
-  bool IsOfThisAtlas(const Header& header) const;
+  bool IsOfThisAtlas(const SurveyFileHeader& header) const;
   std::filesystem::path PathOf(std::uint64_t key) const;
   bool HasRoom();
-  Status WriteFile(std::uint64_t key, std::uint64_t revision, ByteSpan payload);
   void Insert(const Entry& entry);
   void Remove(std::uint64_t key);
   void Report(const std::string& what);
