@@ -83,7 +83,8 @@ bool Forgetting::IsBandFull(std::size_t spare) const {
       }
       segments += std::min(limit, of_vehicle);
     }
-    needed += i < spare ? std::min(limit, tallies_[i].segments) : 0;  // at most: others may follow
+    // More than what goes with the stretch where its vehicle has others.
+    needed += i < spare ? std::min(limit, tallies_[i].segments) : 0;
   }
   return segments >= needed;
 }

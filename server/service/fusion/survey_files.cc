@@ -30,6 +30,7 @@ SurveyFiles::SurveyFiles(const SurveyFilesOptions& options,
     log_(LogLevel::kWarning,
          "surveys are not kept on disk: the disk refused to note this start, or the program's own "
          "file cannot be read");
+    FindFiles();  // none is of this line of the atlas, or will be known not to be
     return;
   }
   std::error_code error;

@@ -34,8 +34,8 @@ struct SurveyFilesOptions {
 
 class SurveyFiles {
  public:
-  // Of the atlas with these starts, the last of which is now; of an atlas without any nothing is
-  // kept. Removes the files in the directory that cannot be believed.
+  // Of the atlas with these starts, the last of which is now. Removes the files in the directory
+  // that cannot be believed; all of them, and keeps none, where there is no start.
   SurveyFiles(const SurveyFilesOptions& options,
               const MapProfile& profile,
               std::vector<AtlasStart> starts,
