@@ -87,8 +87,8 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.fusion.workers = config.workers > 0 ? static_cast<unsigned>(config.workers)
                                               : std::max(1U, std::thread::hardware_concurrency());
   options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
-  const std::size_t survey_bytes = static_cast<std::size_t>(config.survey_mib) << 20;
-  options.fusion.building.surveys = {survey_bytes / 3 * 2, survey_bytes / 3};
+  options.fusion.building.surveys =
+      SurveyCacheLimits::OfTotal(static_cast<std::size_t>(config.survey_mib) << 20);
   options.fusion.building.survey_files.directory = config.data / "surveys";
   options.fusion.building.survey_files.max_bytes = static_cast<std::size_t>(config.survey_disk_mib)
                                                    << 20;

@@ -9,6 +9,7 @@ namespace atlas {
 
 // 128-bit integers for products of 64-bit ones.
 __extension__ using Int128 = __int128;
+__extension__ using Uint128 = unsigned __int128;
 
 // floor(a / b), b > 0.
 constexpr std::int64_t FloorDiv(std::int64_t a, std::int64_t b) {

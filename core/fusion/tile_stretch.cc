@@ -52,6 +52,7 @@ void TileStretch::Save(ByteWriter& out) const {
   out.Varint(vehicle);
   out.U8(has_forgotten ? 1 : 0);
   out.Varint(grown_at);
+  out.SignedVarint(tile_time_ms);
   out.Varint(frames.size());
   for (const StretchMember& frame : frames) {
     SaveMember(frame, out);
@@ -73,6 +74,7 @@ TileStretch TileStretch::Load(ByteReader& in, const TileId& id, const MapProfile
   stretch.vehicle = static_cast<std::uint32_t>(in.Varint());
   stretch.has_forgotten = in.U8() != 0;
   stretch.grown_at = static_cast<std::uint32_t>(in.Varint());
+  stretch.tile_time_ms = in.SignedVarint();
   const std::uint64_t count = in.Varint();
   std::vector<StretchFrame> surveyed;
   for (std::uint64_t i = 0; i < count && in.ok(); ++i) {

@@ -27,6 +27,7 @@ struct TileStretch {
   bool has_forgotten = false;          // some of its segments are gone
   std::uint32_t used = 0;              // segments that are part of a layer
   std::uint32_t grown_at = 0;          // the tile's count of changes then
+  std::int64_t tile_time_ms = 0;       // of the tile's latest keyframe then
 
   std::size_t bytes() const;
   // To be loaded by the same build again.

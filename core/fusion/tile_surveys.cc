@@ -9,8 +9,8 @@ namespace atlas {
 namespace {
 
 // A stretch settles when its session went on with another one; when the tile was fused this often
-// without it; or when it is this much older than the latest, a visit that is over, and the tile was
-// fused a few times without it.
+// without it; or when this much time has gone by in the tile since it grew, a visit that is over,
+// and the tile was fused a few times without it.
 constexpr std::uint32_t kOpenFusions = 16;
 constexpr std::int64_t kVisitMs = 60'000;
 constexpr std::uint32_t kVisitFusions = 2;
@@ -38,14 +38,17 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
     SurveyForgottenAgain(wanted);
   }
   TakeStretches(wanted, profile);
-
+  const std::int64_t latest_ms = LatestTime();
   std::vector<FrameOnMap> expected;
   open_.clear();
   awaited_.clear();
   for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
-    const TileStretch& stretch = stretches_[i];
+    TileStretch& stretch = stretches_[i];
     if (stretch.open) {
       open_.push_back(i);
+    }
+    if (stretch.grown_at == expected_count_) {
+      stretch.tile_time_ms = latest_ms;
     }
     for (const StretchMember& frame : std::span(stretch.frames).subspan(wanted[i].kept)) {
       expected.push_back({{stretch.key, frame.sequence},
@@ -111,17 +114,18 @@ void TileSurveys::TakeStretches(std::span<PlannedStretch> wanted, const MapProfi
   for (std::uint32_t i = 0; i < wanted.size(); ++i) {
     PlannedStretch& w = wanted[i];
     const bool grows = w.kept < w.frames.size();
-    TileStretch stretch{std::move(w.key), w.number, 0, 0, {}, {}, {}, false, 0, 0};
+    TileStretch stretch{std::move(w.key), w.number, 0, 0, {}, {}, {}, false, 0, 0, 0};
     if (w.old == PlannedStretch::kNone) {
       stretch.vehicle = NumberOf(stretch.key.vehicle);
       stretch.open.emplace(whole, profile);
     } else {
       stretch = std::move(stretches_[w.old]);
       stretches_[w.old].open.reset();
-      if (!stretch.open && grows) {
+      const bool reopens = !stretch.open && grows;
+      if (reopens) {
         stretch.open = Reopen(w.old, std::span(w.frames).first(w.kept), profile);
       }
-      settled_places[w.old] = stretch.open ? SettledStretches::kGone : i;
+      settled_places[w.old] = reopens ? SettledStretches::kGone : i;
     }
     stretch.session = 0;
     if (!next.empty()) {
@@ -164,6 +168,15 @@ StretchSurvey TileSurveys::Reopen(std::uint32_t place,
   return survey;
 }
 
+// Of the last keyframes of all stretches.
+std::int64_t TileSurveys::LatestTime() const {
+  std::int64_t latest_ms = std::numeric_limits<std::int64_t>::min();
+  for (const TileStretch& stretch : stretches_) {
+    latest_ms = std::max(latest_ms, stretch.frames.back().time_ms);
+  }
+  return latest_ms;
+}
+
 bool TileSurveys::IsToSettle(std::size_t place, std::int64_t latest_ms) const {
   const TileStretch& stretch = stretches_[place];
   const std::uint32_t idle = expected_count_ - stretch.grown_at;
@@ -172,15 +185,12 @@ bool TileSurveys::IsToSettle(std::size_t place, std::int64_t latest_ms) const {
   }
   const std::size_t next = place + 1;
   const bool session_goes_on = next < stretches_.size() && stretches_[next].key == stretch.key;
-  const bool is_over = stretch.frames.back().time_ms < latest_ms - kVisitMs;
+  const bool is_over = stretch.tile_time_ms < latest_ms - kVisitMs;
   return session_goes_on || idle > kOpenFusions || (is_over && idle > kVisitFusions);
 }
 
 void TileSurveys::Settle(const MapProfile& profile) {
-  std::int64_t latest_ms = std::numeric_limits<std::int64_t>::min();
-  for (const TileStretch& stretch : stretches_) {
-    latest_ms = std::max(latest_ms, stretch.frames.back().time_ms);
-  }
+  const std::int64_t latest_ms = LatestTime();
   std::vector<std::uint32_t> settling;
   for (std::uint32_t i = 0; i < stretches_.size(); ++i) {
     if (IsToSettle(i, latest_ms)) {

@@ -50,7 +50,7 @@ class TileSurveys {
 
   // What Load() of the same build makes them of again, for the same profile: packed.
   Bytes Save() const;
-  // kInvalidData: these are not bytes of Save().
+  // `bytes` are those of a Save(). kInvalidData: there are more or fewer.
   static Result<TileSurveys> Load(ByteSpan bytes, const TileId& id, const MapProfile& profile);
 
  private:
@@ -62,6 +62,7 @@ class TileSurveys {
   StretchSurvey Reopen(std::uint32_t place,
                        std::span<const StretchMember> frames,
                        const MapProfile& profile) const;
+  std::int64_t LatestTime() const;
   bool IsToSettle(std::size_t place, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
   void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);

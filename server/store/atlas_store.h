@@ -29,9 +29,9 @@ class AtlasStore {
   virtual ~AtlasStore() = default;
 
   virtual const AtlasIdentity& identity() const = 0;
-  // When it was opened: oldest first, of the last hundred times; the last one is this. None where
-  // the disk refused to note it.
-  virtual const std::vector<AtlasStart>& starts() const = 0;
+  // An opening is noted with the first change that it makes, by the same transaction. Of starts
+  // before a damaged one nothing is known.
+  virtual Result<AtlasLine> ReadLine() = 0;
 
   // Same key, blob hash and time as a stored one: a duplicate, nothing changes, even if its pose
   // was corrected since. Other content under the key: kConflict. Marks the footprint dirty. All the

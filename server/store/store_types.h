@@ -24,14 +24,20 @@ struct AtlasIdentity {
   std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup
 };
 
-// The store was opened, and what is written from there on goes on from this revision. An atlas that
-// was put back from a copy begins another line: what was kept elsewhere of a later revision is not
-// of it, and its starts tell.
+// The atlas was opened and changed: what it was given until it was opened next goes on from this
+// revision.
 struct AtlasStart {
   std::array<std::uint8_t, 16> id{};  // random
   std::uint64_t revision = 0;
 
   friend bool operator==(const AtlasStart&, const AtlasStart&) = default;
+};
+
+// How it came to be what it is. One that was put back from a copy begins another line: what was
+// kept elsewhere of a later revision is not of it, and its starts tell.
+struct AtlasLine {
+  std::vector<AtlasStart> starts;  // the last hundred, oldest first
+  std::uint64_t revision = 0;      // that it stands at
 };
 
 struct PositionPrior {

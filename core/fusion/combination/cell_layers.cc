@@ -42,7 +42,7 @@ void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
   std::int32_t highest_mm = std::numeric_limits<std::int32_t>::min();
   for (std::uint32_t i = 0; i < segments.size(); ++i) {
     if (IsMaker(*segments[i].segment, segments)) {
-      makers_.push_back(i);
+      makers_.push_back({segments[i].segment->altitude_mm, i});
       labels_[i] = 0;
       lowest_mm = std::min(lowest_mm, segments[i].segment->altitude_mm);
       highest_mm = std::max(highest_mm, segments[i].segment->altitude_mm);
@@ -60,19 +60,18 @@ void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
 }
 
 void CellLayerBuilder::ChainMakers(std::span<const SegmentView> segments) {
-  SmallStableSort(makers_.begin(), makers_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return segments[a].segment->altitude_mm < segments[b].segment->altitude_mm;
-  });
+  SmallStableSort(makers_.begin(), makers_.end(),
+                  [](const Maker& a, const Maker& b) { return a.altitude_mm < b.altitude_mm; });
   estimates_.clear();
-  for (const std::uint32_t i : makers_) {
-    const Segment& segment = *segments[i].segment;
+  for (const Maker& maker : makers_) {
+    const Segment& segment = *segments[maker.index].segment;
     estimates_.push_back(
         {segment.altitude_mm, sigmas_.Sigma100um(segment.source, segment.distance_step)});
   }
   chain_labels_.resize(makers_.size());
   sums_.assign(ChainLayers(estimates_, profile_, chain_labels_), {});
   for (std::size_t i = makers_.size(); i-- > 0;) {  // the lowest one stays as reference
-    labels_[makers_[i]] = chain_labels_[i];
+    labels_[makers_[i].index] = chain_labels_[i];
     sums_[chain_labels_[i]].reference_mm = estimates_[i].altitude_mm;
   }
 }

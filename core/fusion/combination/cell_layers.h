@@ -52,6 +52,12 @@ class CellLayerBuilder {
     std::int64_t last_time_ms = 0;
   };
 
+  // A segment that makes a layer, with others or alone.
+  struct Maker {
+    std::int32_t altitude_mm = 0;
+    std::uint32_t index = 0;
+  };
+
   bool IsMaker(const Segment& segment, std::span<const SegmentView> segments) const;
   void LabelMakers(std::span<const SegmentView> segments);
   void ChainMakers(std::span<const SegmentView> segments);
@@ -66,7 +72,7 @@ class CellLayerBuilder {
   const MapProfile& profile_;
 
   bool all_make_ = true;  // else strong segments make layers, and obstacles far from all of these
-  std::vector<std::uint32_t> makers_;
+  std::vector<Maker> makers_;
   std::vector<AltitudeEstimate> estimates_;
   std::vector<std::uint32_t> chain_labels_;
   std::vector<LayerSums> sums_;

@@ -32,18 +32,28 @@ void Add(const ForgottenMark& mark, std::vector<ForgottenMark>& marks) {
 
 }  // namespace
 
+void Forgetting::AddPresent(const SegmentView& view) {
+  present_.push_back({MarkOf(view, profile_), view.stretch});
+}
+
+void Forgetting::SetPresent(std::span<const SegmentView> segments) {
+  present_.clear();
+  for (const SegmentView& view : segments) {
+    AddPresent(view);
+  }
+}
+
 // One that is as late as the mark is not taken to come before it.
-void Forgetting::TallyBefore(const ForgottenMark& mark, std::span<const SegmentView> present) {
+void Forgetting::TallyBefore(const ForgottenMark& mark) {
   tallies_.clear();
-  for (const SegmentView& view : present) {
-    const ForgottenMark its = MarkOf(view, profile_);
-    if (its.band != mark.band || !ComesBefore(its, mark)) {
+  for (const Present& its : present_) {
+    if (its.mark.band != mark.band || !ComesBefore(its.mark, mark)) {
       continue;
     }
     const auto tally = std::find_if(tallies_.begin(), tallies_.end(),
-                                    [&](const Tally& t) { return t.stretch == view.stretch; });
+                                    [&](const Tally& t) { return t.stretch == its.stretch; });
     if (tally == tallies_.end()) {
-      tallies_.push_back({view.stretch, view.vehicle, 1});
+      tallies_.push_back({its.stretch, its.mark.vehicle, 1});
     } else {
       ++tally->segments;
     }
@@ -92,25 +102,28 @@ bool Forgetting::IsBandFull(std::size_t spare) const {
 std::size_t Forgetting::MoveSpareToFront(std::span<const SegmentView> counting,
                                          std::span<SegmentView> rest,
                                          std::vector<ForgottenMark>& marks) {
-  present_.assign(counting.begin(), counting.end());
+  if (rest.empty() && marks.empty()) {
+    return 0;
+  }
+  SetPresent(counting);
   before_.swap(marks);
   marks.clear();
   SmallStableSort(rest.begin(), rest.end(), IsChosenBefore);
   std::size_t spared = 0;
   for (std::size_t i = 0; i < rest.size(); ++i) {
     ForgottenMark mark = MarkOf(rest[i], profile_);
-    TallyBefore(mark, present_);
+    TallyBefore(mark);
     if (IsBandFull(kSpareStretches)) {
       mark.vehicle = ForgottenMark::kAnyVehicle;
     } else if (!IsVehicleFull(mark.vehicle, kSpareStretches)) {
-      present_.push_back(rest[i]);
+      AddPresent(rest[i]);
       std::swap(rest[spared++], rest[i]);
       continue;
     }
     Add(mark, marks);
   }
   for (ForgottenMark mark : before_) {
-    TallyBefore(mark, present_);
+    TallyBefore(mark);
     mark.vehicle = IsBandFull(kSpareStretches) ? ForgottenMark::kAnyVehicle : mark.vehicle;
     Add(mark, marks);
   }
@@ -119,8 +132,9 @@ std::size_t Forgetting::MoveSpareToFront(std::span<const SegmentView> counting,
 
 bool Forgetting::MayCount(std::span<const ForgottenMark> marks,
                           std::span<const SegmentView> present) {
+  SetPresent(present);
   return std::any_of(marks.begin(), marks.end(), [&](const ForgottenMark& mark) {
-    TallyBefore(mark, present);
+    TallyBefore(mark);
     return !IsVehicleFull(mark.vehicle, 0) && !IsBandFull(0);
   });
 }

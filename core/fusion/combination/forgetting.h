@@ -42,13 +42,21 @@ class Forgetting {
     std::size_t segments = 0;
   };
 
-  void TallyBefore(const ForgottenMark& mark, std::span<const SegmentView> present);
+  // One that is there, as a mark.
+  struct Present {
+    ForgottenMark mark;
+    std::uint32_t stretch = 0;
+  };
+
+  void SetPresent(std::span<const SegmentView> segments);
+  void AddPresent(const SegmentView& view);
+  void TallyBefore(const ForgottenMark& mark);
   // Whether those keep the mark out, even without any `spare` stretches of them.
   bool IsVehicleFull(std::uint32_t vehicle, std::size_t spare) const;
   bool IsBandFull(std::size_t spare) const;
 
   const MapProfile& profile_;
-  std::vector<SegmentView> present_;
+  std::vector<Present> present_;
   std::vector<ForgottenMark> before_;
   std::vector<Tally> tallies_;  // the largest first
 };

@@ -1,8 +1,8 @@
 #include "core/fusion/segment/column_evidence.h"
 
 #include <bit>
-#include <cstring>
 
+#include "core/base/integer_math.h"
 #include "core/geometry/nibble.h"
 
 namespace atlas {
@@ -55,14 +55,12 @@ Lanes AddSaturating(Lanes a, Lanes b, Lanes limit) {
 }
 
 // Values from `offset` on, 0 beyond them.
-ColumnLanes From(const ColumnLanes& lanes, std::int64_t offset) {
-  ColumnLanes from{};
-  const auto skipped = static_cast<std::size_t>(std::clamp<std::int64_t>(offset, 0, 16));
-  const auto shifted = static_cast<std::size_t>(std::clamp<std::int64_t>(-offset, 0, 16));
-  if (skipped + shifted < lanes.size()) {
-    std::memcpy(from.data() + shifted, lanes.data() + skipped, lanes.size() - skipped - shifted);
+Lanes From(const ColumnLanes& lanes, std::int64_t offset) {
+  if (offset >= 16 || offset <= -16) {
+    return Lanes{};
   }
-  return from;
+  const auto bits = std::bit_cast<Uint128>(lanes);
+  return std::bit_cast<Lanes>(offset >= 0 ? bits >> (8 * offset) : bits << (-8 * offset));
 }
 
 // Bit k: nibble k is not 0.
@@ -128,7 +126,7 @@ void DropHitsWhere(const ColumnLanes& other,
                    std::int64_t offset,
                    ColumnLanes& evidence) {
   const Lanes before = std::bit_cast<Lanes>(evidence);
-  const Lanes beside = std::bit_cast<Lanes>(From(other, offset));
+  const Lanes beside = From(other, offset);
   evidence = std::bit_cast<ColumnLanes>(beside == All(value) ? Min(before, Lanes{}) : before);
 }
 
@@ -150,7 +148,7 @@ void ColumnSum::Fold(const ColumnLanes& said,
   }
   const std::uint32_t seen = said_seen;
   seen_ |= offset >= 0 ? seen >> offset : seen << -offset;
-  const Lanes says = std::bit_cast<Lanes>(From(said, offset));
+  const Lanes says = From(said, offset);
   const Lanes before = std::bit_cast<Lanes>(evidence_);
   const Lanes evidence_limit = All(clamp.evidence);
   const Lanes say_limit = All(std::min(clamp.stretch, clamp.evidence));

@@ -1,4 +1,4 @@
-// Arrays of plain values as one compressed blob and back, within one process. Compressed are first
+// Arrays of plain values as one compressed blob and back, for the same build. Compressed are first
 // all first bytes of an array's values, then all second ones, and so on: that is faster and
 // smaller.
 #pragma once
@@ -71,7 +71,7 @@ Bytes PackArrays(const std::vector<T>&... arrays) {
   return packed;
 }
 
-// `packed` comes from PackArrays of as many arrays of the same types, in this process.
+// `packed` comes from PackArrays of as many arrays of the same types, by the same build.
 template <typename... T>
 void UnpackArrays(ByteSpan packed, std::vector<T>&... arrays) {
   std::uint64_t size = 0;

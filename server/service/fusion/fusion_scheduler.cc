@@ -51,12 +51,11 @@ void FusionScheduler::Stop() {
   threads_.clear();  // joins
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t kept_bytes = refresher_.kept_bytes();
-  refresher_.MoveToDisk();
-  if (const std::size_t moved_bytes = kept_bytes - refresher_.kept_bytes(); moved_bytes > 0) {
+  if (const std::size_t moved_bytes = refresher_.MoveToDisk(); moved_bytes > 0) {
     const std::chrono::duration<double> took_s = std::chrono::steady_clock::now() - begin;
-    log_(LogLevel::kInfo,
-         StrCat("fusion: ", moved_bytes >> 20, " MiB of surveys moved to ",
-                refresher_.kept_disk_bytes() >> 20, " MiB on disk in ", took_s.count(), " s"));
+    log_(LogLevel::kInfo, StrCat("fusion: ", moved_bytes >> 20, " of ", kept_bytes >> 20,
+                                 " MiB of surveys moved to disk in ", took_s.count(),
+                                 " s: ", refresher_.kept_disk_bytes() >> 20, " MiB are there"));
   }
 }
 

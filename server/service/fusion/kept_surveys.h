@@ -9,8 +9,7 @@ namespace atlas {
 
 struct KeptSurveys {
   TileSurveys surveys;
-  std::uint64_t revision = 0;          // of the atlas that the tile was last made from
-  std::uint64_t revision_on_disk = 0;  // SurveyFiles': 0 if there are none
+  std::uint64_t revision = 0;  // of the atlas that the tile was last made from
 };
 
 }  // namespace atlas

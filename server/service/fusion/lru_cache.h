@@ -4,11 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
-#include <unordered_map>
 #include <utility>
+
+#include "server/service/fusion/lru_list.h"
 
 namespace atlas {
 
@@ -22,47 +22,29 @@ class LruCache {
   // Null if it is not there.
   Handle Find(std::uint64_t key) {
     const std::lock_guard lock(mutex_);
-    const auto found = by_key_.find(key);
-    if (found == by_key_.end()) {
-      return nullptr;
-    }
-    by_age_.splice(by_age_.begin(), by_age_, found->second);
-    return found->second->value;
+    const Handle* found = values_.Use(key);
+    return found == nullptr ? nullptr : *found;
   }
 
   // Where there is one of the key already, that one stays.
   void Insert(std::uint64_t key, Handle value, std::size_t bytes) {
     const std::lock_guard lock(mutex_);
-    if (by_key_.contains(key)) {
-      return;
+    if (values_.Find(key) == nullptr) {
+      values_.Insert(key, std::move(value), bytes);
     }
-    by_age_.push_front({key, std::move(value), bytes});
-    by_key_[key] = by_age_.begin();
-    bytes_ += bytes;
-    while (bytes_ > max_bytes_ && !by_age_.empty()) {
-      bytes_ -= by_age_.back().bytes;
-      by_key_.erase(by_age_.back().key);
-      by_age_.pop_back();
+    while (values_.TakeOldestAbove(max_bytes_)) {
     }
   }
 
   std::size_t bytes() const {
     const std::lock_guard lock(mutex_);
-    return bytes_;
+    return values_.bytes();
   }
 
  private:
-  struct Entry {
-    std::uint64_t key = 0;
-    Handle value;
-    std::size_t bytes = 0;
-  };
-
   std::size_t max_bytes_;
   mutable std::mutex mutex_;
-  std::list<Entry> by_age_;  // most recently used first
-  std::unordered_map<std::uint64_t, typename std::list<Entry>::iterator> by_key_;
-  std::size_t bytes_ = 0;
+  LruList<Handle> values_;
 };
 
 }  // namespace atlas

@@ -1,58 +1,35 @@
 #include "server/service/fusion/survey_cache.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace atlas {
-namespace {
 
-constexpr std::chrono::minutes kIdle{1};  // the vehicles are gone, most likely
-
-}  // namespace
-
-std::optional<SurveyCache::Shelf::Entry> SurveyCache::Shelf::Take(std::uint64_t key) {
-  const auto found = by_key.find(key);
-  if (found == by_key.end()) {
-    return std::nullopt;
+class SurveyCache::Work {
+ public:
+  Work(SurveyCache& cache, const Entry& entry, Lock& lock)
+      : cache_(cache), key_(entry.kept.surveys.id().Key()), lock_(lock) {
+    cache_.at_work_.insert(key_);
+    lock_.unlock();
   }
-  Entry entry = std::move(*found->second);
-  bytes -= entry.bytes;
-  by_age.erase(found->second);
-  by_key.erase(found);
-  return entry;
-}
-
-void SurveyCache::Shelf::Put(KeptSurveys kept, Time used_at) {
-  const std::uint64_t key = kept.surveys.id().Key();
-  Take(key);  // another worker's, whose lease ran out
-  const std::size_t size = kept.surveys.bytes();
-  const auto place = std::find_if(by_age.begin(), by_age.end(),
-                                  [&](const Entry& entry) { return entry.used_at <= used_at; });
-  by_key[key] = by_age.insert(place, {std::move(kept), size, used_at});
-  bytes += size;
-}
-
-std::optional<SurveyCache::Shelf::Entry> SurveyCache::Shelf::TakeOldestAbove(std::size_t limit) {
-  if (bytes <= limit || by_age.empty()) {
-    return std::nullopt;
+  Work(const Work&) = delete;
+  Work& operator=(const Work&) = delete;
+  ~Work() {
+    lock_.lock();
+    cache_.at_work_.erase(key_);
+    cache_.done_.notify_all();
   }
-  return Take(by_age.back().kept.surveys.id().Key());
-}
 
-std::optional<SurveyCache::Shelf::Entry> SurveyCache::Shelf::TakeIdle(Time before) {
-  const auto idle = std::find_if(by_age.rbegin(), by_age.rend(), [](const Entry& entry) {
-    return entry.kept.revision != entry.kept.revision_on_disk;
-  });
-  if (idle == by_age.rend() || idle->used_at >= before) {
-    return std::nullopt;
-  }
-  return Take(idle->kept.surveys.id().Key());
-}
+ private:
+  SurveyCache& cache_;
+  std::uint64_t key_;
+  Lock& lock_;
+};
 
 std::optional<KeptSurveys> SurveyCache::Take(const TileId& id) {
-  std::optional<Shelf::Entry> entry;
+  std::optional<Entry> entry;
   {
-    const std::lock_guard lock(mutex_);
+    Lock lock(mutex_);
+    done_.wait(lock, [&] { return !at_work_.contains(id.Key()); });
     entry = plain_.Take(id.Key());
     if (!entry) {
       entry = packed_.Take(id.Key());
@@ -66,52 +43,79 @@ std::optional<KeptSurveys> SurveyCache::Take(const TileId& id) {
 }
 
 void SurveyCache::Put(KeptSurveys kept) {
-  std::unique_lock lock(mutex_);
-  plain_.Put(std::move(kept), std::chrono::steady_clock::now());
-  while (auto oldest = plain_.TakeOldestAbove(limits_.plain_bytes)) {
-    lock.unlock();
-    oldest->kept.surveys.Pack();  // takes milliseconds
-    lock.lock();
-    packed_.Put(std::move(oldest->kept), oldest->used_at);
+  const Lock lock(mutex_);
+  PutOn(plain_, {std::move(kept), std::chrono::steady_clock::now()});
+}
+
+// There are two of a tile if a worker was given up and came back.
+void SurveyCache::PutOn(Shelf& shelf, Entry entry) {
+  const std::uint64_t key = entry.kept.surveys.id().Key();
+  for (Shelf* other : {&plain_, &packed_}) {
+    const Entry* its = other->Find(key);
+    if (its != nullptr && its->kept.revision > entry.kept.revision) {
+      return;
+    }
+    other->Take(key);
   }
-  while (auto oldest = packed_.TakeOldestAbove(limits_.packed_bytes)) {
-    lock.unlock();
-    files_.Write(oldest->kept);
-    lock.lock();
+  const std::size_t size = entry.kept.surveys.bytes();
+  const Time used_at = entry.used_at;
+  shelf.Insert(key, std::move(entry), size,
+               [&](const Entry& other) { return other.used_at > used_at; });
+}
+
+void SurveyCache::Trim() {
+  Lock lock(mutex_);
+  while (auto oldest = plain_.TakeOldestAbove(limits_.plain_bytes)) {
+    {
+      const Work work(*this, *oldest, lock);
+      oldest->kept.surveys.Pack();  // takes milliseconds
+    }
+    PutOn(packed_, *std::move(oldest));
+  }
+  while (const auto oldest = packed_.TakeOldestAbove(limits_.packed_bytes)) {
+    const Work work(*this, *oldest, lock);
+    if (!files_.Has(oldest->kept)) {
+      files_.Write(oldest->kept);
+    }
   }
 }
 
 bool SurveyCache::StoreIdle() {
-  const Time before = std::chrono::steady_clock::now() - kIdle;
+  const Time before = std::chrono::steady_clock::now() - limits_.idle;
+  const auto is_idle = [&](const Entry& entry) {
+    return entry.used_at < before && !files_.Has(entry.kept);
+  };
+  Lock lock(mutex_);
   for (Shelf* shelf : {&plain_, &packed_}) {
-    std::unique_lock lock(mutex_);
-    if (auto idle = shelf->TakeIdle(before)) {
-      lock.unlock();
-      const bool is_stored = files_.Write(idle->kept);
-      lock.lock();
-      if (!shelf->by_key.contains(idle->kept.surveys.id().Key())) {  // else made anew meanwhile
-        shelf->Put(std::move(idle->kept), idle->used_at);
+    if (auto idle = shelf->TakeOldest(is_idle)) {
+      bool is_stored = false;
+      {
+        const Work work(*this, *idle, lock);
+        is_stored = files_.Write(idle->kept);
       }
+      PutOn(*shelf, *std::move(idle));
       return is_stored;
     }
   }
   return false;
 }
 
-void SurveyCache::MoveToDisk() {
+std::size_t SurveyCache::MoveToDisk() {
+  std::size_t moved_bytes = 0;
+  Lock lock(mutex_);
   for (Shelf* shelf : {&packed_, &plain_}) {  // the oldest first
-    std::unique_lock lock(mutex_);
-    while (auto oldest = shelf->TakeOldestAbove(0)) {
-      lock.unlock();
-      files_.Write(oldest->kept);
-      lock.lock();
+    while (const auto oldest = shelf->TakeOldestAbove(0)) {
+      const Work work(*this, *oldest, lock);
+      const bool is_on_disk = files_.Has(oldest->kept) || files_.Write(oldest->kept);
+      moved_bytes += is_on_disk ? oldest->kept.surveys.bytes() : 0;
     }
   }
+  return moved_bytes;
 }
 
 std::size_t SurveyCache::bytes() const {
-  const std::lock_guard lock(mutex_);
-  return plain_.bytes + packed_.bytes;
+  const Lock lock(mutex_);
+  return plain_.bytes() + packed_.bytes();
 }
 
 }  // namespace atlas

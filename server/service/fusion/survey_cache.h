@@ -4,21 +4,26 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <mutex>
 #include <optional>
-#include <unordered_map>
+#include <unordered_set>
 
 #include "server/service/fusion/kept_surveys.h"
+#include "server/service/fusion/lru_list.h"
 #include "server/service/fusion/survey_files.h"
 
 namespace atlas {
 
 struct SurveyCacheLimits {
-  std::size_t plain_bytes = std::size_t{1} << 30;
-  std::size_t packed_bytes = std::size_t{512} << 20;
+  std::size_t plain_bytes = 0;
+  std::size_t packed_bytes = 0;
+  std::chrono::milliseconds idle = std::chrono::minutes(1);  // the vehicles are gone, most likely
+
+  // Compressed ones take a sixth: there are more of them in their third.
+  static SurveyCacheLimits OfTotal(std::size_t bytes) { return {bytes / 3 * 2, bytes / 3}; }
 };
 
 class SurveyCache {
@@ -27,39 +32,40 @@ class SurveyCache {
   SurveyCache(const SurveyCacheLimits& limits, SurveyFiles& files)
       : limits_(limits), files_(files) {}
 
-  // Takes a tile's surveys out, ready to be used; none if they are not there.
+  // Takes a tile's surveys out, ready to be used; none if they are not there. Waits for those that
+  // are just being compressed or written.
   std::optional<KeptSurveys> Take(const TileId& id);
+  // Of two of a tile, those of the later revision stay. There may be too many until Trim().
   void Put(KeptSurveys kept);
-  // Writes one of those that were not used for a minute and are not on disk as they are. False:
-  // there is none. So a process that is killed loses little.
+  // Compresses what is too much as it is, then writes what is too much compressed.
+  void Trim();
+  // Writes one of those that were not used for a while and are not on disk as they are. False:
+  // there is none, or it could not be. So a process that is killed loses little.
   bool StoreIdle();
-  // Writes what is in memory to the files; it is gone from it then.
-  void MoveToDisk();
+  // Writes what is in memory to the files; it is gone from it then. How many bytes are on disk.
+  std::size_t MoveToDisk();
   std::size_t bytes() const;  // in memory
 
  private:
   using Time = std::chrono::steady_clock::time_point;
+  using Lock = std::unique_lock<std::mutex>;
 
-  // One of the two: tiles by age, the last used first.
-  struct Shelf {
-    struct Entry {
-      KeptSurveys kept;
-      std::size_t bytes = 0;
-      Time used_at;
-    };
-    std::list<Entry> by_age;
-    std::unordered_map<std::uint64_t, std::list<Entry>::iterator> by_key;
-    std::size_t bytes = 0;
-
-    std::optional<Entry> Take(std::uint64_t key);
-    void Put(KeptSurveys kept, Time used_at);
-    std::optional<Entry> TakeIdle(Time before);
-    std::optional<Entry> TakeOldestAbove(std::size_t limit);
+  struct Entry {
+    KeptSurveys kept;
+    Time used_at;
   };
+  using Shelf = LruList<Entry>;
+
+  // An entry that was taken out is worked on without the lock: others wait for its tile.
+  class Work;
+
+  void PutOn(Shelf& shelf, Entry entry);
 
   SurveyCacheLimits limits_;
   SurveyFiles& files_;
   mutable std::mutex mutex_;
+  std::condition_variable done_;
+  std::unordered_set<std::uint64_t> at_work_;
   Shelf plain_;
   Shelf packed_;
 };

@@ -19,6 +19,8 @@ struct SurveyFileHeader {
   std::uint64_t revision = 0;            // of the atlas that the surveys were made from
   std::uint64_t key = 0;                 // the tile's
   std::uint64_t payload_bytes = 0;
+
+  friend bool operator==(const SurveyFileHeader&, const SurveyFileHeader&) = default;
 };
 
 struct SurveyFile {

@@ -1,12 +1,13 @@
 #include "server/service/fusion/survey_files.h"
 
 #include <algorithm>
+#include <exception>
 #include <iterator>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
-#include "server/service/fusion/survey_file.h"
 
 namespace atlas {
 namespace fs = std::filesystem;
@@ -16,38 +17,53 @@ constexpr const char* kSuffix = ".survey";
 constexpr const char* kUnfinished = ".survey-new";
 constexpr std::chrono::minutes kPause{1};
 
+// Whether the atlas went on from the state that it was in when the file was written.
+bool IsOfLine(const SurveyFileHeader& header, const AtlasLine& line) {
+  const auto start = std::find_if(line.starts.begin(), line.starts.end(),
+                                  [&](const AtlasStart& s) { return s.id == header.start; });
+  if (header.build != BuildHash() || start == line.starts.end()) {
+    return false;
+  }
+  const auto next = std::next(start);
+  return header.revision <= (next == line.starts.end() ? line.revision : next->revision);
+}
+
 }  // namespace
 
 SurveyFiles::SurveyFiles(const SurveyFilesOptions& options,
                          const MapProfile& profile,
-                         std::vector<AtlasStart> starts,
+                         ReadLine read_line,
                          LogSink log)
-    : options_(options), profile_(profile), starts_(std::move(starts)), log_(std::move(log)) {
-  if (options_.directory.empty() || options_.max_bytes == 0) {
+    : options_(options), profile_(profile), read_line_(std::move(read_line)), log_(std::move(log)) {
+  if (options_.directory.empty()) {
     return;
   }
-  if (starts_.empty() || BuildHash() == 0) {
-    log_(LogLevel::kWarning,
-         "surveys are not kept on disk: the disk refused to note this start, or the program's own "
-         "file cannot be read");
-    FindFiles();  // none is of this line of the atlas, or will be known not to be
+  if (options_.max_bytes == 0) {
+    FindFiles({});
     return;
   }
+  const auto line = read_line_();
   std::error_code error;
-  fs::create_directories(options_.directory, error);
-  if (error) {
-    log_(LogLevel::kWarning, StrCat("surveys are not kept on disk: cannot make ",
-                                    options_.directory.string(), ": ", error.message()));
+  std::string why;
+  if (!line) {
+    why = line.error().message();
+  } else if (BuildHash() == 0) {
+    why = "the program's own file cannot be read";
+  } else if (fs::create_directories(options_.directory, error); error) {
+    why = StrCat("cannot make ", options_.directory.string(), ": ", error.message());
+  }
+  if (!why.empty()) {
+    log_(LogLevel::kWarning, "surveys are not kept on disk: " + why);
     return;
   }
   is_on_ = true;
-  FindFiles();
+  FindFiles(*line);
 }
 
-void SurveyFiles::FindFiles() {
+void SurveyFiles::FindFiles(const AtlasLine& line) {
   struct Found {
     fs::file_time_type time;
-    Entry entry;
+    SurveyFileHeader header;
   };
   std::vector<Found> found;
   std::error_code error;
@@ -59,32 +75,21 @@ void SurveyFiles::FindFiles() {
     }
     std::error_code ignored;
     const auto header = ReadSurveyFileHeader(path);
-    if (header && path == PathOf(header->key) && IsOfThisAtlas(*header)) {
-      found.push_back(
-          {fs::last_write_time(path, ignored), {header->key, SurveyFileBytes(*header)}});
+    if (header && path == PathOf(header->key) && IsOfLine(*header, line)) {
+      found.push_back({fs::last_write_time(path, ignored), *header});
     } else {
       fs::remove(path, ignored);
     }
   }
-  if (error) {
+  if (error && error != std::errc::no_such_file_or_directory) {
     Report(StrCat("cannot list ", options_.directory.string(), ": ", error.message()));
   }
   std::sort(found.begin(), found.end(),
             [](const Found& a, const Found& b) { return a.time < b.time; });
   const std::lock_guard lock(mutex_);
   for (const Found& file : found) {
-    Insert(file.entry);
+    Insert(file.header);
   }
-}
-
-// Whether the atlas went on from the state that it was in when the file was written.
-bool SurveyFiles::IsOfThisAtlas(const SurveyFileHeader& header) const {
-  const auto start = std::find_if(starts_.begin(), starts_.end(),
-                                  [&](const AtlasStart& s) { return s.id == header.start; });
-  if (header.build != BuildHash() || start == starts_.end()) {
-    return false;
-  }
-  return std::next(start) == starts_.end() || header.revision <= std::next(start)->revision;
 }
 
 fs::path SurveyFiles::PathOf(std::uint64_t key) const {
@@ -92,84 +97,116 @@ fs::path SurveyFiles::PathOf(std::uint64_t key) const {
 }
 
 std::optional<KeptSurveys> SurveyFiles::Read(const TileId& id) {
+  SurveyFileHeader header;
   {
     const std::lock_guard lock(mutex_);
-    const auto found = by_key_.find(id.Key());
-    if (found == by_key_.end()) {
+    const SurveyFileHeader* found = files_.Use(id.Key());
+    if (found == nullptr) {
       return std::nullopt;
     }
-    by_age_.splice(by_age_.begin(), by_age_, found->second);
+    header = *found;
   }
-  const auto file = ReadSurveyFile(PathOf(id.Key()));
-  if (file && file->header.key == id.Key() && IsOfThisAtlas(file->header)) {
+  const auto file = ReadSurveyFile(PathOf(header.key));
+  if (file && file->header == header) {
     auto surveys = TileSurveys::Load(file->payload, id, profile_);
     if (surveys) {
-      return KeptSurveys{*std::move(surveys), file->header.revision, file->header.revision};
+      std::error_code ignored;  // its age after a restart is a guess then
+      fs::last_write_time(PathOf(header.key), fs::file_time_type::clock::now(), ignored);
+      return KeptSurveys{*std::move(surveys), header.revision};
     }
   }
   const std::lock_guard lock(mutex_);
-  Remove(id.Key());
+  if (const SurveyFileHeader* now = files_.Use(header.key); now != nullptr && *now == header) {
+    files_.Take(header.key);
+    RemoveFile(header.key);
+  }
   return std::nullopt;
 }
 
-bool SurveyFiles::Write(KeptSurveys& kept) {
-  if (!is_on_ || kept.revision == kept.revision_on_disk || !HasRoom()) {
+bool SurveyFiles::Write(const KeptSurveys& kept) {
+  if (!is_on_ || !MayWrite() || !HasRoom()) {
     return false;
   }
-  const Bytes payload = kept.surveys.Save();
-  const SurveyFileHeader header{BuildHash(), starts_.back().id, kept.revision,
-                                kept.surveys.id().Key(), payload.size()};
-  std::uint64_t number = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    number = writes_++;
-  }
-  const fs::path unfinished = options_.directory / StrCat(header.key, ".", number, kUnfinished);
-  const Status status = WriteSurveyFile(PathOf(header.key), unfinished, header, payload);
-  if (!status.ok()) {
-    Report(status.message());
+  const auto header = WriteFile(kept);
+  if (!header) {
+    Report(header.error().message());
     return false;
   }
-  kept.revision_on_disk = kept.revision;
   const std::lock_guard lock(mutex_);
-  Insert({header.key, SurveyFileBytes(header)});
+  Insert(*header);
   return true;
 }
 
+// What it throws (no memory, say) is the end of no thread: it can be done without.
+Result<SurveyFileHeader> SurveyFiles::WriteFile(const KeptSurveys& kept) {
+  try {
+    const auto line = read_line_();
+    if (!line) {
+      return Error(line.error());
+    }
+    if (line->starts.empty()) {
+      return Error(StatusCode::kInvalidData, "the last start of the atlas is damaged");
+    }
+    const Bytes payload = kept.surveys.Save();
+    const SurveyFileHeader header{BuildHash(), line->starts.back().id, kept.revision,
+                                  kept.surveys.id().Key(), payload.size()};
+    std::uint64_t number = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      number = writes_++;
+    }
+    std::error_code ignored;  // somebody removed it; else writing says what is wrong
+    fs::create_directories(options_.directory, ignored);
+    const fs::path unfinished = options_.directory / StrCat(header.key, ".", number, kUnfinished);
+    Status status = WriteSurveyFile(PathOf(header.key), unfinished, header, payload);
+    return status.ok() ? Result<SurveyFileHeader>(header) : Error(std::move(status));
+  } catch (const std::exception& error) {
+    return Error(StatusCode::kInternal, error.what());
+  }
+}
+
+bool SurveyFiles::Has(const KeptSurveys& kept) const {
+  const std::lock_guard lock(mutex_);
+  const SurveyFileHeader* found = files_.Find(kept.surveys.id().Key());
+  return found != nullptr && found->revision == kept.revision;
+}
+
+bool SurveyFiles::MayWrite() const {
+  const std::lock_guard lock(mutex_);
+  return std::chrono::steady_clock::now() >= not_before_;
+}
+
+void SurveyFiles::MakeRoom() {
+  if (is_on_) {
+    HasRoom();
+  }
+}
+
 bool SurveyFiles::HasRoom() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (std::chrono::steady_clock::now() < not_before_) {
+  const std::lock_guard lock(mutex_);
+  while (true) {
+    std::error_code error;
+    const fs::space_info space = fs::space(options_.directory, error);
+    if (error || space.available >= options_.min_free_bytes) {
+      return true;
+    }
+    const auto oldest = files_.TakeOldestAbove(0);
+    if (!oldest) {
       return false;
     }
-  }
-  std::error_code error;
-  const fs::space_info space = fs::space(options_.directory, error);
-  return error || space.available >= options_.min_free_bytes;
-}
-
-// Under the lock, as is Remove().
-void SurveyFiles::Insert(const Entry& entry) {
-  if (const auto old = by_key_.find(entry.key); old != by_key_.end()) {
-    bytes_ -= old->second->bytes;
-    by_age_.erase(old->second);
-  }
-  by_age_.push_front(entry);
-  by_key_[entry.key] = by_age_.begin();
-  bytes_ += entry.bytes;
-  while (bytes_ > options_.max_bytes) {
-    Remove(by_age_.back().key);
+    RemoveFile(oldest->key);
   }
 }
 
-void SurveyFiles::Remove(std::uint64_t key) {
-  const auto found = by_key_.find(key);
-  if (found == by_key_.end()) {
-    return;
+// Under the lock.
+void SurveyFiles::Insert(const SurveyFileHeader& header) {
+  files_.Insert(header.key, header, SurveyFileBytes(header));
+  while (const auto oldest = files_.TakeOldestAbove(options_.max_bytes)) {
+    RemoveFile(oldest->key);
   }
-  bytes_ -= found->second->bytes;
-  by_age_.erase(found->second);
-  by_key_.erase(found);
+}
+
+void SurveyFiles::RemoveFile(std::uint64_t key) const {
   std::error_code ignored;  // it is not believed, or overwritten, later
   fs::remove(PathOf(key), ignored);
 }
@@ -182,7 +219,7 @@ void SurveyFiles::Report(const std::string& what) {
 
 std::size_t SurveyFiles::bytes() const {
   const std::lock_guard lock(mutex_);
-  return bytes_;
+  return files_.bytes();
 }
 
 }  // namespace atlas

@@ -17,14 +17,18 @@ TileRefresher::TileRefresher(AtlasStore& store,
       group_bytes_(options.group_bytes),
       keyframes_(options.keyframe_bytes),
       tiles_(options.tile_bytes),
-      survey_files_(options.survey_files, profile_, store.starts(), log),
+      survey_files_(
+          options.survey_files, profile_, [&store] { return store.ReadLine(); }, log),
       surveys_(options.surveys, survey_files_),
       builder_(store, keyframes_, tiles_, options.group_bytes) {}
 
-void TileRefresher::MoveToDisk() {
-  if (survey_files_.is_on()) {
-    surveys_.MoveToDisk();
-  }
+bool TileRefresher::StoreIdle() {
+  survey_files_.MakeRoom();
+  return survey_files_.is_on() && surveys_.StoreIdle();
+}
+
+std::size_t TileRefresher::MoveToDisk() {
+  return survey_files_.is_on() ? surveys_.MoveToDisk() : 0;
 }
 
 void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) {
@@ -94,9 +98,10 @@ void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
     if (content) {
       tiles_.Insert(content->payload_hash, std::make_shared<const Tile>(tile));
     }
-    surveys_.Put({std::move(job.surveys), job.revision, 0});
+    surveys_.Put({std::move(job.surveys), job.revision});
     on_built(id, BuiltTile{job.revision, std::move(content)});
   }
+  surveys_.Trim();  // which may wait for the disk: nobody waits for it
 }
 
 // In canonical order, which is that of each job.

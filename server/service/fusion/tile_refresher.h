@@ -20,9 +20,10 @@ namespace atlas {
 struct TileRefresherOptions {
   std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded keyframes, all workers together
   std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
-  SurveyCacheLimits surveys;                            // kept from one time to the next
-  SurveyFilesOptions survey_files;                      // and where memory has no room for them
-  std::size_t group_bytes = std::size_t{128} << 20;     // surveys of the tiles at hand, a worker
+  SurveyCacheLimits surveys =                           // kept from one time to the next
+      SurveyCacheLimits::OfTotal(std::size_t{512} << 20);
+  SurveyFilesOptions survey_files;                   // and where memory has no room for them
+  std::size_t group_bytes = std::size_t{128} << 20;  // surveys of the tiles at hand, a worker
 };
 
 class TileRefresher {
@@ -39,9 +40,9 @@ class TileRefresher {
   std::size_t kept_disk_bytes() const { return survey_files_.bytes(); }
   // For a worker without work: writes something of what is kept in memory to disk; false when there
   // is nothing to do.
-  bool StoreIdle() { return survey_files_.is_on() && surveys_.StoreIdle(); }
+  bool StoreIdle();
   // To be called last: what is kept in memory goes to disk.
-  void MoveToDisk();
+  std::size_t MoveToDisk();
 
  private:
   // A level-0 tile under way.

@@ -36,16 +36,18 @@ class SqliteStore final : public AtlasStore {
   SqliteStore(const SqliteStoreOptions& options,
               DataDirectory directory,
               const AtlasIdentity& identity,
-              std::vector<AtlasStart> starts,
               std::unique_ptr<Connection> writer)
       : directory_(std::move(directory)),
         identity_(identity),
-        starts_(std::move(starts)),
         writes_(std::move(writer), {options.max_queued_writes, options.max_group}),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
   const AtlasIdentity& identity() const override { return identity_; }
-  const std::vector<AtlasStart>& starts() const override { return starts_; }
+  Result<AtlasLine> ReadLine() override {
+    return readers_.Run<AtlasLine>([](Connection& connection) {
+      return AtlasLine{ReadStarts(connection), ReadCounter(connection, Counter::kRevision)};
+    });
+  }
 
   void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) override {
     Write<PutKeyframeResult>(std::move(done), [k = std::move(keyframe)](Connection& connection) {
@@ -189,7 +191,6 @@ class SqliteStore final : public AtlasStore {
 
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   AtlasIdentity identity_;
-  std::vector<AtlasStart> starts_;
   WriteQueue writes_;
   ReaderPool readers_;
 };
@@ -301,9 +302,8 @@ Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
     }
     writer->Execute("PRAGMA journal_mode = WAL");
     DropAllLeases(*writer);
-    std::vector<AtlasStart> starts = AddStart(*writer);
     return std::make_unique<SqliteStore>(options, std::move(directory), *identity,
-                                         std::move(starts), std::move(writer));
+                                         std::move(writer));
   } catch (const std::exception& error) {
     return Error(StatusFromException(error).WithContext(directory.database_file().string()));
   }

@@ -70,8 +70,7 @@ Status Fill(AtlasAtWork& atlas, const MapProfile& profile, std::uint32_t keyfram
 Status Run(std::uint32_t keyframes, std::size_t survey_mib) {
   const MapProfile profile;
   FusionOptions fusion;
-  const std::size_t survey_bytes = survey_mib << 20;
-  fusion.building.surveys = {survey_bytes / 3 * 2, survey_bytes / 3};
+  fusion.building.surveys = SurveyCacheLimits::OfTotal(survey_mib << 20);
   AtlasAtWork atlas(profile, fusion);
   ATLAS_RETURN_IF_ERROR(Fill(atlas, profile, keyframes));
   const double filled_mb = PeakMegabytes();
@@ -110,7 +109,7 @@ Status Run(std::uint32_t keyframes, std::size_t survey_mib) {
 
 int main(int argc, char** argv) {
   const int keyframes = argc > 1 ? std::atoi(argv[1]) : 0;
-  const int survey_mib = argc > 2 ? std::atoi(argv[2]) : 1'536;
+  const int survey_mib = argc > 2 ? std::atoi(argv[2]) : 512;
   if (keyframes < static_cast<int>(atlas::testing::kPlaceKeyframes) || survey_mib < 0) {
     std::cerr << "usage: scaling_bench KEYFRAMES (100 or more) [SURVEY_MIB]\n";
     return 2;

@@ -190,6 +190,56 @@ TEST(TileSurveysTest, ACorrectionAmongManyPassesCostsOneStretch) {
   }
 }
 
+// Neither the size of what is kept nor what it costs: what counts no more is forgotten.
+TEST(TileSurveysTest, WhatIsKeptDoesNotGrowWithThePasses) {
+  MapProfile profile = DrivesProfile(0);
+  profile.preset = FusionPreset::kBounded;
+  KeptTile tile(profile);
+  std::vector<PlacedKeyframe> keyframes;
+  std::vector<std::size_t> saved_bytes;
+  for (std::uint32_t pass = 0; pass < 40; ++pass) {
+    keyframes.push_back(testing::PlacedFrame({"car", StrCat("pass", 100 + pass), 0}, {0.8, 0.8},
+                                             testing::StreetKeyframe(profile, 12, 0)));
+    keyframes.back().time_ms = 1'000'000 * std::int64_t{pass};
+    tile.Update(keyframes);
+    for (int idle = 0; idle < 3; ++idle) {
+      tile.Update(keyframes);
+    }
+    saved_bytes.push_back(tile.surveys().Save().size());
+  }
+  constexpr std::size_t kFrameBytes = 100;  // each is still known by name, place and time
+  EXPECT_LT(saved_bytes[39], saved_bytes[12] + 27 * kFrameBytes);
+  // When all that was seen lately goes, what was forgotten is asked for.
+  keyframes.resize(20);
+  EXPECT_GT(tile.Update(keyframes), 10u);
+}
+
+// Of yesterday, uploaded while others drive there, or by a clock that is ahead of the others'. What
+// it sees has been forgotten as soon as it settles: it would start over each time.
+TEST(TileSurveysTest, OlderDrivesBesideLiveOnesAreAddedToLikeThem) {
+  MapProfile profile = DrivesProfile(0);
+  profile.preset = FusionPreset::kBounded;
+  profile.stretch_keyframes = 256;
+  KeptTile tile(profile);
+  std::vector<PlacedKeyframe> keyframes;
+  const auto see = [&](const std::string& vehicle, std::uint32_t i, std::int64_t time_ms) {
+    keyframes.push_back(testing::PlacedFrame({vehicle, StrCat("s", time_ms / 10'000'000), i},
+                                             {0.8, 0.8 + 0.01 * i},
+                                             testing::StreetKeyframe(profile, 12, i)));
+    keyframes.back().time_ms = time_ms + 1'000 * std::int64_t{i};
+    return tile.Update(keyframes);
+  };
+  for (int pass = 0; pass < 10; ++pass) {
+    see("old", 0, 50'000'000 + 10'000'000 * pass);
+  }
+  for (std::uint32_t i = 0; i < 30; ++i) {
+    EXPECT_EQ(see("a", i, 200'000'000), 1u) << i;
+    EXPECT_EQ(see("b", i, 200'000'000), 1u) << i;
+    EXPECT_EQ(see("ahead", i, 200'061'000), 1u) << i;
+    EXPECT_EQ(see("old", i, 0), 1u) << i;
+  }
+}
+
 // Passes that see several segments in most bands of a cell, three of them corrected at once, again
 // and again.
 TEST(TileSurveysTest, ThreePassesAtOnceCostThreeStretches) {

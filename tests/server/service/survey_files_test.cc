@@ -182,21 +182,23 @@ TEST_F(SurveyFilesTest, FilesMayVanishAtAnyTime) {
   for (std::uint32_t i = 0; i < 8; ++i) {
     uploads.push_back(DriveUpload(i));
   }
-  EXPECT_EQ(Digest().sha256, DigestOfAnother(uploads).sha256);
+  const AtlasDigest digest = Digest();
+  EXPECT_FALSE(FilesIn(survey_files_.directory).empty()) << "others are written";
+  EXPECT_EQ(digest.sha256, DigestOfAnother(uploads).sha256);
 }
 
 // Files of its own in a directory, without a service.
 class FilesAlone {
  public:
-  FilesAlone(const SurveyFilesOptions& options, std::vector<AtlasStart> starts)
+  FilesAlone(const SurveyFilesOptions& options, const Result<AtlasLine>& line)
       : files_(
-            options, TestProfile(), std::move(starts), [this](LogLevel, const std::string& line) {
-              lines_.push_back(line);
-            }) {}
+            options,
+            TestProfile(),
+            [line] { return line; },
+            [this](LogLevel, const std::string& text) { lines_.push_back(text); }) {}
 
   bool Write(const TileId& id, std::uint64_t revision) {
-    KeptSurveys kept{TileSurveys(id), revision, 0};
-    return files_.Write(kept);
+    return files_.Write({TileSurveys(id), revision});
   }
   bool Has(const TileId& id) { return files_.Read(id).has_value(); }
   SurveyFiles& files() { return files_; }
@@ -215,35 +217,38 @@ AtlasStart Start(std::uint8_t number, std::uint64_t revision) {
 }
 
 constexpr TileId kTile{0, 3, -4};
+const AtlasLine kLine{{Start(1, 0)}, 9};
 
 TEST_F(SurveyFilesTest, AFileIsBelievedWhileTheAtlasGoesOnFromIt) {
   {
-    FilesAlone files(survey_files_, {Start(1, 0)});
+    FilesAlone files(survey_files_, kLine);
     EXPECT_TRUE(files.Write(kTile, 7));
     EXPECT_TRUE(files.Has(kTile));
     EXPECT_FALSE(files.Has({0, 3, -5}));
   }
-  const auto is_believed = [&](std::vector<AtlasStart> starts) {
+  const auto is_believed = [&](const AtlasLine& line) {
     const fs::path saved = directory_ / "saved";
     fs::remove_all(saved);
     fs::copy(survey_files_.directory, saved);
-    FilesAlone files(survey_files_, std::move(starts));
+    FilesAlone files(survey_files_, line);
     const bool has = files.Has(kTile);
     EXPECT_EQ(has, !FilesIn(survey_files_.directory).empty()) << "others are removed";
     fs::remove_all(survey_files_.directory);
     fs::copy(saved, survey_files_.directory);
     return has;
   };
-  EXPECT_TRUE(is_believed({Start(1, 0), Start(2, 7)}));
-  EXPECT_TRUE(is_believed({Start(1, 0), Start(2, 9), Start(3, 9)}));
-  EXPECT_FALSE(is_believed({Start(1, 0), Start(2, 6)})) << "a copy of before was put back";
-  EXPECT_FALSE(is_believed({Start(2, 0), Start(3, 9)})) << "another atlas, or so long ago";
+  EXPECT_TRUE(is_believed({{Start(1, 0)}, 7}));
+  EXPECT_TRUE(is_believed({{Start(1, 0), Start(2, 7)}, 8}));
+  EXPECT_TRUE(is_believed({{Start(1, 0), Start(2, 9), Start(3, 9)}, 10}));
+  EXPECT_FALSE(is_believed({{Start(1, 0)}, 6})) << "a copy of before was put back";
+  EXPECT_FALSE(is_believed({{Start(1, 0), Start(2, 6)}, 9})) << "and has changed since";
+  EXPECT_FALSE(is_believed({{Start(2, 0), Start(3, 9)}, 9})) << "another atlas, or so long ago";
   EXPECT_FALSE(is_believed({}));
 }
 
 TEST_F(SurveyFilesTest, AFileUnderAnothersNameIsNotBelieved) {
   const TileId other{0, 3, -5};
-  FilesAlone files(survey_files_, {Start(1, 0)});
+  FilesAlone files(survey_files_, kLine);
   ASSERT_TRUE(files.Write(kTile, 7));
   const fs::path path = FilesIn(survey_files_.directory).front();
   const std::string bytes = Contents(path);
@@ -258,13 +263,13 @@ TEST_F(SurveyFilesTest, AFileUnderAnothersNameIsNotBelieved) {
 TEST_F(SurveyFilesTest, TheLeastRecentlyUsedGoFirst) {
   std::size_t file_bytes = 0;
   {
-    FilesAlone files(survey_files_, {Start(1, 0)});
+    FilesAlone files(survey_files_, kLine);
     ASSERT_TRUE(files.Write(kTile, 7));
     file_bytes = files.files().bytes();
   }
   fs::remove_all(survey_files_.directory);
   survey_files_.max_bytes = 3 * file_bytes + file_bytes / 2;
-  FilesAlone files(survey_files_, {Start(1, 0)});
+  FilesAlone files(survey_files_, kLine);
   for (std::int32_t x = 0; x < 3; ++x) {
     ASSERT_TRUE(files.Write({0, x, 0}, 7));
   }
@@ -276,13 +281,63 @@ TEST_F(SurveyFilesTest, TheLeastRecentlyUsedGoFirst) {
   EXPECT_EQ(FilesIn(survey_files_.directory).size(), 3u);
 }
 
-TEST_F(SurveyFilesTest, WhatIsOnDiskIsNotWrittenTwice) {
-  FilesAlone files(survey_files_, {Start(1, 0)});
-  KeptSurveys kept{TileSurveys(kTile), 7, 0};
+TEST_F(SurveyFilesTest, TheLeastRecentlyUsedGoFirstAfterARestart) {
+  {
+    FilesAlone files(survey_files_, kLine);
+    for (std::int32_t x = 0; x < 3; ++x) {
+      ASSERT_TRUE(files.Write({0, x, 0}, 7));
+    }
+    for (const fs::path& path : FilesIn(survey_files_.directory)) {
+      fs::last_write_time(path, fs::last_write_time(path) - std::chrono::hours(1));
+    }
+    ASSERT_TRUE(files.Has({0, 1, 0}));
+    survey_files_.max_bytes = files.files().bytes() / 3;
+  }
+  FilesAlone files(survey_files_, kLine);
+  EXPECT_TRUE(files.Has({0, 1, 0}));
+  EXPECT_FALSE(files.Has({0, 2, 0}));
+}
+
+TEST_F(SurveyFilesTest, WhatIsThereIsKnown) {
+  FilesAlone files(survey_files_, kLine);
+  KeptSurveys kept{TileSurveys(kTile), 7};
+  EXPECT_FALSE(files.files().Has(kept));
   EXPECT_TRUE(files.files().Write(kept));
-  EXPECT_FALSE(files.files().Write(kept));
+  EXPECT_TRUE(files.files().Has(kept));
   kept.revision = 8;
-  EXPECT_TRUE(files.files().Write(kept));
+  EXPECT_FALSE(files.files().Has(kept));
+}
+
+TEST_F(SurveyFilesTest, ADirectoryThatWasRemovedIsMadeAgain) {
+  FilesAlone files(survey_files_, kLine);
+  ASSERT_TRUE(files.Write(kTile, 7));
+  fs::remove_all(survey_files_.directory);
+  EXPECT_FALSE(files.Has(kTile));
+  EXPECT_TRUE(files.Write(kTile, 8));
+  EXPECT_TRUE(files.Has(kTile));
+  EXPECT_TRUE(files.lines().empty());
+}
+
+TEST_F(SurveyFilesTest, WhoWantsNoneHasNone) {
+  {
+    FilesAlone files(survey_files_, kLine);
+    ASSERT_TRUE(files.Write(kTile, 7));
+  }
+  Overwrite(survey_files_.directory / "letter.txt", "dear");
+  survey_files_.max_bytes = 0;
+  FilesAlone files(survey_files_, kLine);
+  EXPECT_FALSE(files.files().is_on());
+  EXPECT_EQ(FilesIn(survey_files_.directory).size(), 1u);
+  EXPECT_FALSE(files.Write(kTile, 7));
+  fs::remove_all(survey_files_.directory);
+  EXPECT_TRUE(FilesAlone(survey_files_, kLine).lines().empty());
+}
+
+TEST_F(SurveyFilesTest, AnAtlasThatCannotBeReadIsTold) {
+  FilesAlone files(survey_files_, Result<AtlasLine>(Error(StatusCode::kInvalidData, "bent")));
+  EXPECT_FALSE(files.files().is_on());
+  ASSERT_EQ(files.lines().size(), 1u);
+  EXPECT_NE(files.lines()[0].find("bent"), std::string::npos);
 }
 
 TEST_F(SurveyFilesTest, WhatIsOnDiskOfOthersStays) {
@@ -290,7 +345,7 @@ TEST_F(SurveyFilesTest, WhatIsOnDiskOfOthersStays) {
   Overwrite(survey_files_.directory / "letter.txt", "dear");
   Overwrite(survey_files_.directory / "1.survey", "half");
   Overwrite(survey_files_.directory / "1.0.survey-new", "half");
-  FilesAlone files(survey_files_, {Start(1, 0)});
+  FilesAlone files(survey_files_, kLine);
   const auto left = FilesIn(survey_files_.directory);
   ASSERT_EQ(left.size(), 1u);
   EXPECT_EQ(left.front().filename(), "letter.txt");
@@ -298,15 +353,30 @@ TEST_F(SurveyFilesTest, WhatIsOnDiskOfOthersStays) {
 
 TEST_F(SurveyFilesTest, OthersNeedAFullDiskMore) {
   survey_files_.min_free_bytes = ~std::uintmax_t{0};
-  FilesAlone files(survey_files_, {Start(1, 0)});
+  FilesAlone files(survey_files_, kLine);
   EXPECT_FALSE(files.Write(kTile, 7));
   EXPECT_TRUE(FilesIn(survey_files_.directory).empty());
   EXPECT_TRUE(files.lines().empty());
 }
 
+TEST_F(SurveyFilesTest, OthersGetTheRoomWhenTheyNeedIt) {
+  {
+    FilesAlone files(survey_files_, kLine);
+    ASSERT_TRUE(files.Write(kTile, 7));
+  }
+  FilesAlone plenty(survey_files_, kLine);
+  plenty.files().MakeRoom();
+  EXPECT_TRUE(plenty.Has(kTile));
+  survey_files_.min_free_bytes = ~std::uintmax_t{0};
+  FilesAlone files(survey_files_, kLine);
+  files.files().MakeRoom();
+  EXPECT_TRUE(FilesIn(survey_files_.directory).empty());
+  EXPECT_EQ(files.files().bytes(), 0u);
+}
+
 TEST_F(SurveyFilesTest, ADirectoryThatCannotBeMadeIsToldOnce) {
   Overwrite(survey_files_.directory, "a file");
-  FilesAlone files(survey_files_, {Start(1, 0)});
+  FilesAlone files(survey_files_, kLine);
   EXPECT_FALSE(files.files().is_on());
   EXPECT_FALSE(files.Write(kTile, 7));
   ASSERT_EQ(files.lines().size(), 1u);
@@ -314,7 +384,7 @@ TEST_F(SurveyFilesTest, ADirectoryThatCannotBeMadeIsToldOnce) {
 }
 
 TEST_F(SurveyFilesTest, AWriteThatFailsIsToldOnceAMinute) {
-  FilesAlone files(survey_files_, {Start(1, 0)});
+  FilesAlone files(survey_files_, kLine);
   fs::remove_all(survey_files_.directory);
   Overwrite(survey_files_.directory, "a file");
   EXPECT_FALSE(files.Write(kTile, 7));

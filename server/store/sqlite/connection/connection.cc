@@ -1,5 +1,8 @@
 #include "server/store/sqlite/connection/connection.h"
 
+#include <algorithm>
+#include <random>
+
 #include <sqlite3.h>
 
 #include "core/base/str_cat.h"
@@ -62,6 +65,8 @@ Bytes Query::Blob() {
 
 Connection::Connection(const ConnectionOptions& options)
     : database_(options.file.string(), OpenFlags(options.mode), options.busy_timeout_ms) {
+  std::random_device random;
+  std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });
   // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.
   Execute(
       StrCat("PRAGMA cache_size = -", options.cache_kib,

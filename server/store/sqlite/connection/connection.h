@@ -3,6 +3,8 @@
 // Status.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -73,10 +75,13 @@ class Connection {
   void Execute(const char* sql) { database_.exec(sql); }
   // The first column of the first row of a statement that is run once.
   std::int64_t Ask(const char* sql);
+  // Random, of this connection.
+  ByteSpan id() const { return id_; }
   // False after SQLite rolled the transaction back by itself (full disk, I/O error).
   bool is_in_transaction() const;
 
  private:
+  std::array<std::uint8_t, 16> id_{};
   SQLite::Database database_;
   std::unordered_map<const char*, std::unique_ptr<SQLite::Statement>> statements_;
 };

@@ -28,9 +28,4 @@ std::uint64_t ReadCounter(Connection& connection, Counter counter);
 // The value after adding `delta`.
 std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t delta);
 
-// The number of a change about to be committed.
-inline std::uint64_t NextRevision(Connection& connection) {
-  return AddToCounter(connection, Counter::kRevision, 1);
-}
-
 }  // namespace atlas

@@ -116,6 +116,11 @@ CREATE TABLE tombstones (
   PRIMARY KEY (session_id, sequence)) WITHOUT ROWID;
 CREATE INDEX tombstones_of_compaction ON tombstones (compaction_id);
 
+CREATE TABLE starts (
+  number INTEGER PRIMARY KEY,
+  id BLOB NOT NULL, revision INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
+
 INSERT INTO counters (id, name, value) VALUES
   (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),
   (5, 'keyframe_bytes', 0), (6, 'tiles', 0), (7, 'tile_bytes', 0), (8, 'cells', 0),

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <random>
 
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
@@ -14,6 +13,38 @@ constexpr std::int64_t kRemembered = 100;
 
 std::int64_t HashOf(std::int64_t number, ByteSpan id, std::uint64_t revision) {
   return RowHash(RowKind::kStart).Int(number).Raw(id).Unsigned(revision).value();
+}
+
+bool IsNoted(Connection& connection) {
+  Query last = connection.Prepare("SELECT id FROM starts ORDER BY number DESC LIMIT 1");
+  const ByteSpan id = connection.id();
+  if (!last.Step()) {
+    return false;
+  }
+  const Bytes noted = last.Blob();
+  return std::equal(noted.begin(), noted.end(), id.begin(), id.end());
+}
+
+void NoteStart(Connection& connection) {
+  const ByteSpan id = connection.id();
+  const std::uint64_t revision = ReadCounter(connection, Counter::kRevision);
+  const std::int64_t number = 1 + connection.Ask("SELECT coalesce(max(number), 0) FROM starts");
+  connection.Prepare("INSERT INTO starts (number, id, revision, checksum) VALUES (?,?,?,?)")
+      .Bind(number)
+      .Bind(id)
+      .Bind(revision)
+      .Bind(HashOf(number, id, revision))
+      .Run();
+  connection.Prepare("DELETE FROM starts WHERE number <= ?").Bind(number - kRemembered).Run();
+}
+
+}  // namespace
+
+std::uint64_t NextRevision(Connection& connection) {
+  if (!IsNoted(connection)) {
+    NoteStart(connection);
+  }
+  return AddToCounter(connection, Counter::kRevision, 1);
 }
 
 std::vector<AtlasStart> ReadStarts(Connection& connection) {
@@ -34,40 +65,6 @@ std::vector<AtlasStart> ReadStarts(Connection& connection) {
     starts.push_back(start);
   }
   return starts;
-}
-
-void InsertStart(Connection& connection) {
-  AtlasStart now;
-  std::random_device random;
-  std::generate(now.id.begin(), now.id.end(),
-                [&random] { return static_cast<std::uint8_t>(random()); });
-  connection.Execute(
-      "BEGIN IMMEDIATE; CREATE TABLE IF NOT EXISTS starts (number INTEGER PRIMARY KEY, "
-      "id BLOB NOT NULL, revision INTEGER NOT NULL, checksum INTEGER NOT NULL)");
-  now.revision = ReadCounter(connection, Counter::kRevision);
-  const std::int64_t number = 1 + connection.Ask("SELECT coalesce(max(number), 0) FROM starts");
-  connection.Prepare("INSERT INTO starts (number, id, revision, checksum) VALUES (?,?,?,?)")
-      .Bind(number)
-      .Bind(ByteSpan(now.id))
-      .Bind(now.revision)
-      .Bind(HashOf(number, now.id, now.revision))
-      .Run();
-  connection.Prepare("DELETE FROM starts WHERE number <= ?").Bind(number - kRemembered).Run();
-  connection.Execute("COMMIT");
-}
-
-}  // namespace
-
-std::vector<AtlasStart> AddStart(Connection& connection) {
-  try {
-    InsertStart(connection);
-    return ReadStarts(connection);
-  } catch (const SQLite::Exception&) {
-    if (connection.is_in_transaction()) {
-      connection.Execute("ROLLBACK");
-    }
-    return {};
-  }
 }
 
 }  // namespace atlas

@@ -1,6 +1,7 @@
-// When the store was opened (AtlasStart).
+// When the atlas was opened to be changed (AtlasStart), and the revisions that it takes.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "server/store/sqlite/connection/connection.h"
@@ -8,9 +9,11 @@
 
 namespace atlas {
 
-// Adds a row for now, in a table that it makes where there is none, and forgets all but the last
-// hundred. The value: these, oldest first, those before a damaged one left out; none where the disk
-// refuses.
-std::vector<AtlasStart> AddStart(Connection& connection);
+// The number of a change about to be committed. The first of a connection notes its start, and
+// forgets all starts but the last hundred.
+std::uint64_t NextRevision(Connection& connection);
+
+// Oldest first, those before a damaged one left out.
+std::vector<AtlasStart> ReadStarts(Connection& connection);
 
 }  // namespace atlas

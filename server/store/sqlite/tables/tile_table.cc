@@ -5,6 +5,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/tables/start_table.h"
 #include "server/store/tile_ranges.h"
 
 namespace atlas {

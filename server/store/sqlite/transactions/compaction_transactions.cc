@@ -10,6 +10,7 @@
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/session_table.h"
+#include "server/store/sqlite/tables/start_table.h"
 
 namespace atlas {
 namespace {

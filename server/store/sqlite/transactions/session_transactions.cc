@@ -6,6 +6,7 @@
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
+#include "server/store/sqlite/tables/start_table.h"
 
 namespace atlas {
 namespace {

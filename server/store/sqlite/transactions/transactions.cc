@@ -14,6 +14,7 @@
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
+#include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
 
 namespace atlas {

@@ -168,6 +168,7 @@ DaemonSetup Drawing::DrawSetup() {
   setup.building.keyframe_bytes = OneOf(std::array<std::size_t, 3>{0, 30'000, kMuch});
   setup.building.surveys.plain_bytes = OneOf(std::array<std::size_t, 3>{0, 100'000, kMuch});
   setup.building.surveys.packed_bytes = OneOf(std::array<std::size_t, 3>{0, 50'000, kMuch});
+  setup.building.surveys.idle = std::chrono::milliseconds(Below(2) == 0 ? 0 : 60'000);
   setup.building.survey_files.max_bytes = OneOf(std::array<std::size_t, 3>{0, 50'000, kMuch});
   setup.building.survey_files.min_free_bytes = 0;
   setup.building.group_bytes = OneOf(std::array<std::size_t, 4>{1, 100'000, kMuch, kMuch});
