@@ -103,7 +103,7 @@ def bench_restarts(bin_dir, emit, _):
 
 def bench_scaling(bin_dir, emit, _):
     """Ten keyframes corrected, in maps of 100, 1,000 and 10,000; as configured, and with little memory."""
-    for survey_mib in (512, 96):
+    for survey_mib in (1024, 96):
         first = None
         for keyframes in (100, 1000, 10000):
             row, = rows_of(bin_dir / "scaling_bench", keyframes, survey_mib)

@@ -17,6 +17,7 @@
 #include "server/config/daemon_config.h"
 #include "server/net/tcp_server.h"
 #include "server/service/atlas_service.h"
+#include "server/service/process_memory.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace atlas {
@@ -147,6 +148,7 @@ int Main(int argc, const char* const* argv) {
 }  // namespace atlas
 
 int main(int argc, char** argv) {
+  atlas::ReturnLargeBlocks();
   try {
     return atlas::Main(argc, argv);
   } catch (const std::exception& error) {

@@ -43,7 +43,12 @@ void SettledStretches::Settle(std::span<const std::uint32_t> settling,
   marks_.Unpack();
   BoundedChoice choice(profile);
   Forgetting forgetting(profile);
+  std::size_t segments = settled_.size();
+  for (const std::uint32_t place : settling) {
+    segments += stretches[place].open->size();
+  }
   SettledSegments merged;
+  merged.Reserve(CellsOfTile(profile), segments);
   SettledSegments spare;
   CellMarks marks;
   for (std::size_t cell = 0; cell < CellsOfTile(profile); ++cell) {

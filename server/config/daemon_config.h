@@ -18,7 +18,7 @@ struct DaemonConfig {
   std::uint16_t port = 7447;
   int workers = 0;             // fusion threads; 0: one a core
   int cache_mib = 128;         // decoded keyframes, all workers together
-  int survey_mib = 512;        // what tiles keep from one fusion to the next
+  int survey_mib = 1024;       // what tiles keep from one fusion to the next
   int survey_disk_mib = 4096;  // the same on disk; 0: nothing
   std::string log_level = "info";
 

@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include <malloc.h>
 #include <unistd.h>
 
 namespace atlas {
@@ -12,6 +13,12 @@ std::uint64_t ResidentBytes() {
   std::uint64_t resident_pages = 0;
   statm >> total_pages >> resident_pages;
   return statm ? resident_pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
+}
+
+void ReturnLargeBlocks() {
+#ifdef M_MMAP_THRESHOLD  // glibc: else it learns to keep them
+  ::mallopt(M_MMAP_THRESHOLD, 4 << 20);
+#endif
 }
 
 }  // namespace atlas

@@ -1,13 +1,11 @@
-// Arrays of plain values as one compressed blob and back, for the same build. Compressed are first
-// all first bytes of an array's values, then all second ones, and so on: that is faster and
-// smaller.
+// Arrays of plain values as compressed bytes and back, for the same build. In blocks, so that no
+// second copy of the whole is ever made; of each first all first bytes of its values, then all
+// second ones, and so on: that is faster and smaller.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
-#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -17,56 +15,63 @@
 namespace atlas {
 namespace packed_arrays_internal {
 
-inline constexpr std::size_t kBlock = 512;  // values at a time, so that they stay in a cache
-
 template <typename T>
-void Append(const std::vector<T>& values, std::uint8_t*& out) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  const std::uint64_t count = values.size();
-  std::memcpy(out, &count, sizeof(count));
-  out += sizeof(count);
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(values.data());
-  for (std::size_t first = 0; first < count; first += kBlock) {
-    const std::size_t end = std::min<std::size_t>(count, first + kBlock);
+inline constexpr std::size_t kBlockValues = (std::size_t{256} << 10) / sizeof(T);
+
+// Calls `visit(value, byte)` for all bytes of `count` values, few values at a time: they stay in a
+// cache.
+template <typename T, typename Visit>
+void VisitBytes(std::size_t count, const Visit& visit) {
+  constexpr std::size_t kAtOnce = 512;
+  for (std::size_t first = 0; first < count; first += kAtOnce) {
+    const std::size_t end = std::min(count, first + kAtOnce);
     for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
       for (std::size_t i = first; i < end; ++i) {
-        out[byte * count + i] = bytes[i * sizeof(T) + byte];
+        visit(i, byte);
       }
     }
   }
-  out += count * sizeof(T);
 }
 
 template <typename T>
-void Take(const std::uint8_t*& in, std::vector<T>& values) {
-  std::uint64_t count = 0;
-  std::memcpy(&count, in, sizeof(count));
-  in += sizeof(count);
-  values.resize(count);
-  auto* bytes = reinterpret_cast<std::uint8_t*>(values.data());
-  for (std::size_t first = 0; first < count; first += kBlock) {
-    const std::size_t end = std::min<std::size_t>(count, first + kBlock);
-    for (std::size_t byte = 0; byte < sizeof(T); ++byte) {
-      for (std::size_t i = first; i < end; ++i) {
-        bytes[i * sizeof(T) + byte] = in[byte * count + i];
-      }
-    }
+void Pack(const std::vector<T>& values, ByteWriter& out) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  constexpr int kLevel = 1;
+  out.Varint(values.size());
+  Bytes plain;
+  for (std::size_t first = 0; first < values.size(); first += kBlockValues<T>) {
+    const std::size_t count = std::min(kBlockValues<T>, values.size() - first);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(values.data() + first);
+    plain.resize(count * sizeof(T));
+    VisitBytes<T>(count, [=, to = plain.data()](std::size_t i, std::size_t byte) {
+      to[byte * count + i] = bytes[i * sizeof(T) + byte];
+    });
+    const Bytes packed = Compress(plain, kLevel);
+    out.Varint(packed.size());
+    out.Raw(packed);
   }
-  in += count * sizeof(T);
+}
+
+template <typename T>
+void Unpack(ByteReader& in, std::vector<T>& values) {
+  values = std::vector<T>(in.Varint());
+  for (std::size_t first = 0; first < values.size(); first += kBlockValues<T>) {
+    const std::size_t count = std::min(kBlockValues<T>, values.size() - first);
+    const Bytes plain = Decompress(in.Raw(in.Varint()), count * sizeof(T)).value();
+    auto* bytes = reinterpret_cast<std::uint8_t*>(values.data() + first);
+    VisitBytes<T>(count, [=, from = plain.data()](std::size_t i, std::size_t byte) {
+      bytes[i * sizeof(T) + byte] = from[byte * count + i];
+    });
+  }
 }
 
 }  // namespace packed_arrays_internal
 
 template <typename... T>
 Bytes PackArrays(const std::vector<T>&... arrays) {
-  constexpr int kLevel = 1;
-  const std::uint64_t size = (... + (sizeof(std::uint64_t) + arrays.size() * sizeof(T)));
-  Bytes plain(size);
-  std::uint8_t* end = plain.data();
-  (packed_arrays_internal::Append(arrays, end), ...);
-  Bytes packed = Compress(plain, kLevel);
-  const auto* size_bytes = reinterpret_cast<const std::uint8_t*>(&size);
-  packed.insert(packed.end(), size_bytes, size_bytes + sizeof(size));
+  ByteWriter out;
+  (packed_arrays_internal::Pack(arrays, out), ...);
+  Bytes packed = out.Take();
   packed.shrink_to_fit();
   return packed;
 }
@@ -74,11 +79,8 @@ Bytes PackArrays(const std::vector<T>&... arrays) {
 // `packed` comes from PackArrays of as many arrays of the same types, by the same build.
 template <typename... T>
 void UnpackArrays(ByteSpan packed, std::vector<T>&... arrays) {
-  std::uint64_t size = 0;
-  std::memcpy(&size, packed.last(sizeof(size)).data(), sizeof(size));
-  const Bytes plain = Decompress(packed.first(packed.size() - sizeof(size)), size).value();
-  const std::uint8_t* begin = plain.data();
-  (packed_arrays_internal::Take(begin, arrays), ...);
+  ByteReader in(packed);
+  (packed_arrays_internal::Unpack(in, arrays), ...);
 }
 
 }  // namespace atlas

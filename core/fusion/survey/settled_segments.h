@@ -25,6 +25,11 @@ class SettledSegments {
   explicit SettledSegments(Bytes packed) : packed_(std::move(packed)) {}
 
   // To be filled cell by cell: Append() its segments, then EndCell().
+  void Reserve(std::size_t cells, std::size_t segments) {
+    cell_end_.reserve(cells);
+    segments_.reserve(segments);
+    stretches_.reserve(segments);
+  }
   void Append(const Segment& segment, std::uint32_t stretch) {
     segments_.push_back(segment);
     stretches_.push_back(stretch);
@@ -32,6 +37,7 @@ class SettledSegments {
   void EndCell() { cell_end_.push_back(static_cast<std::uint32_t>(segments_.size())); }
 
   bool is_empty() const { return segments_.empty(); }
+  std::size_t size() const { return segments_.size(); }
   std::size_t bytes() const;
 
   // A cell's segments and the numbers of their stretches; none while there are none at all.

@@ -60,6 +60,7 @@ class StretchSurvey {
   const TileBand& band() const { return band_; }
   std::span<const StretchFrame> frames() const { return frames_; }
   std::size_t bytes() const;
+  std::size_t size() const { return segments_.size(); }  // of all cells
 
   // Compresses the segments; they come back, as not used, with Unpack(), which comes before
   // anything else. What did not change since it was packed last is not compressed again.

@@ -62,17 +62,29 @@ void FusionScheduler::Stop() {
 void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
   while (!stop.stop_requested()) {
     const std::uint64_t seen = changes_.version();
+    if (!Work(worker, stop)) {
+      if (changes_.is_closed()) {
+        return;
+      }
+      changes_.WaitPast(seen, std::chrono::steady_clock::now() + kLookAgain, stop);
+    }
+  }
+}
+
+// False when there is nothing to do now. What it throws is not the end of the process: tiles that
+// were claimed are claimed again when their lease runs out.
+bool FusionScheduler::Work(Worker& worker, const std::stop_token& stop) {
+  try {
     const std::vector<TileClaim> claims =
         GiveBack(worker) ? NextClaims(worker.owner) : std::vector<TileClaim>();
-    if (!claims.empty()) {
-      BuildClaims(worker, claims, stop);
-    } else if (refresher_.StoreIdle()) {
-      continue;
-    } else if (!changes_.is_closed()) {
-      changes_.WaitPast(seen, std::chrono::steady_clock::now() + kLookAgain, stop);
-    } else {
-      return;
+    if (claims.empty()) {
+      return refresher_.StoreIdle();
     }
+    BuildClaims(worker, claims, stop);
+    return true;
+  } catch (const std::exception& error) {
+    log_(LogLevel::kError, StrCat("fusion: ", worker.owner, ": ", error.what()));
+    return false;
   }
 }
 

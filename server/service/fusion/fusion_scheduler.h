@@ -66,6 +66,7 @@ class FusionScheduler {
   };
 
   void RunWorker(const std::stop_token& stop, Worker worker);
+  bool Work(Worker& worker, const std::stop_token& stop);
   std::vector<TileClaim> NextClaims(const std::string& owner);
   bool StartNextWave(std::uint64_t done);
   void BuildClaims(Worker& worker,

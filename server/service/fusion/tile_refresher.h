@@ -21,7 +21,7 @@ struct TileRefresherOptions {
   std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded keyframes, all workers together
   std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
   SurveyCacheLimits surveys =                           // kept from one time to the next
-      SurveyCacheLimits::OfTotal(std::size_t{512} << 20);
+      SurveyCacheLimits::OfTotal(std::size_t{1024} << 20);
   SurveyFilesOptions survey_files;                   // and where memory has no room for them
   std::size_t group_bytes = std::size_t{128} << 20;  // surveys of the tiles at hand, a worker
 };

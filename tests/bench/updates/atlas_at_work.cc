@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/service/process_memory.h"
 #include "server/store/await.h"
 #include "server/store/sqlite/sqlite_store.h"
 
@@ -39,7 +40,8 @@ std::filesystem::path NewDirectory() {
 
 AtlasAtWork::AtlasAtWork(const MapProfile& profile, const FusionOptions& fusion)
     : directory_(NewDirectory()), fusion_(fusion) {
-  fusion_.building.survey_files.directory = directory_ / "surveys";  // as atlasd
+  ReturnLargeBlocks();  // as atlasd, and so is this
+  fusion_.building.survey_files.directory = directory_ / "surveys";
   SqliteStoreOptions options;
   options.directory = directory_;
   options.new_profile = profile;

@@ -109,7 +109,7 @@ Status Run(std::uint32_t keyframes, std::size_t survey_mib) {
 
 int main(int argc, char** argv) {
   const int keyframes = argc > 1 ? std::atoi(argv[1]) : 0;
-  const int survey_mib = argc > 2 ? std::atoi(argv[2]) : 512;
+  const int survey_mib = argc > 2 ? std::atoi(argv[2]) : 1'024;
   if (keyframes < static_cast<int>(atlas::testing::kPlaceKeyframes) || survey_mib < 0) {
     std::cerr << "usage: scaling_bench KEYFRAMES (100 or more) [SURVEY_MIB]\n";
     return 2;
