@@ -30,6 +30,9 @@ class SettledStretches {
                std::span<const TileStretch> stretches,
                std::vector<SegmentView>& segments);
 
+  std::span<Segment> Segments(std::size_t cell) { return settled_.Segments(cell); }
+  std::span<const std::uint32_t> Places(std::size_t cell) const { return settled_.Stretches(cell); }
+
   // Takes the segments of `settling`, open ones, and closes them.
   void Settle(std::span<const std::uint32_t> settling,
               std::span<TileStretch> stretches,

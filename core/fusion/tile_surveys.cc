@@ -22,9 +22,9 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
   const MapProfile& profile = context.profile;
   assert(profile.preset != FusionPreset::kPaper);
   ++expected_count_;
-  if (tile_.cell_begin.empty()) {
-    tile_ = EmptyTile(id_, profile);
-    touched_ = CellSet(tile_.cell_begin.size() - 1);
+  if (made_.tile.cell_begin.empty()) {
+    made_ = {EmptyTile(id_, profile), {}};
+    touched_ = CellSet(made_.tile.cell_begin.size() - 1);
     touched_.Fill();
   }
   Settle(profile);
@@ -204,37 +204,48 @@ void TileSurveys::Settle(const MapProfile& profile) {
 
 const Tile& TileSurveys::Combine(const FusionContext& context) {
   assert(awaited_.empty());
+  const bool have_parts = HaveParts(context.profile);
+  CellSet revised(made_.tile.cell_begin.size() - 1);  // where segments changed, each in its band
   for (const std::uint32_t i : open_) {
     StretchSurvey& survey = *stretches_[i].open;
-    touched_.InsertAll(survey.touched());
+    touched_.InsertAll(have_parts ? survey.reshaped() : survey.touched());
+    revised.InsertAll(survey.touched());
     survey.ClearTouched();
   }
   CellCombiner combiner(context.sigmas, context.profile);
-  Tile tile = EmptyTile(id_, context.profile);
-  tile.layers.reserve(tile_.layers.size());
-  for (std::size_t cell = 0; cell + 1 < tile.cell_begin.size(); ++cell) {
+  BandedTile made{EmptyTile(id_, context.profile), {}};
+  made.tile.layers.reserve(made_.tile.layers.size());
+  made.bands.reserve(made_.bands.size());
+  for (std::size_t cell = 0; cell + 1 < made.tile.cell_begin.size(); ++cell) {
     if (touched_.Contains(cell)) {
-      CombineCell(cell, combiner, tile.layers);
-    } else {
-      const auto layers = tile_.Layers(cell);
-      tile.layers.insert(tile.layers.end(), layers.begin(), layers.end());
+      CombineCell(cell, combiner, made);
+    } else if (!revised.Contains(cell)) {
+      CopyCell(cell, made);
+    } else if (!CombinePart(cell, combiner, made)) {
+      CombineCell(cell, combiner, made);
     }
-    tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(tile.layers.size());
+    made.tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(made.tile.layers.size());
   }
   for (const TileStretch& stretch : stretches_) {
-    const bool is_new = tile.contributors.empty() || tile.contributors.back() != stretch.key;
+    auto& contributors = made.tile.contributors;
+    const bool is_new = contributors.empty() || contributors.back() != stretch.key;
     if (stretch.used > 0 && is_new) {
-      tile.contributors.push_back(stretch.key);
+      contributors.push_back(stretch.key);
     }
   }
-  tile_ = std::move(tile);
+  made_ = std::move(made);
   touched_.Clear();
-  return tile_;
+  return made_.tile;
 }
 
-void TileSurveys::CombineCell(std::size_t cell,
-                              CellCombiner& combiner,
-                              std::vector<TileLayer>& out) {
+void TileSurveys::CopyCell(std::size_t cell, BandedTile& out) const {
+  const auto layers = made_.tile.Layers(cell);
+  const auto bands = std::span(made_.bands).subspan(made_.tile.cell_begin[cell], layers.size());
+  out.tile.layers.insert(out.tile.layers.end(), layers.begin(), layers.end());
+  out.bands.insert(out.bands.end(), bands.begin(), bands.end());
+}
+
+void TileSurveys::CombineCell(std::size_t cell, CellCombiner& combiner, BandedTile& out) {
   segments_.clear();
   settled_.Collect(cell, stretches_, segments_);
   for (const std::uint32_t place : open_) {
@@ -244,16 +255,121 @@ void TileSurveys::CombineCell(std::size_t cell,
     return;
   }
   SortByStretch(segments_);
-  combiner.Combine(segments_, out);
+  combiner.Combine(segments_, {}, out.tile.layers);
+  for (const CellLayer& layer : combiner.layers()) {
+    out.bands.push_back(BandOf(layer.reference_mm, combiner.profile().band_mm));
+  }
+  SetCombined(combiner);
+}
+
+// Combines only the part of the cell that the revised segments are in, and copies the others'
+// layers. False, and nothing is done, where it can reach further: a layer's altitude, the mean of
+// what was seen, is not where its segments are; there are as many layers as a cell may have; or the
+// column below ends elsewhere.
+bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, BandedTile& out) {
+  const MapProfile& profile = combiner.profile();
+  const std::int32_t band_mm = profile.band_mm;
+  CollectPlainly(cell, band_mm);
+  const CellPart part = FindRevisedPart(plain_);
+  const auto layers = made_.tile.Layers(cell);
+  const auto bands = std::span(made_.bands).subspan(made_.tile.cell_begin[cell], layers.size());
+  std::size_t begin = 0;
+  while (begin < layers.size() && bands[begin] < part.lowest) {
+    ++begin;
+  }
+  std::size_t end = begin;
+  while (end < layers.size() && part.Contains(bands[end])) {
+    ++end;
+  }
+  const auto is_inside = [&](const TileLayer& layer) {
+    return part.Contains(BandOf(layer.altitude_mm, band_mm));
+  };
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const std::int32_t band = BandOf(layers[i].altitude_mm, band_mm);
+    const bool is_at_home = i < begin ? band < part.lowest - 1
+                            : i < end ? is_inside(layers[i])
+                                      : std::min(band - 1, bands[i]) > part.highest;
+    if (!is_at_home) {
+      return false;
+    }
+  }
+  CellCombiner::Others others;
+  segments_.clear();
+  for (const CellSegment& s : plain_) {
+    if (part.Contains(s.band)) {
+      segments_.push_back(ViewOf(*s.segment, s.stretch, stretches_));
+    } else {
+      others.has_strong |= s.segment->is_strong;
+    }
+  }
+  SortByStretch(segments_);
+  others.above_mm = end < layers.size() ? &layers[end].altitude_mm : nullptr;
+  layers_.clear();
+  combiner.Combine(segments_, others, layers_);
+  const std::size_t count = begin + layers_.size() + layers.size() - end;
+  if (count >= kMaxCellLayers || layers.size() >= kMaxCellLayers ||
+      !std::all_of(layers_.begin(), layers_.end(), is_inside)) {
+    return false;
+  }
+  if (begin > 0) {
+    const std::int32_t below_mm = layers[begin - 1].altitude_mm;
+    const std::int32_t* was_mm = begin < layers.size() ? &layers[begin].altitude_mm : nullptr;
+    const std::int32_t* is_mm = layers_.empty() ? others.above_mm : &layers_[0].altitude_mm;
+    if (ColumnSpanOf(below_mm, was_mm, profile).mask !=
+        ColumnSpanOf(below_mm, is_mm, profile).mask) {
+      return false;
+    }
+  }
+  const auto copy = [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      out.tile.layers.push_back(layers[i]);
+      out.bands.push_back(bands[i]);
+    }
+  };
+  copy(0, begin);
+  out.tile.layers.insert(out.tile.layers.end(), layers_.begin(), layers_.end());
+  for (const CellLayer& layer : combiner.layers()) {
+    out.bands.push_back(BandOf(layer.reference_mm, band_mm));
+  }
+  copy(end, layers.size());
+  SetCombined(combiner);
+  return true;
+}
+
+// All segments of a cell into plain_.
+void TileSurveys::CollectPlainly(std::size_t cell, std::int32_t band_mm) {
+  plain_.clear();
+  const auto add = [&](Segment& segment, std::uint32_t place) {
+    plain_.push_back({&segment, place, BandOf(segment.altitude_mm, band_mm)});
+  };
+  const std::span settled = settled_.Segments(cell);
+  const std::span places = settled_.Places(cell);
+  for (std::size_t i = 0; i < settled.size(); ++i) {
+    add(settled[i], places[i]);
+  }
+  for (const std::uint32_t place : open_) {
+    StretchSurvey& open = *stretches_[place].open;
+    for (std::uint32_t i = open.First(cell); i != Segment::kNone; i = open.At(i).next) {
+      add(open.At(i), place);
+    }
+  }
+}
+
+// Notes of segments_ that they were.
+void TileSurveys::SetCombined(const CellCombiner& combiner) {
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     SetUsed(segments_[i], combiner.IsUsed(i), stretches_);
+    if (segments_[i].segment->is_revised) {
+      segments_[i].segment->is_revised = false;
+    }
   }
 }
 
 std::size_t TileSurveys::bytes() const {
   std::size_t bytes = sizeof(*this) + settled_.bytes() +
-                      tile_.layers.capacity() * sizeof(TileLayer) +
-                      tile_.cell_begin.capacity() * sizeof(std::uint32_t);
+                      made_.tile.layers.capacity() * sizeof(TileLayer) +
+                      made_.tile.cell_begin.capacity() * sizeof(std::uint32_t) +
+                      made_.bands.capacity() * sizeof(std::int32_t);
   for (const TileStretch& stretch : stretches_) {
     bytes += stretch.bytes();
   }
@@ -285,7 +401,7 @@ void TileSurveys::Pack() {
       stretch.open->Pack();
     }
   }
-  tile_ = Tile();
+  made_ = BandedTile();
 }
 
 void TileSurveys::Unpack() {

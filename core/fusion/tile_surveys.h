@@ -18,6 +18,7 @@
 #include "core/base/bytes.h"
 #include "core/base/status.h"
 #include "core/fusion/combination/cell_combiner.h"
+#include "core/fusion/combination/cell_part.h"
 #include "core/fusion/fusion_context.h"
 #include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/settled_stretches.h"
@@ -54,6 +55,11 @@ class TileSurveys {
   static Result<TileSurveys> Load(ByteSpan bytes, const TileId& id, const MapProfile& profile);
 
  private:
+  struct BandedTile {
+    Tile tile;
+    std::vector<std::int32_t> bands;  // of a segment of each layer
+  };
+
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);
   std::vector<bool> FindStaying(std::span<PlannedStretch> wanted) const;
   void SurveyForgottenAgain(std::span<PlannedStretch> wanted) const;
@@ -65,7 +71,11 @@ class TileSurveys {
   std::int64_t LatestTime() const;
   bool IsToSettle(std::size_t place, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
-  void CombineCell(std::size_t cell, CellCombiner& combiner, std::vector<TileLayer>& out);
+  void CombineCell(std::size_t cell, CellCombiner& combiner, BandedTile& out);
+  bool CombinePart(std::size_t cell, CellCombiner& combiner, BandedTile& out);
+  void CopyCell(std::size_t cell, BandedTile& out) const;
+  void CollectPlainly(std::size_t cell, std::int32_t band_mm);
+  void SetCombined(const CellCombiner& combiner);
 
   TileId id_;
   std::uint32_t expected_count_ = 0;    // calls of Expect()
@@ -74,10 +84,12 @@ class TileSurveys {
   SettledStretches settled_;
   std::vector<std::uint32_t> open_;     // places of the stretches that are
   std::vector<std::uint32_t> awaited_;  // those of the frames that must be added, last first
-  Tile tile_;                           // without cells: there is none
+  BandedTile made_;                     // without cells: there is none
   bool is_packed_ = false;
   CellSet touched_;                    // cells that changed since it was made
   std::vector<SegmentView> segments_;  // of a cell
+  std::vector<CellSegment> plain_;     // of a cell, all of them
+  std::vector<TileLayer> layers_;      // of a part of a cell
 };
 
 static_assert(std::is_nothrow_move_constructible_v<TileSurveys>);  // vectors copy others

@@ -9,10 +9,12 @@
 
 namespace atlas {
 
-void CellLayerBuilder::Build(std::span<const SegmentView> segments) {
+void CellLayerBuilder::Build(std::span<const SegmentView> segments, bool has_other_strong) {
+  const auto is_strong = [](const SegmentView& s) {
+    return s.segment->is_strong;
+  };
   all_make_ = profile_.preset == FusionPreset::kPaper ||
-              std::none_of(segments.begin(), segments.end(),
-                           [](const SegmentView& s) { return s.segment->is_strong; });
+              (!has_other_strong && std::none_of(segments.begin(), segments.end(), is_strong));
   LabelMakers(segments);
   Sum(segments);
   Publish();
@@ -47,6 +49,10 @@ void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
       lowest_mm = std::min(lowest_mm, segments[i].segment->altitude_mm);
       highest_mm = std::max(highest_mm, segments[i].segment->altitude_mm);
     }
+  }
+  if (makers_.empty()) {  // of a part of a cell
+    sums_.clear();
+    return;
   }
   const std::int64_t always_mm = profile_.preset == FusionPreset::kPaper
                                      ? 0
@@ -139,8 +145,8 @@ void CellLayerBuilder::Publish() {
   layers_.clear();
   for (const std::uint32_t index : published_) {
     const LayerSums& sums = sums_[index];
-    layers_.push_back({sums.altitude_mm, sigmas_.SigmaOfWeight100um(sums.weight), sums.is_measured,
-                       sums.observations, sums.last_time_ms});
+    layers_.push_back({sums.altitude_mm, sums.reference_mm, sigmas_.SigmaOfWeight100um(sums.weight),
+                       sums.is_measured, sums.observations, sums.last_time_ms});
   }
 }
 

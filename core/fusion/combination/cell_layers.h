@@ -17,6 +17,7 @@ inline constexpr std::int64_t kVehicleWeightCap = 64 * kUnitWeight;
 
 struct CellLayer {
   std::int32_t altitude_mm = 0;
+  std::int32_t reference_mm = 0;  // the altitude of one of its segments
   std::uint16_t sigma_100um = 0;
   bool is_measured = false;        // by at least one strong observation
   std::uint32_t observations = 0;  // that belong to it
@@ -32,9 +33,10 @@ class CellLayerBuilder {
   CellLayerBuilder(const SigmaTable& sigmas, const MapProfile& profile)
       : sigmas_(sigmas), profile_(profile) {}
 
-  // Segments in canonical order. Their layers, lowest first and at most kMaxCellLayers, and for
-  // each segment its layer or kNoLayer are then in layers() and labels().
-  void Build(std::span<const SegmentView> segments);
+  // Segments in canonical order, and whether the cell has strong ones besides. Their layers, lowest
+  // first and at most kMaxCellLayers, and for each segment its layer or kNoLayer are then in
+  // layers() and labels().
+  void Build(std::span<const SegmentView> segments, bool has_other_strong);
 
   std::span<const CellLayer> layers() const { return layers_; }
   std::span<const std::uint32_t> labels() const { return labels_; }

@@ -29,8 +29,9 @@ std::uint32_t SecondsOf(std::int64_t time_ms) {
 void EvidenceFolder::Fold(std::span<const SegmentView> segments,
                           std::span<const std::uint32_t> labels,
                           std::span<const CellLayer> layers,
+                          const std::int32_t* above_mm,
                           std::vector<TileLayer>& out) {
-  Begin(layers);
+  Begin(layers, above_mm);
   SortByTime(segments);
   const FoldClamp clamp{static_cast<std::int8_t>(profile_.stretch_clamp),
                         static_cast<std::int8_t>(profile_.carry_clamp),
@@ -61,11 +62,11 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
   }
 }
 
-void EvidenceFolder::Begin(std::span<const CellLayer> layers) {
+void EvidenceFolder::Begin(std::span<const CellLayer> layers, const std::int32_t* above_mm) {
   sums_.clear();
   drives_.Clear();
   for (std::size_t i = 0; i < layers.size(); ++i) {
-    const std::int32_t* above = i + 1 < layers.size() ? &layers[i + 1].altitude_mm : nullptr;
+    const std::int32_t* above = i + 1 < layers.size() ? &layers[i + 1].altitude_mm : above_mm;
     sums_.push_back({ColumnSpanOf(layers[i].altitude_mm, above, profile_), 0, {}});
   }
 }

@@ -22,11 +22,12 @@ class EvidenceFolder {
   // `profile` must outlive the folder.
   explicit EvidenceFolder(const MapProfile& profile) : profile_(profile), drives_(profile) {}
 
-  // Appends the cell's layers to `out`, complete. Segments in canonical order with the layer of
-  // each, or kNoLayer.
+  // Appends the layers to `out`, complete. Segments in canonical order with the layer of each, or
+  // kNoLayer; `above_mm`: the altitude of the cell's next layer above these, or null.
   void Fold(std::span<const SegmentView> segments,
             std::span<const std::uint32_t> labels,
             std::span<const CellLayer> layers,
+            const std::int32_t* above_mm,
             std::vector<TileLayer>& out);
 
  private:
@@ -37,7 +38,7 @@ class EvidenceFolder {
     ColumnSum column;
   };
 
-  void Begin(std::span<const CellLayer> layers);
+  void Begin(std::span<const CellLayer> layers, const std::int32_t* above_mm);
   void SortByTime(std::span<const SegmentView> segments);
   // Whether what the segment says of occupancy is about this layer: it measured it, or guessed it
   // right.

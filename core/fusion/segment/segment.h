@@ -30,6 +30,7 @@ struct alignas(64) Segment {
   AltitudeSource source : 2 = AltitudeSource::kNone;  // the representative's
   bool is_strong : 1 = false;                         // some altitude was measured or interpolated
   bool is_used : 1 = false;                           // it was part of a layer when combined last
+  bool is_revised : 1 = false;                        // it has changed since then
   ColumnLanes column{};
 };
 static_assert(sizeof(Segment) == 64);  // one line of a cache: it is read for every observation

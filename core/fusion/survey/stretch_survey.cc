@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/fusion/segment/segment_view.h"
 #include "core/fusion/survey/packed_arrays.h"
 #include "core/tile/column_lattice.h"
 #include "core/tile/layer_association.h"
@@ -28,7 +29,8 @@ StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
              static_cast<std::int8_t>(profile.driven_clamp)},
       occupancy_units_{0, profile.miss_units, profile.hit_units},
       heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone),
-      touched_(heads_.size()) {}
+      touched_(heads_.size()),
+      reshaped_(heads_.size()) {}
 
 StretchSurvey::StretchSurvey(const TileBand& band,
                              const MapProfile& profile,
@@ -111,10 +113,16 @@ void StretchSurvey::Join(std::size_t cell,
   const Match match = Find(cell, observation.altitude_mm, observation.is_strong());
   if (!IsOneLayer(observation, match, sigmas) && match.alike < kMaxCellSegments) {
     AddSegment(cell, observation, observation.is_strong());
+    reshaped_.Insert(cell);
   } else {
     MoveToFront(cell, match);
-    if (observation.distance_step < segments_[match.segment].distance_step) {
-      SetRepresentative(observation, segments_[match.segment]);  // of two equally near the first
+    Segment& segment = segments_[match.segment];
+    if (observation.distance_step < segment.distance_step) {
+      const std::int32_t band = BandOf(segment.altitude_mm, profile_.band_mm);
+      SetRepresentative(observation, segment);  // of two equally near the first
+      if (BandOf(segment.altitude_mm, profile_.band_mm) != band) {
+        reshaped_.Insert(cell);
+      }
     }
   }
   AddEvidence(observation, sigmas.Weight(observation.source, observation.distance_step), frame,
@@ -216,6 +224,7 @@ void StretchSurvey::AddEvidence(const Observation& observation,
                                 std::uint32_t frame,
                                 std::uint32_t index) {
   Segment& segment = segments_[index];
+  segment.is_revised = true;
   segment.weight += weight;
   segment.moment += weight * (observation.altitude_mm - segment.reference_mm);
   if (segment.observations < std::numeric_limits<std::uint16_t>::max()) {

@@ -73,9 +73,14 @@ class StretchSurvey {
   std::uint32_t First(std::size_t cell) const { return heads_[cell]; }
   Segment& At(std::uint32_t segment) { return segments_[segment]; }
 
-  // Cells that were observed since these were cleared last.
+  // Cells that were observed since these were cleared last, and those of them where a segment came
+  // or went to another band of altitude. The segments that changed are revised.
   const CellSet& touched() const { return touched_; }
-  void ClearTouched() { touched_.Clear(); }
+  const CellSet& reshaped() const { return reshaped_; }
+  void ClearTouched() {
+    touched_.Clear();
+    reshaped_.Clear();
+  }
   // Inserts the cells that have segments.
   void FindCells(CellSet& cells) const;
 
@@ -111,6 +116,7 @@ class StretchSurvey {
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;
   CellSet touched_;
+  CellSet reshaped_;
   Bytes packed_;  // heads_ and segments_, if not empty
 };
 
