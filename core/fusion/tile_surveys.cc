@@ -204,18 +204,16 @@ void TileSurveys::Settle(const MapProfile& profile) {
 
 const Tile& TileSurveys::Combine(const FusionContext& context) {
   assert(awaited_.empty());
-  const bool have_parts = HaveParts(context.profile);
-  CellSet revised(made_.tile.cell_begin.size() - 1);  // where segments changed, each in its band
+  CellSet revised(made_.tile.cell_begin.size() - 1);  // where only segments are
   for (const std::uint32_t i : open_) {
     StretchSurvey& survey = *stretches_[i].open;
-    touched_.InsertAll(have_parts ? survey.reshaped() : survey.touched());
     revised.InsertAll(survey.touched());
     survey.ClearTouched();
   }
   CellCombiner combiner(context.sigmas, context.profile);
-  BandedTile made{EmptyTile(id_, context.profile), {}};
+  MadeTile made{EmptyTile(id_, context.profile), {}};
   made.tile.layers.reserve(made_.tile.layers.size());
-  made.bands.reserve(made_.bands.size());
+  made.references_mm.reserve(made_.references_mm.size());
   for (std::size_t cell = 0; cell + 1 < made.tile.cell_begin.size(); ++cell) {
     if (touched_.Contains(cell)) {
       CombineCell(cell, combiner, made);
@@ -238,14 +236,15 @@ const Tile& TileSurveys::Combine(const FusionContext& context) {
   return made_.tile;
 }
 
-void TileSurveys::CopyCell(std::size_t cell, BandedTile& out) const {
+void TileSurveys::CopyCell(std::size_t cell, MadeTile& out) const {
   const auto layers = made_.tile.Layers(cell);
-  const auto bands = std::span(made_.bands).subspan(made_.tile.cell_begin[cell], layers.size());
+  const auto references_mm =
+      std::span(made_.references_mm).subspan(made_.tile.cell_begin[cell], layers.size());
   out.tile.layers.insert(out.tile.layers.end(), layers.begin(), layers.end());
-  out.bands.insert(out.bands.end(), bands.begin(), bands.end());
+  out.references_mm.insert(out.references_mm.end(), references_mm.begin(), references_mm.end());
 }
 
-void TileSurveys::CombineCell(std::size_t cell, CellCombiner& combiner, BandedTile& out) {
+void TileSurveys::CombineCell(std::size_t cell, CellCombiner& combiner, MadeTile& out) {
   segments_.clear();
   settled_.Collect(cell, stretches_, segments_);
   for (const std::uint32_t place : open_) {
@@ -257,38 +256,40 @@ void TileSurveys::CombineCell(std::size_t cell, CellCombiner& combiner, BandedTi
   SortByStretch(segments_);
   combiner.Combine(segments_, {}, out.tile.layers);
   for (const CellLayer& layer : combiner.layers()) {
-    out.bands.push_back(BandOf(layer.reference_mm, combiner.profile().band_mm));
+    out.references_mm.push_back(layer.reference_mm);
   }
   SetCombined(combiner);
 }
 
 // Combines only the part of the cell that the revised segments are in, and copies the others'
-// layers. False, and nothing is done, where it can reach further: a layer's altitude, the mean of
-// what was seen, is not where its segments are; there are as many layers as a cell may have; or the
-// column below ends elsewhere.
-bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, BandedTile& out) {
+// layers. False, and nothing is done, where it is all of it, or can reach further: a layer's
+// altitude, the mean of what was seen, is far from its segments; there are as many layers as a cell
+// may have; the column below ends elsewhere; or nothing was measured elsewhere in the cell, so that
+// guesses may or may not count there.
+bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, MadeTile& out) {
   const MapProfile& profile = combiner.profile();
-  const std::int32_t band_mm = profile.band_mm;
-  CollectPlainly(cell, band_mm);
-  const CellPart part = FindRevisedPart(plain_);
   const auto layers = made_.tile.Layers(cell);
-  const auto bands = std::span(made_.bands).subspan(made_.tile.cell_begin[cell], layers.size());
+  if (layers.size() < 2) {
+    return false;
+  }
+  CollectPlainly(cell);
+  const CellPart part = FindRevisedPart(plain_, PartReach(profile));
+  const auto references_mm =
+      std::span(made_.references_mm).subspan(made_.tile.cell_begin[cell], layers.size());
   std::size_t begin = 0;
-  while (begin < layers.size() && bands[begin] < part.lowest) {
+  while (begin < layers.size() && references_mm[begin] < part.lowest_mm) {
     ++begin;
   }
   std::size_t end = begin;
-  while (end < layers.size() && part.Contains(bands[end])) {
+  while (end < layers.size() && part.Contains(references_mm[end])) {
     ++end;
   }
-  const auto is_inside = [&](const TileLayer& layer) {
-    return part.Contains(BandOf(layer.altitude_mm, band_mm));
-  };
   for (std::size_t i = 0; i < layers.size(); ++i) {
-    const std::int32_t band = BandOf(layers[i].altitude_mm, band_mm);
-    const bool is_at_home = i < begin ? band < part.lowest - 1
-                            : i < end ? is_inside(layers[i])
-                                      : std::min(band - 1, bands[i]) > part.highest;
+    const std::int64_t altitude_mm = layers[i].altitude_mm;
+    const bool is_at_home = i < begin ? altitude_mm <= part.lowest_mm - profile.other_layer_mm
+                            : i < end ? part.IsNear(altitude_mm)
+                                      : altitude_mm >= part.highest_mm + profile.other_layer_mm &&
+                                            references_mm[i] > part.highest_mm;
     if (!is_at_home) {
       return false;
     }
@@ -296,11 +297,14 @@ bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, BandedTi
   CellCombiner::Others others;
   segments_.clear();
   for (const CellSegment& s : plain_) {
-    if (part.Contains(s.band)) {
+    if (part.Contains(s.segment->altitude_mm)) {
       segments_.push_back(ViewOf(*s.segment, s.stretch, stretches_));
     } else {
       others.has_strong |= s.segment->is_strong;
     }
+  }
+  if (!others.has_strong) {
+    return false;
   }
   SortByStretch(segments_);
   others.above_mm = end < layers.size() ? &layers[end].altitude_mm : nullptr;
@@ -308,7 +312,8 @@ bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, BandedTi
   combiner.Combine(segments_, others, layers_);
   const std::size_t count = begin + layers_.size() + layers.size() - end;
   if (count >= kMaxCellLayers || layers.size() >= kMaxCellLayers ||
-      !std::all_of(layers_.begin(), layers_.end(), is_inside)) {
+      !std::all_of(layers_.begin(), layers_.end(),
+                   [&](const TileLayer& layer) { return part.IsNear(layer.altitude_mm); })) {
     return false;
   }
   if (begin > 0) {
@@ -323,13 +328,13 @@ bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, BandedTi
   const auto copy = [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       out.tile.layers.push_back(layers[i]);
-      out.bands.push_back(bands[i]);
+      out.references_mm.push_back(references_mm[i]);
     }
   };
   copy(0, begin);
   out.tile.layers.insert(out.tile.layers.end(), layers_.begin(), layers_.end());
   for (const CellLayer& layer : combiner.layers()) {
-    out.bands.push_back(BandOf(layer.reference_mm, band_mm));
+    out.references_mm.push_back(layer.reference_mm);
   }
   copy(end, layers.size());
   SetCombined(combiner);
@@ -337,20 +342,17 @@ bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, BandedTi
 }
 
 // All segments of a cell into plain_.
-void TileSurveys::CollectPlainly(std::size_t cell, std::int32_t band_mm) {
+void TileSurveys::CollectPlainly(std::size_t cell) {
   plain_.clear();
-  const auto add = [&](Segment& segment, std::uint32_t place) {
-    plain_.push_back({&segment, place, BandOf(segment.altitude_mm, band_mm)});
-  };
   const std::span settled = settled_.Segments(cell);
   const std::span places = settled_.Places(cell);
   for (std::size_t i = 0; i < settled.size(); ++i) {
-    add(settled[i], places[i]);
+    plain_.push_back({&settled[i], places[i], settled[i].altitude_mm});
   }
   for (const std::uint32_t place : open_) {
     StretchSurvey& open = *stretches_[place].open;
     for (std::uint32_t i = open.First(cell); i != Segment::kNone; i = open.At(i).next) {
-      add(open.At(i), place);
+      plain_.push_back({&open.At(i), place, open.CombinedAltitude(i)});
     }
   }
 }
@@ -360,7 +362,7 @@ void TileSurveys::SetCombined(const CellCombiner& combiner) {
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     SetUsed(segments_[i], combiner.IsUsed(i), stretches_);
     if (segments_[i].segment->is_revised) {
-      segments_[i].segment->is_revised = false;
+      stretches_[segments_[i].stretch].open->SetCombined(*segments_[i].segment);
     }
   }
 }
@@ -369,7 +371,7 @@ std::size_t TileSurveys::bytes() const {
   std::size_t bytes = sizeof(*this) + settled_.bytes() +
                       made_.tile.layers.capacity() * sizeof(TileLayer) +
                       made_.tile.cell_begin.capacity() * sizeof(std::uint32_t) +
-                      made_.bands.capacity() * sizeof(std::int32_t);
+                      made_.references_mm.capacity() * sizeof(std::int32_t);
   for (const TileStretch& stretch : stretches_) {
     bytes += stretch.bytes();
   }
@@ -401,7 +403,7 @@ void TileSurveys::Pack() {
       stretch.open->Pack();
     }
   }
-  made_ = BandedTile();
+  made_ = MadeTile();
 }
 
 void TileSurveys::Unpack() {

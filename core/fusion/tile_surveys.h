@@ -55,9 +55,9 @@ class TileSurveys {
   static Result<TileSurveys> Load(ByteSpan bytes, const TileId& id, const MapProfile& profile);
 
  private:
-  struct BandedTile {
+  struct MadeTile {
     Tile tile;
-    std::vector<std::int32_t> bands;  // of a segment of each layer
+    std::vector<std::int32_t> references_mm;  // the altitude of a segment of each layer
   };
 
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);
@@ -71,10 +71,10 @@ class TileSurveys {
   std::int64_t LatestTime() const;
   bool IsToSettle(std::size_t place, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
-  void CombineCell(std::size_t cell, CellCombiner& combiner, BandedTile& out);
-  bool CombinePart(std::size_t cell, CellCombiner& combiner, BandedTile& out);
-  void CopyCell(std::size_t cell, BandedTile& out) const;
-  void CollectPlainly(std::size_t cell, std::int32_t band_mm);
+  void CombineCell(std::size_t cell, CellCombiner& combiner, MadeTile& out);
+  bool CombinePart(std::size_t cell, CellCombiner& combiner, MadeTile& out);
+  void CopyCell(std::size_t cell, MadeTile& out) const;
+  void CollectPlainly(std::size_t cell);
   void SetCombined(const CellCombiner& combiner);
 
   TileId id_;
@@ -84,7 +84,7 @@ class TileSurveys {
   SettledStretches settled_;
   std::vector<std::uint32_t> open_;     // places of the stretches that are
   std::vector<std::uint32_t> awaited_;  // those of the frames that must be added, last first
-  BandedTile made_;                     // without cells: there is none
+  MadeTile made_;                       // without cells: there is none
   bool is_packed_ = false;
   CellSet touched_;                    // cells that changed since it was made
   std::vector<SegmentView> segments_;  // of a cell

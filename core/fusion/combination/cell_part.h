@@ -1,9 +1,9 @@
-// The part of a cell that a change of some of its segments can reach: the bands of altitude that
-// segments are in, up to the next empty one to either side.
+// The part of a cell that a change of some of its segments can reach: the altitudes where they are
+// and were when they were combined last, and all segments that lie no further from them, or from
+// one another, than segments have to do with each other.
 //
-// A band is at least as high as the distance from which on two altitudes are never of one layer:
-// across an empty one no segment is chained, adopted, chosen or kept out because of another. What
-// is left to look at is the layer below, whose column ends at the one above it.
+// Within that reach they may be chained to one layer, adopted, or chosen instead of each other.
+// What is left to look at is the layer below, whose column ends at the one above it.
 #pragma once
 
 #include <algorithm>
@@ -18,41 +18,55 @@ namespace atlas {
 // A segment of a cell, not looked at any closer yet.
 struct CellSegment {
   Segment* segment = nullptr;
-  std::uint32_t stretch = 0;  // its place
-  std::int32_t band = 0;
+  std::uint32_t stretch = 0;     // its place
+  std::int32_t combined_mm = 0;  // its altitude when it was combined last
 };
 
+// From the lowest to the highest of its segments; altitudes in mm.
 struct CellPart {
-  std::int32_t lowest = 1;  // bands
-  std::int32_t highest = 0;
+  // A layer's altitude is the mean of what was seen, not where one of its segments is.
+  static constexpr std::int64_t kMargin_mm = 500;
 
-  bool is_empty() const { return lowest > highest; }
-  bool Contains(std::int32_t band) const { return lowest <= band && band <= highest; }
+  std::int64_t lowest_mm = 0;
+  std::int64_t highest_mm = -1;
 
-  void Add(std::int32_t band) {
-    *this = is_empty() ? CellPart{band, band}
-                       : CellPart{std::min(lowest, band), std::max(highest, band)};
+  bool is_empty() const { return lowest_mm > highest_mm; }
+  bool Contains(std::int64_t altitude_mm) const {
+    return lowest_mm <= altitude_mm && altitude_mm <= highest_mm;
+  }
+  // Whether a layer there is where one of the part's should be.
+  bool IsNear(std::int64_t altitude_mm) const {
+    return lowest_mm - kMargin_mm <= altitude_mm && altitude_mm <= highest_mm + kMargin_mm;
+  }
+  void Add(std::int64_t altitude_mm) {
+    *this = is_empty()
+                ? CellPart{altitude_mm, altitude_mm}
+                : CellPart{std::min(lowest_mm, altitude_mm), std::max(highest_mm, altitude_mm)};
   }
 };
 
-// Whether the cells of such a map have parts.
-inline bool HaveParts(const MapProfile& profile) {
-  return profile.band_mm >= profile.other_layer_mm && profile.preset != FusionPreset::kPaper;
+// How near to each other segments have to do with each other, and a segment with a layer of which
+// none is further than the margin.
+inline std::int64_t PartReach(const MapProfile& profile) {
+  return std::max<std::int64_t>(profile.other_layer_mm + CellPart::kMargin_mm, profile.band_mm);
 }
 
 // Around all that are revised; empty if none is.
-inline CellPart FindRevisedPart(std::span<const CellSegment> segments) {
+inline CellPart FindRevisedPart(std::span<const CellSegment> segments, std::int64_t reach_mm) {
   CellPart part;
   for (const CellSegment& s : segments) {
     if (s.segment->is_revised) {
-      part.Add(s.band);
+      part.Add(s.segment->altitude_mm);
+      part.Add(s.combined_mm);
     }
   }
   for (bool grows = !part.is_empty(); grows;) {
     grows = false;
     for (const CellSegment& s : segments) {
-      if (s.band == part.lowest - 1 || s.band == part.highest + 1) {
-        part.Add(s.band);
+      const std::int64_t altitude_mm = s.segment->altitude_mm;
+      if (!part.Contains(altitude_mm) && part.lowest_mm - reach_mm < altitude_mm &&
+          altitude_mm < part.highest_mm + reach_mm) {
+        part.Add(altitude_mm);
         grows = true;
       }
     }

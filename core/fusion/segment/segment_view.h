@@ -25,13 +25,10 @@ inline bool WasSeenEarlier(const SegmentView& a, const SegmentView& b) {
                                 : a.segment->last_frame < b.segment->last_frame;
 }
 
-// floor(altitude / band_mm): the band of an altitude, in 32 bits since it is asked of every
-// segment.
-inline std::int32_t BandOf(std::int32_t altitude_mm, std::int32_t band_mm) {
-  return altitude_mm / band_mm - (altitude_mm % band_mm < 0 ? 1 : 0);
-}
+// floor(altitude / band_mm): its band of altitude, in 32 bits since it is asked of every segment.
 inline std::int32_t BandOf(const SegmentView& view, std::int32_t band_mm) {
-  return BandOf(view.segment->altitude_mm, band_mm);
+  const std::int32_t altitude_mm = view.segment->altitude_mm;
+  return altitude_mm / band_mm - (altitude_mm % band_mm < 0 ? 1 : 0);
 }
 
 }  // namespace atlas

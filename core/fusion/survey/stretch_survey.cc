@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "core/fusion/segment/segment_view.h"
 #include "core/fusion/survey/packed_arrays.h"
 #include "core/tile/column_lattice.h"
 #include "core/tile/layer_association.h"
@@ -29,8 +28,7 @@ StretchSurvey::StretchSurvey(const TileBand& band, const MapProfile& profile)
              static_cast<std::int8_t>(profile.driven_clamp)},
       occupancy_units_{0, profile.miss_units, profile.hit_units},
       heads_(static_cast<std::size_t>(band.rows) * profile.tile_cells, Segment::kNone),
-      touched_(heads_.size()),
-      reshaped_(heads_.size()) {}
+      touched_(heads_.size()) {}
 
 StretchSurvey::StretchSurvey(const TileBand& band,
                              const MapProfile& profile,
@@ -44,7 +42,7 @@ StretchSurvey::StretchSurvey(const TileBand& band,
 std::size_t StretchSurvey::bytes() const {
   return sizeof(*this) + frames_.capacity() * sizeof(StretchFrame) +
          heads_.capacity() * sizeof(std::uint32_t) + segments_.capacity() * sizeof(Segment) +
-         packed_.capacity();
+         combined_mm_.capacity() * sizeof(std::int32_t) + packed_.capacity();
 }
 
 void StretchSurvey::FindCells(CellSet& cells) const {
@@ -65,12 +63,15 @@ void StretchSurvey::Pack() {
   }
   heads_ = std::vector<std::uint32_t>();
   segments_ = std::vector<Segment>();
+  combined_mm_ = std::vector<std::int32_t>();
 }
 
 void StretchSurvey::Unpack() {
   UnpackArrays(packed_, heads_, segments_);
+  combined_mm_.clear();
   for (Segment& segment : segments_) {
     segment.is_used = false;
+    combined_mm_.push_back(segment.altitude_mm);
   }
 }
 
@@ -113,16 +114,10 @@ void StretchSurvey::Join(std::size_t cell,
   const Match match = Find(cell, observation.altitude_mm, observation.is_strong());
   if (!IsOneLayer(observation, match, sigmas) && match.alike < kMaxCellSegments) {
     AddSegment(cell, observation, observation.is_strong());
-    reshaped_.Insert(cell);
   } else {
     MoveToFront(cell, match);
-    Segment& segment = segments_[match.segment];
-    if (observation.distance_step < segment.distance_step) {
-      const std::int32_t band = BandOf(segment.altitude_mm, profile_.band_mm);
-      SetRepresentative(observation, segment);  // of two equally near the first
-      if (BandOf(segment.altitude_mm, profile_.band_mm) != band) {
-        reshaped_.Insert(cell);
-      }
+    if (observation.distance_step < segments_[match.segment].distance_step) {
+      SetRepresentative(observation, segments_[match.segment]);  // of two equally near the first
     }
   }
   AddEvidence(observation, sigmas.Weight(observation.source, observation.distance_step), frame,
@@ -194,6 +189,7 @@ std::uint32_t StretchSurvey::AddSegment(std::size_t cell,
 std::uint32_t StretchSurvey::AddSegment(std::size_t cell, const Segment& segment) {
   const auto index = static_cast<std::uint32_t>(segments_.size());
   segments_.push_back(segment);
+  combined_mm_.push_back(segment.altitude_mm);
   segments_.back().next = heads_[cell];
   heads_[cell] = index;
   return index;

@@ -73,13 +73,15 @@ class StretchSurvey {
   std::uint32_t First(std::size_t cell) const { return heads_[cell]; }
   Segment& At(std::uint32_t segment) { return segments_[segment]; }
 
-  // Cells that were observed since these were cleared last, and those of them where a segment came
-  // or went to another band of altitude. The segments that changed are revised.
+  // Cells that were observed since these were cleared last. The segments that changed are revised.
   const CellSet& touched() const { return touched_; }
-  const CellSet& reshaped() const { return reshaped_; }
-  void ClearTouched() {
-    touched_.Clear();
-    reshaped_.Clear();
+  void ClearTouched() { touched_.Clear(); }
+  // The altitude of a segment when it was combined last, or when it was made.
+  std::int32_t CombinedAltitude(std::uint32_t segment) const { return combined_mm_[segment]; }
+  // A revised segment of this survey was combined.
+  void SetCombined(Segment& segment) {
+    segment.is_revised = false;
+    combined_mm_[static_cast<std::size_t>(&segment - segments_.data())] = segment.altitude_mm;
   }
   // Inserts the cells that have segments.
   void FindCells(CellSet& cells) const;
@@ -115,8 +117,8 @@ class StretchSurvey {
   std::vector<StretchFrame> frames_;
   std::vector<std::uint32_t> heads_;  // by cell of the band
   std::vector<Segment> segments_;
+  std::vector<std::int32_t> combined_mm_;  // of each
   CellSet touched_;
-  CellSet reshaped_;
   Bytes packed_;  // heads_ and segments_, if not empty
 };
 

@@ -3,6 +3,8 @@
 #include "core/fusion/tile_surveys.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <map>
 #include <random>
 #include <string>
@@ -185,6 +187,67 @@ TEST(TileSurveysTest, ACorrectionAmongManyPassesCostsOneStretch) {
           keyframes[pass * kFrames + i].placement.x_um += moved_um;
         }
         EXPECT_EQ(tile.Update(keyframes), kFrames) << vehicles << " vehicles, pass " << pass;
+      }
+    }
+  }
+}
+
+// Decks whose drives wander up and down, past each other: what is one layer now is two then, and a
+// layer's altitude is far from that of the segments that it is made of.
+TEST(TileSurveysTest, FollowDecksThatWander) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(30); ++seed) {
+    MapProfile profile = DrivesProfile(0);
+    profile.preset = seed % 2 == 0 ? FusionPreset::kBounded : FusionPreset::kStrict;
+    std::mt19937 random(seed);
+    const auto below = [&](std::int64_t n) {
+      return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(n));
+    };
+    KeptTile tile(profile);
+    std::vector<PlacedKeyframe> keyframes;
+    std::array<std::int64_t, 4> deck_um = {0, 3'200'000, 6'400'000, 9'600'000};
+    for (std::uint32_t i = 0; i < 60; ++i) {
+      const auto deck = static_cast<std::size_t>(below(4));
+      deck_um[deck] += below(900'000) - (seed % 3 == 0 ? 100'000 : 450'000);
+      keyframes.push_back(testing::PlacedFrame(
+          {"car", StrCat("deck", deck), i},
+          {0.1 * static_cast<double>(below(16)), 0.1 * static_cast<double>(below(16))},
+          random() % 3 == 0 ? testing::RandomKeyframe(profile, 12, i)
+                            : testing::StreetKeyframe(profile, 12, i)));
+      keyframes.back().placement.z_um += deck_um[deck];
+      tile.Update(keyframes);
+      if (::testing::Test::HasFailure()) {
+        FAIL() << "seed " << seed << ", step " << i;
+      }
+    }
+  }
+}
+
+// Ground that rises under a vehicle that comes nearer: its layer, the mean of what was seen, stays
+// behind, where guesses of others are taken for it.
+TEST(TileSurveysTest, FollowGroundThatRises) {
+  for (std::uint32_t seed = 0; seed < testing::Scaled(40); ++seed) {
+    MapProfile profile = DrivesProfile(0);
+    profile.preset = seed % 2 == 0 ? FusionPreset::kBounded : FusionPreset::kStrict;
+    std::mt19937 random(seed);
+    const auto below_m = [&](double limit_m) {
+      return limit_m * static_cast<double>(random() % 1'000) / 1'000.0;
+    };
+    KeptTile tile(profile);
+    std::vector<PlacedKeyframe> keyframes;
+    const auto see = [&](const std::string& session, const testing::MapPose& pose, bool is_street) {
+      const auto i = static_cast<std::uint32_t>(keyframes.size());
+      keyframes.push_back(testing::PlacedFrame({"car", session, i}, pose,
+                                               is_street
+                                                   ? testing::StreetKeyframe(profile, 16, 1)
+                                                   : testing::RandomKeyframe(profile, 16, i)));
+      tile.Update(keyframes);
+    };
+    see("deck", {0.8, 0.8, 12.0}, true);
+    for (int i = 0; i < 14; ++i) {
+      see("rising", {1.5 - 0.1 * i, 0.8, 0.45 * i}, true);
+      see("guessing", {below_m(1.6), below_m(1.6), below_m(6.0) - 1.0}, false);
+      if (::testing::Test::HasFailure()) {
+        FAIL() << "seed " << seed << ", step " << i;
       }
     }
   }
