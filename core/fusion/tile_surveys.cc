@@ -22,9 +22,9 @@ std::vector<FrameOnMap> TileSurveys::Expect(const TileChange& change,
   const MapProfile& profile = context.profile;
   assert(profile.preset != FusionPreset::kPaper);
   ++expected_count_;
-  if (made_.tile.cell_begin.empty()) {
-    made_ = {EmptyTile(id_, profile), {}};
-    touched_ = CellSet(made_.tile.cell_begin.size() - 1);
+  if (combined_.is_gone()) {
+    combined_.Begin(id_, profile);
+    touched_ = CellSet(combined_.tile().cell_begin.size() - 1);
     touched_.Fill();
   }
   Settle(profile);
@@ -204,174 +204,13 @@ void TileSurveys::Settle(const MapProfile& profile) {
 
 const Tile& TileSurveys::Combine(const FusionContext& context) {
   assert(awaited_.empty());
-  CellSet revised(made_.tile.cell_begin.size() - 1);  // where only segments are
-  for (const std::uint32_t i : open_) {
-    StretchSurvey& survey = *stretches_[i].open;
-    revised.InsertAll(survey.touched());
-    survey.ClearTouched();
-  }
-  CellCombiner combiner(context.sigmas, context.profile);
-  MadeTile made{EmptyTile(id_, context.profile), {}};
-  made.tile.layers.reserve(made_.tile.layers.size());
-  made.references_mm.reserve(made_.references_mm.size());
-  for (std::size_t cell = 0; cell + 1 < made.tile.cell_begin.size(); ++cell) {
-    if (touched_.Contains(cell)) {
-      CombineCell(cell, combiner, made);
-    } else if (!revised.Contains(cell)) {
-      CopyCell(cell, made);
-    } else if (!CombinePart(cell, combiner, made)) {
-      CombineCell(cell, combiner, made);
-    }
-    made.tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(made.tile.layers.size());
-  }
-  for (const TileStretch& stretch : stretches_) {
-    auto& contributors = made.tile.contributors;
-    const bool is_new = contributors.empty() || contributors.back() != stretch.key;
-    if (stretch.used > 0 && is_new) {
-      contributors.push_back(stretch.key);
-    }
-  }
-  made_ = std::move(made);
+  combined_.Update(touched_, {settled_, stretches_, open_}, context);
   touched_.Clear();
-  return made_.tile;
-}
-
-void TileSurveys::CopyCell(std::size_t cell, MadeTile& out) const {
-  const auto layers = made_.tile.Layers(cell);
-  const auto references_mm =
-      std::span(made_.references_mm).subspan(made_.tile.cell_begin[cell], layers.size());
-  out.tile.layers.insert(out.tile.layers.end(), layers.begin(), layers.end());
-  out.references_mm.insert(out.references_mm.end(), references_mm.begin(), references_mm.end());
-}
-
-void TileSurveys::CombineCell(std::size_t cell, CellCombiner& combiner, MadeTile& out) {
-  segments_.clear();
-  settled_.Collect(cell, stretches_, segments_);
-  for (const std::uint32_t place : open_) {
-    CollectOpen(cell, place, stretches_, segments_);
-  }
-  if (segments_.empty()) {
-    return;
-  }
-  SortByStretch(segments_);
-  combiner.Combine(segments_, {}, out.tile.layers);
-  for (const CellLayer& layer : combiner.layers()) {
-    out.references_mm.push_back(layer.reference_mm);
-  }
-  SetCombined(combiner);
-}
-
-// Combines only the part of the cell that the revised segments are in, and copies the others'
-// layers. False, and nothing is done, where it is all of it, or can reach further: a layer's
-// altitude, the mean of what was seen, is far from its segments; there are as many layers as a cell
-// may have; the column below ends elsewhere; or nothing was measured elsewhere in the cell, so that
-// guesses may or may not count there.
-bool TileSurveys::CombinePart(std::size_t cell, CellCombiner& combiner, MadeTile& out) {
-  const MapProfile& profile = combiner.profile();
-  const auto layers = made_.tile.Layers(cell);
-  if (layers.size() < 2) {
-    return false;
-  }
-  CollectPlainly(cell);
-  const CellPart part = FindRevisedPart(plain_, PartReach(profile));
-  const auto references_mm =
-      std::span(made_.references_mm).subspan(made_.tile.cell_begin[cell], layers.size());
-  std::size_t begin = 0;
-  while (begin < layers.size() && references_mm[begin] < part.lowest_mm) {
-    ++begin;
-  }
-  std::size_t end = begin;
-  while (end < layers.size() && part.Contains(references_mm[end])) {
-    ++end;
-  }
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    const std::int64_t altitude_mm = layers[i].altitude_mm;
-    const bool is_at_home = i < begin ? altitude_mm <= part.lowest_mm - profile.other_layer_mm
-                            : i < end ? part.IsNear(altitude_mm)
-                                      : altitude_mm >= part.highest_mm + profile.other_layer_mm &&
-                                            references_mm[i] > part.highest_mm;
-    if (!is_at_home) {
-      return false;
-    }
-  }
-  CellCombiner::Others others;
-  segments_.clear();
-  for (const CellSegment& s : plain_) {
-    if (part.Contains(s.segment->altitude_mm)) {
-      segments_.push_back(ViewOf(*s.segment, s.stretch, stretches_));
-    } else {
-      others.has_strong |= s.segment->is_strong;
-    }
-  }
-  if (!others.has_strong) {
-    return false;
-  }
-  SortByStretch(segments_);
-  others.above_mm = end < layers.size() ? &layers[end].altitude_mm : nullptr;
-  layers_.clear();
-  combiner.Combine(segments_, others, layers_);
-  const std::size_t count = begin + layers_.size() + layers.size() - end;
-  if (count >= kMaxCellLayers || layers.size() >= kMaxCellLayers ||
-      !std::all_of(layers_.begin(), layers_.end(),
-                   [&](const TileLayer& layer) { return part.IsNear(layer.altitude_mm); })) {
-    return false;
-  }
-  if (begin > 0) {
-    const std::int32_t below_mm = layers[begin - 1].altitude_mm;
-    const std::int32_t* was_mm = begin < layers.size() ? &layers[begin].altitude_mm : nullptr;
-    const std::int32_t* is_mm = layers_.empty() ? others.above_mm : &layers_[0].altitude_mm;
-    if (ColumnSpanOf(below_mm, was_mm, profile).mask !=
-        ColumnSpanOf(below_mm, is_mm, profile).mask) {
-      return false;
-    }
-  }
-  const auto copy = [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      out.tile.layers.push_back(layers[i]);
-      out.references_mm.push_back(references_mm[i]);
-    }
-  };
-  copy(0, begin);
-  out.tile.layers.insert(out.tile.layers.end(), layers_.begin(), layers_.end());
-  for (const CellLayer& layer : combiner.layers()) {
-    out.references_mm.push_back(layer.reference_mm);
-  }
-  copy(end, layers.size());
-  SetCombined(combiner);
-  return true;
-}
-
-// All segments of a cell into plain_.
-void TileSurveys::CollectPlainly(std::size_t cell) {
-  plain_.clear();
-  const std::span settled = settled_.Segments(cell);
-  const std::span places = settled_.Places(cell);
-  for (std::size_t i = 0; i < settled.size(); ++i) {
-    plain_.push_back({&settled[i], places[i], settled[i].altitude_mm});
-  }
-  for (const std::uint32_t place : open_) {
-    StretchSurvey& open = *stretches_[place].open;
-    for (std::uint32_t i = open.First(cell); i != Segment::kNone; i = open.At(i).next) {
-      plain_.push_back({&open.At(i), place, open.CombinedAltitude(i)});
-    }
-  }
-}
-
-// Notes of segments_ that they were.
-void TileSurveys::SetCombined(const CellCombiner& combiner) {
-  for (std::size_t i = 0; i < segments_.size(); ++i) {
-    SetUsed(segments_[i], combiner.IsUsed(i), stretches_);
-    if (segments_[i].segment->is_revised) {
-      stretches_[segments_[i].stretch].open->SetCombined(*segments_[i].segment);
-    }
-  }
+  return combined_.tile();
 }
 
 std::size_t TileSurveys::bytes() const {
-  std::size_t bytes = sizeof(*this) + settled_.bytes() +
-                      made_.tile.layers.capacity() * sizeof(TileLayer) +
-                      made_.tile.cell_begin.capacity() * sizeof(std::uint32_t) +
-                      made_.references_mm.capacity() * sizeof(std::int32_t);
+  std::size_t bytes = sizeof(*this) + settled_.bytes() + combined_.bytes();
   for (const TileStretch& stretch : stretches_) {
     bytes += stretch.bytes();
   }
@@ -403,7 +242,7 @@ void TileSurveys::Pack() {
       stretch.open->Pack();
     }
   }
-  made_ = MadeTile();
+  combined_.Clear();
 }
 
 void TileSurveys::Unpack() {

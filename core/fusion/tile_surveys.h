@@ -17,8 +17,7 @@
 
 #include "core/base/bytes.h"
 #include "core/base/status.h"
-#include "core/fusion/combination/cell_combiner.h"
-#include "core/fusion/combination/cell_part.h"
+#include "core/fusion/combined_tile.h"
 #include "core/fusion/fusion_context.h"
 #include "core/fusion/observation/frame_on_map.h"
 #include "core/fusion/settled_stretches.h"
@@ -55,11 +54,6 @@ class TileSurveys {
   static Result<TileSurveys> Load(ByteSpan bytes, const TileId& id, const MapProfile& profile);
 
  private:
-  struct MadeTile {
-    Tile tile;
-    std::vector<std::int32_t> references_mm;  // the altitude of a segment of each layer
-  };
-
   std::vector<PlannedStretch> Plan(const TileChange& change, const MapProfile& profile);
   std::vector<bool> FindStaying(std::span<PlannedStretch> wanted) const;
   void SurveyForgottenAgain(std::span<PlannedStretch> wanted) const;
@@ -71,11 +65,6 @@ class TileSurveys {
   std::int64_t LatestTime() const;
   bool IsToSettle(std::size_t place, std::int64_t latest_ms) const;
   void Settle(const MapProfile& profile);
-  void CombineCell(std::size_t cell, CellCombiner& combiner, MadeTile& out);
-  bool CombinePart(std::size_t cell, CellCombiner& combiner, MadeTile& out);
-  void CopyCell(std::size_t cell, MadeTile& out) const;
-  void CollectPlainly(std::size_t cell);
-  void SetCombined(const CellCombiner& combiner);
 
   TileId id_;
   std::uint32_t expected_count_ = 0;    // calls of Expect()
@@ -84,12 +73,9 @@ class TileSurveys {
   SettledStretches settled_;
   std::vector<std::uint32_t> open_;     // places of the stretches that are
   std::vector<std::uint32_t> awaited_;  // those of the frames that must be added, last first
-  MadeTile made_;                       // without cells: there is none
+  CombinedTile combined_;               // may be gone
+  CellSet touched_;                     // cells where more than segments changed since then
   bool is_packed_ = false;
-  CellSet touched_;                    // cells that changed since it was made
-  std::vector<SegmentView> segments_;  // of a cell
-  std::vector<CellSegment> plain_;     // of a cell, all of them
-  std::vector<TileLayer> layers_;      // of a part of a cell
 };
 
 static_assert(std::is_nothrow_move_constructible_v<TileSurveys>);  // vectors copy others
