@@ -21,4 +21,10 @@ void ReturnLargeBlocks() {
 #endif
 }
 
+void ReturnFreeMemory() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
+}
+
 }  // namespace atlas

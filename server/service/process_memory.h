@@ -12,5 +12,8 @@ std::uint64_t ResidentBytes();
 // surveys of tiles come and go, and what they leave free between others that stay would count as
 // occupied for ever.
 void ReturnLargeBlocks();
+// What is free between blocks that stay goes back as well. Takes milliseconds, and again some when
+// it is used the next time.
+void ReturnFreeMemory();
 
 }  // namespace atlas

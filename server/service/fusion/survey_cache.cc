@@ -2,7 +2,14 @@
 
 #include <utility>
 
+#include "server/service/process_memory.h"
+
 namespace atlas {
+namespace {
+
+constexpr std::size_t kMaxLeftFree = std::size_t{128} << 20;
+
+}  // namespace
 
 class SurveyCache::Work {
  public:
@@ -66,6 +73,7 @@ void SurveyCache::PutOn(Shelf& shelf, Entry entry) {
 void SurveyCache::Trim() {
   Lock lock(mutex_);
   while (auto oldest = plain_.TakeOldestAbove(limits_.plain_bytes)) {
+    left_free_ += oldest->kept.surveys.bytes();
     {
       const Work work(*this, *oldest, lock);
       oldest->kept.surveys.Pack();  // takes milliseconds
@@ -73,10 +81,16 @@ void SurveyCache::Trim() {
     PutOn(packed_, *std::move(oldest));
   }
   while (const auto oldest = packed_.TakeOldestAbove(limits_.packed_bytes)) {
+    left_free_ += oldest->kept.surveys.bytes();
     const Work work(*this, *oldest, lock);
     if (!files_.Has(oldest->kept)) {
       files_.Write(oldest->kept);
     }
+  }
+  if (left_free_ > kMaxLeftFree) {
+    left_free_ = 0;
+    lock.unlock();
+    ReturnFreeMemory();
   }
 }
 

@@ -37,7 +37,8 @@ class SurveyCache {
   std::optional<KeptSurveys> Take(const TileId& id);
   // Of two of a tile, those of the later revision stay. There may be too many until Trim().
   void Put(KeptSurveys kept);
-  // Compresses what is too much as it is, then writes what is too much compressed.
+  // Compresses what is too much as it is, then writes what is too much compressed. Now and then
+  // what that left free goes back to the system: the next ones do not fit where these were.
   void Trim();
   // Writes one of those that were not used for a while and are not on disk as they are. False:
   // there is none, or it could not be. So a process that is killed loses little.
@@ -68,6 +69,7 @@ class SurveyCache {
   std::unordered_set<std::uint64_t> at_work_;
   Shelf plain_;
   Shelf packed_;
+  std::size_t left_free_ = 0;  // bytes, since they went back last
 };
 
 }  // namespace atlas
