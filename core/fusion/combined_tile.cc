@@ -96,8 +96,11 @@ bool CombinedTile::CombinePart(std::size_t cell,
   if (layers.size() < 2) {
     return false;
   }
-  CollectPlainly(cell, from);
-  const CellPart part = FindRevisedPart(plain_, PartReach(profile));
+  const CellPart revised = CollectPlainly(cell, from);
+  if (revised.is_empty()) {
+    return false;
+  }
+  const CellPart part = Grow(revised, plain_, PartReach(profile));
   const auto references_mm = References(cell);
   std::size_t begin = 0;
   while (begin < layers.size() && references_mm[begin] < part.lowest_mm) {
@@ -120,7 +123,7 @@ bool CombinedTile::CombinePart(std::size_t cell,
   CellCombiner::Others others;
   segments_.clear();
   for (const CellSegment& s : plain_) {
-    if (part.Contains(s.segment->altitude_mm)) {
+    if (part.Contains(s.altitude_mm)) {
       segments_.push_back(ViewOf(*s.segment, s.stretch, from.stretches));
     } else {
       others.has_strong |= s.segment->is_strong;
@@ -164,20 +167,27 @@ bool CombinedTile::CombinePart(std::size_t cell,
   return true;
 }
 
-// All segments of a cell into plain_.
-void CombinedTile::CollectPlainly(std::size_t cell, const TileSegments& from) {
+// All segments of a cell into plain_. Returns where those that are revised are and were.
+CellPart CombinedTile::CollectPlainly(std::size_t cell, const TileSegments& from) {
   plain_.clear();
   const std::span settled = from.settled.Segments(cell);
   const std::span places = from.settled.Places(cell);
   for (std::size_t i = 0; i < settled.size(); ++i) {
-    plain_.push_back({&settled[i], places[i], settled[i].altitude_mm});
+    plain_.push_back({&settled[i], settled[i].altitude_mm, places[i]});
   }
+  CellPart revised;
   for (const std::uint32_t place : from.open) {
     StretchSurvey& open = *from.stretches[place].open;
     for (std::uint32_t i = open.First(cell); i != Segment::kNone; i = open.At(i).next) {
-      plain_.push_back({&open.At(i), place, open.CombinedAltitude(i)});
+      Segment& segment = open.At(i);
+      plain_.push_back({&segment, segment.altitude_mm, place});
+      if (segment.is_revised) {
+        revised.Add(segment.altitude_mm);
+        revised.Add(open.CombinedAltitude(i));
+      }
     }
   }
+  return revised;
 }
 
 // Notes of segments_ that they were.

@@ -50,7 +50,7 @@ class CombinedTile {
                    const TileSegments& from,
                    CellCombiner& combiner,
                    CombinedTile& out);
-  void CollectPlainly(std::size_t cell, const TileSegments& from);
+  CellPart CollectPlainly(std::size_t cell, const TileSegments& from);
   void SetCombined(const TileSegments& from, const CellCombiner& combiner);
   std::span<const std::int32_t> References(std::size_t cell) const;
 

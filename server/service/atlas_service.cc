@@ -190,15 +190,19 @@ Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& pat
   return {};
 }
 
-std::function<Status()> AtlasService::CheckFor(std::uint64_t revision,
-                                               const Patience& patience) const {
-  return [this, revision, deadline = DeadlineOf(patience), stop = patience.stop] {
+std::function<Status()> AtlasService::CheckFor(const Patience& patience,
+                                               std::string too_late) const {
+  return [this, deadline = DeadlineOf(patience), stop = patience.stop,
+          too_late = std::move(too_late)] {
     ATLAS_RETURN_IF_ERROR(CheckRunning(stop));
-    return std::chrono::steady_clock::now() < deadline
-               ? Status()
-               : Status(StatusCode::kTimeout,
-                        StrCat("the atlas of revision ", revision, " was not fused in time"));
+    return std::chrono::steady_clock::now() < deadline ? Status()
+                                                       : Status(StatusCode::kTimeout, too_late);
   };
+}
+
+std::function<Status()> AtlasService::CheckPast(std::uint64_t revision,
+                                                const Patience& patience) const {
+  return CheckFor(patience, StrCat("the atlas of revision ", revision, " was not fused in time"));
 }
 
 Result<RegionQuery> AtlasService::Query(const RegionRequest& request,
@@ -207,7 +211,7 @@ Result<RegionQuery> AtlasService::Query(const RegionRequest& request,
   if (!request.at_revision) {
     return RegionQuery::Create(std::make_shared<CurrentTiles>(store_), request, std::move(options));
   }
-  auto view = past_.View(request, CheckFor(*request.at_revision, patience));
+  auto view = past_.View(request, CheckPast(*request.at_revision, patience));
   if (!view) {
     return Error(view.error());
   }
@@ -264,6 +268,7 @@ Result<AtlasService::WaitEnd> AtlasService::WaitForWorkers(TimePoint deadline,
 
 Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
   const TimePoint deadline = DeadlineOf(patience);
+  const auto check_stop = CheckFor(patience, "the digest was not computed in time");
   while (true) {
     DirtyState before;
     const auto end = WaitForWorkers(deadline, patience.stop, before);
@@ -273,7 +278,7 @@ Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
     if (*end == WaitEnd::kDamaged) {
       return Error(fusion_.damage().Summary());
     }
-    auto digest = ComputeDigest(store_, [&] { return CheckRunning(patience.stop); });
+    auto digest = ComputeDigest(store_, check_stop);
     if (!digest) {
       return Error(digest.error());
     }
@@ -292,11 +297,12 @@ Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
 }
 
 Result<AtlasDigest> AtlasService::DigestAt(std::uint64_t revision, const Patience& patience) {
-  return past_.Digest(revision, CheckFor(revision, patience));
+  return past_.Digest(revision, CheckPast(revision, patience));
 }
 
 Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience) {
   const TimePoint deadline = DeadlineOf(patience);
+  const auto check_stop = CheckFor(patience, "the atlas was not verified in time");
   while (true) {
     DirtyState clean;
     if (rebuild) {
@@ -311,9 +317,7 @@ Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience
     }
     AtlasVerifier::Options options;
     options.rebuild = rebuild;
-    options.check_stop = [&] {
-      return CheckRunning(patience.stop);
-    };
+    options.check_stop = check_stop;
     auto report = AtlasVerifier(store_, options).Run();
     if (!report) {
       return Error(report.error());

@@ -97,12 +97,13 @@ class AtlasService {
   Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
   Result<std::uint64_t> ReadRevision();
 
-  // Of a clean atlas that did not change meanwhile; kTimeout if there is none in time, kInvalidData
-  // if damage keeps it from becoming clean.
+  // Of a clean atlas that did not change meanwhile; kTimeout if that takes longer, kInvalidData if
+  // damage keeps it from becoming clean.
   Result<AtlasDigest> Digest(const Patience& patience);
   // Of the atlas as of an earlier revision, fused again; kTimeout if that takes longer.
   Result<AtlasDigest> DigestAt(std::uint64_t revision, const Patience& patience);
   // `rebuild` waits like WaitUntilClean and reports what is damaged; a plain check does not wait.
+  // kTimeout if all of it takes longer.
   Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
 
   // Drops the keyframes that matter nowhere any more (preset bounded), once no tile is dirty; the
@@ -129,8 +130,9 @@ class AtlasService {
                           DirtyState& state);
   bool IsStuck(const DirtyState& state) const;
   Status CheckRunning(const std::stop_token& stop) const;
-  // CheckRunning, and kTimeout when the time is up.
-  std::function<Status()> CheckFor(std::uint64_t revision, const Patience& patience) const;
+  // CheckRunning, and kTimeout, in these words, when the time is up.
+  std::function<Status()> CheckFor(const Patience& patience, std::string too_late) const;
+  std::function<Status()> CheckPast(std::uint64_t revision, const Patience& patience) const;
   // kTimeout when more than damaged tiles is left at the deadline.
   Result<WaitEnd> WaitForWorkers(TimePoint deadline,
                                  const std::stop_token& stop,

@@ -83,9 +83,9 @@ class AtlasStore {
   // Ids above `after_id` in order, up to `limit`.
   virtual Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                             std::uint32_t limit) = 0;
-  // One keyframe with its pose and session: every checksum around it is verified, those of its
-  // earlier poses too.
-  virtual Result<KeyframeRecord> ReadKeyframe(std::int64_t id) = 0;
+  // One keyframe with its pose, session and footprint, of one snapshot: every checksum around it is
+  // verified, those of its earlier poses too. The footprint has none.
+  virtual Result<StoredKeyframe> ReadKeyframe(std::int64_t id) = 0;
 
   // nullopt: there is no such tile.
   virtual Result<std::optional<StoredTile>> ReadTile(const TileId& id) = 0;

@@ -94,6 +94,11 @@ struct KeyframeRecord {
   SessionState session_state = SessionState::kLive;
 };
 
+struct StoredKeyframe {
+  KeyframeRecord record;
+  std::vector<TileId> footprint;  // at its present pose, in key order
+};
+
 // Of each key asked for; nullopt: a compaction dropped it.
 using FoundKeyframes = std::vector<std::optional<KeyframeRecord>>;
 

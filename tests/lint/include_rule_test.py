@@ -61,7 +61,7 @@ ALLOWED = {
     "server/service/fusion": FUSED + ["server/service/change_signal.h", "server/service/log_sink.h",
                                      "server/service/process_memory.h"],
     "server/service/region": STORE + ["core/tile"],
-    "server/service/verification": FUSED + ["server/service/fusion"],
+    "server/service/verification": FUSED + ["server/service/fusion", "server/service/upload_check.h"],
     "server/service/compaction": FUSED + ["server/service/fusion", "server/service/upload_check.h"],
     "server/service/history": FUSED + ["server/service/fusion", "server/service/region",
                                        "server/service/verification"],

@@ -18,8 +18,8 @@ namespace atlas {
 // A segment of a cell, not looked at any closer yet.
 struct CellSegment {
   Segment* segment = nullptr;
-  std::uint32_t stretch = 0;     // its place
-  std::int32_t combined_mm = 0;  // its altitude when it was combined last
+  std::int32_t altitude_mm = 0;
+  std::uint32_t stretch = 0;  // its place
 };
 
 // From the lowest to the highest of its segments; altitudes in mm.
@@ -30,6 +30,7 @@ struct CellPart {
   std::int64_t lowest_mm = 0;
   std::int64_t highest_mm = -1;
 
+  bool operator==(const CellPart&) const = default;
   bool is_empty() const { return lowest_mm > highest_mm; }
   bool Contains(std::int64_t altitude_mm) const {
     return lowest_mm <= altitude_mm && altitude_mm <= highest_mm;
@@ -51,27 +52,21 @@ inline std::int64_t PartReach(const MapProfile& profile) {
   return std::max<std::int64_t>(profile.other_layer_mm + CellPart::kMargin_mm, profile.band_mm);
 }
 
-// Around all that are revised; empty if none is.
-inline CellPart FindRevisedPart(std::span<const CellSegment> segments, std::int64_t reach_mm) {
-  CellPart part;
-  for (const CellSegment& s : segments) {
-    if (s.segment->is_revised) {
-      part.Add(s.segment->altitude_mm);
-      part.Add(s.combined_mm);
+// `part`, not empty, with all segments that lie within its reach.
+inline CellPart Grow(CellPart part, std::span<const CellSegment> segments, std::int64_t reach_mm) {
+  for (;;) {
+    CellPart grown = part;
+    for (const CellSegment& s : segments) {  // without a branch: none could be foreseen
+      const bool is_within =
+          part.lowest_mm - reach_mm < s.altitude_mm && s.altitude_mm < part.highest_mm + reach_mm;
+      grown.lowest_mm = std::min(grown.lowest_mm, is_within ? s.altitude_mm : grown.lowest_mm);
+      grown.highest_mm = std::max(grown.highest_mm, is_within ? s.altitude_mm : grown.highest_mm);
     }
-  }
-  for (bool grows = !part.is_empty(); grows;) {
-    grows = false;
-    for (const CellSegment& s : segments) {
-      const std::int64_t altitude_mm = s.segment->altitude_mm;
-      if (!part.Contains(altitude_mm) && part.lowest_mm - reach_mm < altitude_mm &&
-          altitude_mm < part.highest_mm + reach_mm) {
-        part.Add(altitude_mm);
-        grows = true;
-      }
+    if (grown == part) {
+      return part;
     }
+    part = grown;
   }
-  return part;
 }
 
 }  // namespace atlas

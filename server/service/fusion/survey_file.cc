@@ -121,20 +121,23 @@ std::optional<SurveyFileHeader> ReadSurveyFileHeader(const fs::path& path) {
   return header && !error && size == SurveyFileBytes(*header) ? header : std::nullopt;
 }
 
-std::optional<SurveyFile> ReadSurveyFile(const fs::path& path) {
-  const auto bytes = ReadWhole(path);
-  if (!bytes || bytes->size() < kHeaderBytes) {
+std::optional<Bytes> ReadSurveyFile(const fs::path& path, const SurveyFileHeader& expected) {
+  if (ReadSurveyFileHeader(path) != expected) {  // before room is made for whatever is there
+    return std::nullopt;
+  }
+  auto bytes = ReadWhole(path, SurveyFileBytes(expected));
+  if (!bytes || bytes->size() != SurveyFileBytes(expected)) {
     return std::nullopt;
   }
   const ByteSpan head = ByteSpan(*bytes).first(kHeaderBytes - kHashBytes);
   const ByteSpan hash = ByteSpan(*bytes).subspan(head.size(), kHashBytes);
   const ByteSpan payload = ByteSpan(*bytes).subspan(kHeaderBytes);
-  const auto header = Decode(head);
-  const Bytes expected = HashOf(head, payload);
-  if (!header || !std::equal(hash.begin(), hash.end(), expected.begin())) {
+  const Bytes right = HashOf(head, payload);
+  if (Decode(head) != expected || !std::equal(hash.begin(), hash.end(), right.begin())) {
     return std::nullopt;
   }
-  return SurveyFile{*header, Bytes(payload.begin(), payload.end())};
+  bytes->erase(bytes->begin(), bytes->begin() + kHeaderBytes);
+  return *std::move(bytes);
 }
 
 Status WriteSurveyFile(const fs::path& path,

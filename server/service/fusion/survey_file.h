@@ -23,19 +23,15 @@ struct SurveyFileHeader {
   friend bool operator==(const SurveyFileHeader&, const SurveyFileHeader&) = default;
 };
 
-struct SurveyFile {
-  SurveyFileHeader header;
-  Bytes payload;
-};
-
 // Of the running program's own file: surveys are those of its code, and packed as it lays them out.
 // 0 if that cannot be read.
 std::uint64_t BuildHash();
 
 // Of a file that is as long as it says; nothing is said of its content. None: it is not one.
 std::optional<SurveyFileHeader> ReadSurveyFileHeader(const std::filesystem::path& path);
-// Whole, as it was written. None: it is gone, cut or damaged.
-std::optional<SurveyFile> ReadSurveyFile(const std::filesystem::path& path);
+// The payload, as it was written with that header. None: it is gone, cut, damaged or another one.
+std::optional<Bytes> ReadSurveyFile(const std::filesystem::path& path,
+                                    const SurveyFileHeader& expected);
 std::size_t SurveyFileBytes(const SurveyFileHeader& header);
 
 // Replaces the file once it is whole: until then it is `unfinished`, of the same directory. Waits

@@ -75,7 +75,8 @@ void SurveyFiles::FindFiles(const AtlasLine& line) {
     }
     std::error_code ignored;
     const auto header = ReadSurveyFileHeader(path);
-    if (header && path == PathOf(header->key) && IsOfLine(*header, line)) {
+    if (header && path == PathOf(header->key) && header->payload_bytes <= options_.max_bytes &&
+        IsOfLine(*header, line)) {
       found.push_back({fs::last_write_time(path, ignored), *header});
     } else {
       fs::remove(path, ignored);
@@ -106,9 +107,8 @@ std::optional<KeptSurveys> SurveyFiles::Read(const TileId& id) {
     }
     header = *found;
   }
-  const auto file = ReadSurveyFile(PathOf(header.key));
-  if (file && file->header == header) {
-    auto surveys = TileSurveys::Load(file->payload, id, profile_);
+  if (const auto payload = ReadSurveyFile(PathOf(header.key), header)) {
+    auto surveys = TileSurveys::Load(*payload, id, profile_);
     if (surveys) {
       std::error_code ignored;  // its age after a restart is a guess then
       fs::last_write_time(PathOf(header.key), fs::file_time_type::clock::now(), ignored);

@@ -6,6 +6,7 @@
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_codec.h"
 #include "core/tile/tile_codec.h"
+#include "server/service/upload_check.h"
 
 namespace atlas {
 namespace {
@@ -109,11 +110,19 @@ Status AtlasVerifier::VerifyKeyframes() {
 }
 
 Status AtlasVerifier::CheckKeyframe(std::int64_t id) {
-  const auto record = store_.ReadKeyframe(id);
-  if (!record) {
-    return record.error();
+  const auto stored = store_.ReadKeyframe(id);
+  if (!stored) {
+    return stored.error();
   }
-  const std::string name = StrCat("keyframe ", record->key);
+  const KeyframeRecord& record = stored->record;
+  const std::string name = StrCat("keyframe ", record.key);
+  const auto placed = CheckPose(record, record.pose, store_.identity().profile);
+  if (!placed) {
+    return placed.error();
+  }
+  if (placed->footprint != stored->footprint) {
+    return Status(StatusCode::kInvalidData, name + ": the store lists other tiles than it touches");
+  }
   const auto blob = store_.ReadKeyframeBlob(id);
   if (!blob) {
     return blob.error().WithContext(name);

@@ -113,9 +113,14 @@ class SqliteStore final : public AtlasStore {
   }
   Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                     std::uint32_t limit) override;
-  Result<KeyframeRecord> ReadKeyframe(std::int64_t id) override {
-    return readers_.Run<KeyframeRecord>(
-        [id](Connection& connection) { return VerifyKeyframeRecord(connection, id); });
+  Result<StoredKeyframe> ReadKeyframe(std::int64_t id) override {
+    return readers_.Run<StoredKeyframe>([id](Connection& connection) -> Result<StoredKeyframe> {
+      auto record = VerifyKeyframeRecord(connection, id);
+      if (!record) {
+        return Error(record.error());
+      }
+      return StoredKeyframe{*std::move(record), ReadFootprint(connection, id)};
+    });
   }
 
   Result<std::optional<StoredTile>> ReadTile(const TileId& id) override {

@@ -110,6 +110,16 @@ TEST_F(AtlasTest, VerifyCountsDamagedTilesAndKeyframes) {
   EXPECT_EQ(service_->Digest(Long()).error().code(), StatusCode::kInvalidData);
 }
 
+TEST_F(AtlasTest, VerifyAndDigestGiveUpInTime) {
+  Open(1);
+  UploadDrive(4);
+  Digest();
+  const Patience none{std::chrono::milliseconds(0), {}};
+  EXPECT_EQ(service_->Verify(false, none).error().code(), StatusCode::kTimeout);
+  EXPECT_EQ(service_->Verify(true, none).error().code(), StatusCode::kTimeout);
+  EXPECT_EQ(service_->Digest(none).error().code(), StatusCode::kTimeout);
+}
+
 TEST_F(AtlasTest, VerifyNoticesKeyframesThatVanished) {
   Open(1);
   UploadDrive(4);
@@ -127,13 +137,16 @@ TEST_F(AtlasTest, RebuildFindsTilesThatAreNotWhatTheirKeyframesMake) {
   Open(1);
   UploadDrive(4);
   Digest();
-  // A tile goes missing, and a whole keyframe leaves the index: nothing is damaged, all is wrong.
+  // A tile goes missing, and a whole keyframe leaves the index: only the latter is seen at once.
   Tamper("data",
          "DELETE FROM tiles WHERE key = (SELECT min(key) FROM tiles);"
          "DELETE FROM keyframe_tiles WHERE keyframe_id = 1");
   Open(1);
   const auto plain = service_->Verify(false, Long());
-  EXPECT_EQ(plain->damaged + plain->mismatched, 0u);
+  EXPECT_EQ(plain->damaged, 1u);
+  EXPECT_EQ(plain->mismatched, 0u);
+  ASSERT_EQ(plain->findings.size(), 1u);
+  EXPECT_EQ(plain->findings[0], "keyframe bus/day/0: the store lists other tiles than it touches");
   const auto rebuilt = service_->Verify(true, Long());
   ASSERT_TRUE(rebuilt.has_value()) << rebuilt.error().message();
   EXPECT_GT(rebuilt->mismatched, 1u);

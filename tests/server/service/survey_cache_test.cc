@@ -29,10 +29,10 @@ class SurveyCacheTest : public ::testing::Test {
     std::filesystem::remove_all(directory_);
   }
 
-  SurveyCache& Make(const SurveyCacheLimits& limits) {
+  SurveyCache& Make(const SurveyCacheLimits& limits, std::size_t disk_bytes = 1u << 30) {
     cache_.reset();
     files_.emplace(
-        SurveyFilesOptions{directory_ / "surveys", std::size_t{1} << 30, 0}, MapProfile(),
+        SurveyFilesOptions{directory_ / "surveys", disk_bytes, 0}, MapProfile(),
         [] {
           return AtlasLine{{{{1}, 0}}, 1'000'000};
         },
@@ -111,6 +111,23 @@ TEST_F(SurveyCacheTest, WhatIsIdleIsWrittenOnceAndStays) {
   EXPECT_EQ(cache.Take(Tile(1))->revision, 7u);
   cache.Put(Kept(Tile(1), 8));
   EXPECT_TRUE(cache.StoreIdle()) << "it changed";
+}
+
+// Else they would push each other out for ever.
+TEST_F(SurveyCacheTest, WhatIsIdleIsWrittenOnceThoughTheDiskHasNoRoomForAll) {
+  SurveyCacheLimits limits = kPlenty;
+  limits.idle = std::chrono::milliseconds(-1);
+  SurveyCache& cache = Make(limits, 200);
+  for (std::int32_t tile = 0; tile < 8; ++tile) {
+    cache.Put(Kept(Tile(tile), 7));
+  }
+  int written = 0;
+  while (written < 100 && cache.StoreIdle()) {
+    ++written;
+  }
+  EXPECT_EQ(written, 8);
+  EXPECT_GT(files_->bytes(), 0u);
+  EXPECT_LE(files_->bytes(), 200u);
 }
 
 TEST_F(SurveyCacheTest, WhatWasWrittenAndIsGoneIsWrittenAgain) {

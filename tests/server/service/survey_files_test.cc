@@ -246,6 +246,15 @@ TEST_F(SurveyFilesTest, AFileIsBelievedWhileTheAtlasGoesOnFromIt) {
   EXPECT_FALSE(is_believed({}));
 }
 
+TEST_F(SurveyFilesTest, NoRoomIsMadeForAFileThatGrew) {
+  FilesAlone files(survey_files_, kLine);
+  ASSERT_TRUE(files.Write(kTile, 7));
+  const fs::path path = FilesIn(survey_files_.directory).front();
+  fs::resize_file(path, std::uintmax_t{1} << 40);  // nothing but a hole
+  EXPECT_FALSE(files.Has(kTile));
+  EXPECT_FALSE(fs::exists(path));
+}
+
 TEST_F(SurveyFilesTest, AFileUnderAnothersNameIsNotBelieved) {
   const TileId other{0, 3, -5};
   FilesAlone files(survey_files_, kLine);

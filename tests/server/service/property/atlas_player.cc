@@ -238,7 +238,7 @@ void AtlasPlayer::Compact(const Step& step) {
   std::set<KeyframeKey> remaining;
   const auto ids = store_->ListKeyframeIds(0, kManyKeyframes).value();
   for (const std::int64_t id : ids) {
-    remaining.insert(store_->ReadKeyframe(id)->key);
+    remaining.insert(store_->ReadKeyframe(id)->record.key);
   }
   const std::string wrong = model_.Keep(remaining, step.before_ms);
   Fail(!wrong.empty(), [&] { return "compaction: " + wrong; });
