@@ -39,18 +39,22 @@ std::filesystem::path NewDirectory() {
 }  // namespace
 
 AtlasAtWork::AtlasAtWork(const MapProfile& profile, const FusionOptions& fusion)
-    : directory_(NewDirectory()), fusion_(fusion) {
+    : directory_(NewDirectory()), profile_(profile), fusion_(fusion) {
   ReturnLargeBlocks();  // as atlasd, and so is this
   fusion_.building.survey_files.directory = directory_ / "surveys";
+  Open();
+  Start();
+}
+
+void AtlasAtWork::Open() {
   SqliteStoreOptions options;
   options.directory = directory_;
-  options.new_profile = profile;
+  options.new_profile = profile_;
   auto store = OpenSqliteStore(options);
   if (!store) {
     throw std::runtime_error(store.error().message());
   }
   store_ = *std::move(store);
-  Start();
 }
 
 void AtlasAtWork::Start() {
@@ -62,6 +66,8 @@ void AtlasAtWork::Start() {
 
 void AtlasAtWork::Restart() {
   service_.reset();
+  store_.reset();
+  Open();
   Start();
 }
 

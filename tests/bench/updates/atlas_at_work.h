@@ -44,9 +44,11 @@ class AtlasAtWork {
  private:
   template <typename T, typename Begin>
   Result<UpdateCost> Measure(const Begin& begin);
+  void Open();
   void Start();
 
   std::filesystem::path directory_;
+  MapProfile profile_;
   FusionOptions fusion_;
   std::unique_ptr<AtlasStore> store_;
   std::unique_ptr<AtlasService> service_;

@@ -1,7 +1,7 @@
 // How soon a keyframe is in the map: four vehicles upload one a second each, in real time, and each
 // keyframe's way is timed from its acknowledgement until the tiles that it touches are served. One
 // JSON line a keyframe, and one for all.
-// Usage: online_bench street|overpass|garage RANGE_M SECONDS
+// Usage: online_bench street|overpass|garage RANGE_M SECONDS: 0 is the whole drive
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -44,7 +44,9 @@ Result<std::vector<UploadRequest>> Drive(
   upload.vehicle = StrCat("car.", vehicle);
   upload.range_m = range_m;
   upload.begin = static_cast<std::size_t>(vehicle) * 5;  // not all at the same place
-  upload.end = upload.begin + keyframes;
+  if (keyframes > 0) {
+    upload.end = upload.begin + keyframes;
+  }
   return MakeUploads(*drive, profile, upload);
 }
 
@@ -150,8 +152,9 @@ Status Run(const std::string& world, double range_m, int seconds) {
 }  // namespace atlas::testing
 
 int main(int argc, char** argv) {
-  if (argc != 4 || std::atoi(argv[3]) < 1) {
-    std::cerr << "usage: online_bench street|overpass|garage RANGE_M SECONDS\n";
+  if (argc != 4 || std::atoi(argv[3]) < 0) {
+    std::cerr
+        << "usage: online_bench street|overpass|garage RANGE_M SECONDS (0: the whole drive)\n";
     return 2;
   }
   const atlas::Status status = atlas::testing::Run(argv[1], std::atof(argv[2]), std::atoi(argv[3]));

@@ -1,8 +1,9 @@
 // What a new keyframe costs in the first, second, ... pass over the same place, from the upload to
 // the fused tiles, one at a time with one worker: one JSON line a pass.
-// Usage: passes_bench WORLD PRESET PASSES [VEHICLES [correct|restart]]; with several they take
-// turns. With `correct`: also what it costs after each pass to correct two keyframes of the first
-// one, and two of the latest. With `restart`: the daemon is started again before each pass.
+// Usage: passes_bench WORLD PRESET PASSES [VEHICLES [correct|restart|restart-cold]]; with several
+// they take turns. With `correct`: also what it costs after each pass to correct two keyframes of
+// the first one, and two of the latest. With `restart`: the daemon is started again before each
+// pass; with `restart-cold`, its surveys are not kept on disk.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -131,16 +132,21 @@ int Run(const std::string& world_name,
   const auto world = WorldKindByName(world_name);
   const auto preset = FusionPresetByName(preset_name);
   const bool corrects = mode == "correct";
-  const bool restarts = mode == "restart";
+  const bool is_cold = mode == "restart-cold";
+  const bool restarts = mode == "restart" || is_cold;
   if (!world || !preset || passes < 1 || vehicles < 1 ||
       (!mode.empty() && !corrects && !restarts)) {
     std::cerr << "usage: passes_bench street|overpass|garage strict|bounded|paper PASSES "
-                 "[VEHICLES [correct|restart]]\n";
+                 "[VEHICLES [correct|restart|restart-cold]]\n";
     return 2;
   }
   MapProfile profile;
   profile.preset = *preset;
-  AtlasAtWork atlas(profile, {});
+  FusionOptions fusion;
+  if (is_cold) {
+    fusion.building.survey_files.max_bytes = 0;
+  }
+  AtlasAtWork atlas(profile, fusion);
   Placed oldest;
   for (int pass = 1; pass <= passes; ++pass) {
     if (restarts) {

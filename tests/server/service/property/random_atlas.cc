@@ -61,6 +61,8 @@ class Drawing {
   double centre_x_m_ = 0.0;
   double centre_y_m_ = 0.0;
   std::uint32_t decks_ = 1;
+  double deck_height_m_ = 0.0;
+  double unevenness_m_ = 0.0;  // of a deck
   // Most frames are the same scan at one of two places: a world that compactions thin out.
   bool is_repeated_ = false;
   std::optional<Keyframe> repeated_scan_;
@@ -95,6 +97,8 @@ void Drawing::DrawProfile() {
   centre_x_m_ = OneOf(far_m);
   centre_y_m_ = OneOf(far_m);
   decks_ = 1 + Below(4);
+  deck_height_m_ = OneIn(2) ? 1.3 : 3.2;
+  unevenness_m_ = OneIn(2) ? 0.0 : 0.7;
 }
 
 void Drawing::DrawFrames() {
@@ -194,7 +198,7 @@ QuantizedPose Drawing::DrawPose(std::size_t frame) {
     return before[Below(static_cast<std::uint32_t>(before.size()))];
   }
   const double away_m = OneIn(12) ? 9.0 : 0.0;
-  const double deck_m = 1.3 * Below(decks_);
+  const double deck_m = deck_height_m_ * Below(decks_) + unevenness_m_ * Unit();
   Pose T_world_sensor = Pose::Identity();
   T_world_sensor.translation() =
       Eigen::Vector3d{centre_x_m_ + away_m + 1.5 * Unit(), centre_y_m_ + 1.5 * Unit(), deck_m};
