@@ -15,6 +15,7 @@ TileRefresher::TileRefresher(AtlasStore& store,
       profile_(store.identity().profile),
       sigmas_(profile_, Keyframe::kMaxRadiusCells),
       group_bytes_(options.group_bytes),
+      alone_bytes_(std::max(options.group_bytes, options.surveys.plain_bytes)),
       keyframes_(options.keyframe_bytes),
       tiles_(options.tile_bytes),
       survey_files_(
@@ -45,7 +46,7 @@ void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) 
       continue;
     }
     const std::size_t job_bytes = job->surveys.ExpectedBytes(profile_);
-    if (job_bytes > group_bytes_) {
+    if (job_bytes > alone_bytes_) {
       on_built(id, builder_.Build(id));
       continue;
     }

@@ -22,8 +22,9 @@ struct TileRefresherOptions {
   std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
   SurveyCacheLimits surveys =                           // kept from one time to the next
       SurveyCacheLimits::OfTotal(std::size_t{1024} << 20);
-  SurveyFilesOptions survey_files;                   // and where memory has no room for them
-  std::size_t group_bytes = std::size_t{128} << 20;  // surveys of the tiles at hand, a worker
+  SurveyFilesOptions survey_files;  // and where memory has no room for them
+  // Surveys of the tiles at hand, a worker; a single tile may take as much as what is kept plain.
+  std::size_t group_bytes = std::size_t{128} << 20;
 };
 
 class TileRefresher {
@@ -62,6 +63,7 @@ class TileRefresher {
   const MapProfile profile_;
   const SigmaTable sigmas_;
   const std::size_t group_bytes_;
+  const std::size_t alone_bytes_;  // the same of a tile that is alone in its group
   KeyframeCache keyframes_;
   TileCache tiles_;
   SurveyFiles survey_files_;

@@ -97,8 +97,9 @@ void Drawing::DrawProfile() {
   centre_x_m_ = OneOf(far_m);
   centre_y_m_ = OneOf(far_m);
   decks_ = 1 + Below(4);
-  deck_height_m_ = OneIn(2) ? 1.3 : 3.2;
-  unevenness_m_ = OneIn(2) ? 0.0 : 0.7;
+  const std::array<double, 3> heights_m{1.3, 2.6, 3.2};  // below, at and above PartReach()
+  deck_height_m_ = OneOf(heights_m);
+  unevenness_m_ = OneIn(2) ? 0.0 : 0.9;
 }
 
 void Drawing::DrawFrames() {
