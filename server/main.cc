@@ -111,17 +111,18 @@ void Log(LogLevel level, const std::string& message) {
 }
 
 int Serve(const DaemonConfig& config) {
+  Result<ListenSocket> socket = ListenSocket::Open(config.host, config.port);
+  if (!socket) {
+    return Fail(socket.error());
+  }
   Result<std::unique_ptr<AtlasStore>> store = OpenStore(config);
   if (!store) {
     return Fail(store.error());
   }
   AtlasService service(**store, &NowMs, &Log, ServiceFrom(config));
-  TcpServer server(service, NetOptions());
-  const Result<std::string> address = server.Listen(config.host, config.port);
-  if (!address) {
-    return Fail(address.error());
-  }
-  std::printf("listening %s\n", address->c_str());
+  const std::string address = socket->address();
+  TcpServer server(service, NetOptions(), *std::move(socket));
+  std::printf("listening %s\n", address.c_str());
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());
   server.Run();

@@ -34,15 +34,15 @@ using boost::system::error_code;
 
 class TcpServer::Impl {
  public:
-  Impl(AtlasService& service, const NetOptions& options)
+  Impl(AtlasService& service, const NetOptions& options, ListenSocket socket)
       : options_(options),
         service_(service),
         pool_(static_cast<std::size_t>(options.service_threads)),
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
         budget_(options.max_held_bytes),
-        acceptor_(io_),
-        signals_(io_) {}
+        acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
+        signals_(io_, SIGTERM, SIGINT) {}
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   // Calls on the pools and writes of the store report to `io_`: none may be left when it goes.
@@ -50,33 +50,6 @@ class TcpServer::Impl {
     pool_.join();
     reading_pool_.join();
     service_.Flush();
-  }
-
-  Result<std::string> Listen(const std::string& host, std::uint16_t port) {
-    error_code error;
-    const asio::ip::address address = asio::ip::make_address(host, error);
-    if (error) {
-      return Error(StatusCode::kInvalidArgument,
-                   StrCat("listen address '", host, "' is no IP address"));
-    }
-    const tcp::endpoint endpoint(address, port);
-    acceptor_.open(endpoint.protocol(), error);
-    if (!error) {
-      acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
-    }
-    if (!error) {
-      acceptor_.bind(endpoint, error);
-    }
-    if (!error) {
-      acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    }
-    if (error) {
-      return Error(StatusCode::kUnavailable,
-                   StrCat("cannot listen on ", endpoint, ": ", error.message()));
-    }
-    signals_.add(SIGTERM);  // from here on: whoever learns the address may stop the daemon
-    signals_.add(SIGINT);
-    return StrCat(acceptor_.local_endpoint());
   }
 
   void Run() {
@@ -207,13 +180,10 @@ class TcpServer::Impl {
   std::unique_ptr<asio::steady_timer> drain_limit_;
 };
 
-TcpServer::TcpServer(AtlasService& service, const NetOptions& options)
-    : impl_(std::make_unique<Impl>(service, options)) {}
+TcpServer::TcpServer(AtlasService& service, const NetOptions& options, ListenSocket socket)
+    : impl_(std::make_unique<Impl>(service, options, std::move(socket))) {}
 TcpServer::~TcpServer() = default;
 
-Result<std::string> TcpServer::Listen(const std::string& host, std::uint16_t port) {
-  return impl_->Listen(host, port);
-}
 void TcpServer::Run() {
   impl_->Run();
 }

@@ -1,11 +1,9 @@
 // Accepts connections and runs the network thread.
 #pragma once
 
-#include <cstdint>
 #include <memory>
-#include <string>
 
-#include "core/base/status.h"
+#include "server/net/listen_socket.h"
 #include "server/net/net_options.h"
 #include "server/service/atlas_service.h"
 
@@ -13,18 +11,15 @@ namespace atlas {
 
 class TcpServer {
  public:
-  TcpServer(AtlasService& service, const NetOptions& options);
+  // SIGTERM and SIGINT are its own from here on: whoever learns the address may stop the daemon.
+  TcpServer(AtlasService& service, const NetOptions& options, ListenSocket socket);
   TcpServer(const TcpServer&) = delete;
   TcpServer& operator=(const TcpServer&) = delete;
   ~TcpServer();
 
-  // Port 0 takes a free one. The bound "HOST:PORT"; kInvalidArgument for what is no address,
-  // kUnavailable when the port is taken.
-  Result<std::string> Listen(const std::string& host, std::uint16_t port);
-
-  // Serves until SIGTERM or SIGINT (those since Listen()) or Stop(): then accepts no more, ends the
+  // Serves until SIGTERM, SIGINT or Stop(): then accepts no more, ends the
   // service's waits, lets requests in flight finish for a while, closes everything and returns.
-  // Call once, after Listen().
+  // Call once.
   void Run();
   // From any thread.
   void Stop();

@@ -23,10 +23,10 @@ class NetTest : public ServiceTest {
   }
   void Listen(unsigned workers) {
     Open(workers);
-    server_ = std::make_unique<TcpServer>(*service_, net_);
-    const Result<std::string> address = server_->Listen("127.0.0.1", 0);
-    ASSERT_TRUE(address.has_value()) << address.error().message();
-    port_ = static_cast<std::uint16_t>(std::stoi(address->substr(address->rfind(':') + 1)));
+    Result<ListenSocket> socket = ListenSocket::Open("127.0.0.1", 0);
+    ASSERT_TRUE(socket.has_value()) << socket.error().message();
+    port_ = socket->port();
+    server_ = std::make_unique<TcpServer>(*service_, net_, *std::move(socket));
   }
   void Run() {
     run_ = std::async(std::launch::async, [this] { server_->Run(); });

@@ -117,10 +117,8 @@ TEST_F(ShutdownTest, StoppingTwiceOrWithoutConnectionsEnds) {
 
 TEST_F(ShutdownTest, ATakenPortAndWhatIsNoAddressAreRefused) {
   Serve();
-  TcpServer other(*service_, net_);
-  EXPECT_EQ(other.Listen("127.0.0.1", port_).error().code(), StatusCode::kUnavailable);
-  TcpServer nameless(*service_, net_);
-  EXPECT_EQ(nameless.Listen("example", 0).error().code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(ListenSocket::Open("127.0.0.1", port_).error().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(ListenSocket::Open("example", 0).error().code(), StatusCode::kInvalidArgument);
 }
 
 }  // namespace
