@@ -26,16 +26,25 @@ void BoundedChoice::FindCandidates(std::span<const SegmentView> segments) {
   if (segments.size() <= limit) {
     return;
   }
-  std::array<std::uint32_t, kSlots> counts{};
-  for (std::size_t i = segments.size(); i-- > 0;) {  // later stretches are mostly later in time
-    candidates_.push_back({BandOf(segments[i], profile_.band_mm), static_cast<std::uint32_t>(i)});
-    ++counts[Slot(candidates_.back().band)];
+  bands_.clear();
+  for (const SegmentView& segment : segments) {
+    bands_.push_back(BandOf(segment, profile_.band_mm));
+    ++counts_[Slot(bands_.back())];
   }
-  std::erase_if(candidates_, [&](const Candidate& c) { return counts[Slot(c.band)] <= limit; });
+  for (std::size_t i = segments.size(); i-- > 0;) {  // later stretches are mostly later in time
+    if (counts_[Slot(bands_[i])] > limit) {
+      candidates_.push_back({bands_[i], static_cast<std::uint32_t>(i)});
+    }
+  }
+  for (const std::int32_t band : bands_) {
+    counts_[Slot(band)] = 0;
+  }
 }
 
 void BoundedChoice::Choose(std::span<const SegmentView> segments) {
-  chosen_.fill(kNone);
+  for (const Candidate& candidate : candidates_) {
+    chosen_[Slot(candidate.band)] = kNone;
+  }
   for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
     Candidate& candidate = candidates_[i];
     if (HasRoom(candidate, segments)) {
@@ -63,14 +72,14 @@ bool BoundedChoice::HasRoom(const Candidate& candidate,
 }
 
 std::size_t BoundedChoice::MoveRestBack(std::span<SegmentView> segments) {
-  is_dropped_.assign(segments.size(), false);
+  is_dropped_.assign(segments.size(), 0);
   for (const Candidate& candidate : candidates_) {
-    is_dropped_[candidate.index] = !candidate.counts;
+    is_dropped_[candidate.index] = candidate.counts ? 0 : 1;
   }
   std::size_t kept = 0;
   rest_.clear();
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (is_dropped_[i]) {
+    if (is_dropped_[i] != 0) {
       rest_.push_back(segments[i]);
     } else {
       segments[kept++] = segments[i];

@@ -49,9 +49,11 @@ class BoundedChoice {
   std::size_t MoveRestBack(std::span<SegmentView> segments);
 
   const MapProfile& profile_;
+  std::vector<std::int32_t> bands_;             // by segment
+  std::array<std::uint32_t, kSlots> counts_{};  // of segments; all zero between two calls
   std::vector<Candidate> candidates_;           // as they are chosen
   std::array<std::uint32_t, kSlots> chosen_{};  // the last candidate of each slot, or kNone
-  std::vector<bool> is_dropped_;                // by segment
+  std::vector<std::uint8_t> is_dropped_;        // by segment
   std::vector<SegmentView> rest_;
 };
 
