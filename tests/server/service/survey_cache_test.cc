@@ -10,7 +10,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
+
+#include "tests/server/service/directory_files.h"
 
 namespace atlas {
 namespace {
@@ -40,12 +41,7 @@ class SurveyCacheTest : public ::testing::Test {
     return cache_.emplace(limits, *files_);
   }
 
-  static std::filesystem::path MakeDirectory() {
-    std::string name = std::filesystem::temp_directory_path() / "atlas_cache_XXXXXX";
-    return ::mkdtemp(name.data());
-  }
-
-  std::filesystem::path directory_ = MakeDirectory();
+  std::filesystem::path directory_ = NewDirectory();
   std::optional<SurveyFiles> files_;
   std::optional<SurveyCache> cache_;
 };
