@@ -62,13 +62,18 @@ def bench_online(bin_dir, emit, _):
 
 
 def bench_passes(bin_dir, emit, _):
-    """The garage again and again; draws docs/images/passes.png."""
+    """The garage again and again; draws docs/images/passes.png. What has a goal is run three times, of
+    which the middle one counts: what else the machine does moves single runs."""
     curves = {}
-    for name, preset, vehicles in (("bounded", "bounded", 1), ("bounded_fleet", "bounded", 10),
-                                   ("strict", "strict", 1)):
-        curves[name] = list(rows_of(bin_dir / "passes_bench", "garage", preset, 10, vehicles))
+    for name, preset, vehicles, runs, asked in (("bounded", "bounded", 1, 3, 1.3),
+                                                ("bounded_fleet", "bounded", 10, 1, None),
+                                                ("strict", "strict", 1, 1, None)):
+        all_runs = sorted((list(rows_of(bin_dir / "passes_bench", "garage", preset, 10, vehicles)) for _ in range(runs)),
+                          key=lambda rows: rows[-1]["cpu_ms"] / rows[1]["cpu_ms"])
+        curves[name] = all_runs[runs // 2]
         second, tenth = curves[name][1], curves[name][-1]
-        goal = ", asked 1.3" if name == "bounded" else ""
+        ratios = ", ".join(f"{rows[-1]['cpu_ms'] / rows[1]['cpu_ms']:.2f}" for rows in all_runs)
+        goal = f", asked {asked}, the middle one of {ratios}" if asked else ""
         emit(f"passes.{name}.tenth", tenth["cpu_ms"], "ms CPU a keyframe", "the second pass" + goal,
              second["cpu_ms"])
         for what in ("kept", "store", "tile"):

@@ -47,6 +47,7 @@ void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) 
     }
     const std::size_t job_bytes = job->surveys.ExpectedBytes(profile_);
     if (job_bytes > alone_bytes_) {
+      job->surveys = TileSurveys(id);  // not beside what is built
       on_built(id, builder_.Build(id));
       continue;
     }

@@ -18,6 +18,7 @@
 #include "tests/core/support/test_scale.h"
 #include "tests/server/service/property/atlas_player.h"
 #include "tests/server/service/property/random_atlas.h"
+#include "tests/server/service/property/rising_atlas.h"
 
 namespace atlas::testing {
 namespace {
@@ -48,7 +49,8 @@ std::filesystem::path NewDirectory() {
 }
 
 void PlayCase(std::uint32_t seed, PlayCounts& counts) {
-  const AtlasScript script = RandomAtlas(seed);
+  const AtlasScript script =
+      seed % 16 == 15 - seed / 16 % 16 ? RisingAtlas(seed) : RandomAtlas(seed);
   const std::string failure = AtlasPlayer(script, NewDirectory(), counts).Play();
   ASSERT_EQ(failure, "") << "seed " << seed << " (again: ATLAS_PROPERTY_SEED=" << seed << ")\n"
                          << script;
