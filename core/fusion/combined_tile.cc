@@ -1,6 +1,7 @@
 #include "core/fusion/combined_tile.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace atlas {
@@ -31,11 +32,10 @@ void CombinedTile::Update(const CellSet& touched,
   out.tile_.layers.reserve(tile_.layers.size());
   out.references_mm_.reserve(references_mm_.size());
   for (std::size_t cell = 0; cell + 1 < tile_.cell_begin.size(); ++cell) {
-    if (touched.Contains(cell)) {
-      CombineWhole(cell, from, combiner, out);
-    } else if (!revised.Contains(cell)) {
+    const bool is_touched = touched.Contains(cell);
+    if (!is_touched && !revised.Contains(cell)) {
       Copy(cell, out);
-    } else if (!CombinePart(cell, from, combiner, out)) {
+    } else if (is_touched || !CombinePart(cell, from, combiner, out)) {
       CombineWhole(cell, from, combiner, out);
     }
     out.tile_.cell_begin[cell + 1] = static_cast<std::uint32_t>(out.tile_.layers.size());
@@ -91,80 +91,120 @@ bool CombinedTile::CombinePart(std::size_t cell,
                                const TileSegments& from,
                                CellCombiner& combiner,
                                CombinedTile& out) {
-  const MapProfile& profile = combiner.profile();
-  const auto layers = tile_.Layers(cell);
-  if (layers.size() < 2) {
+  const std::optional<Part> part = FindPart(cell, from, combiner.profile());
+  if (!part) {
     return false;
   }
-  const CellPart revised = CollectPlainly(cell, from);
-  if (revised.is_empty()) {
-    return false;
-  }
-  const CellPart part = Grow(revised, plain_, PartReach(profile));
-  const auto references_mm = References(cell);
-  std::size_t begin = 0;
-  while (begin < layers.size() && references_mm[begin] < part.lowest_mm) {
-    ++begin;
-  }
-  std::size_t end = begin;
-  while (end < layers.size() && part.Contains(references_mm[end])) {
-    ++end;
-  }
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    const std::int64_t altitude_mm = layers[i].altitude_mm;
-    const bool is_at_home = i < begin ? altitude_mm <= part.lowest_mm - profile.other_layer_mm
-                            : i < end ? part.IsNear(altitude_mm)
-                                      : altitude_mm >= part.highest_mm + profile.other_layer_mm &&
-                                            references_mm[i] > part.highest_mm;
-    if (!is_at_home) {
-      return false;
-    }
-  }
-  CellCombiner::Others others;
-  segments_.clear();
-  for (const CellSegment& s : plain_) {
-    if (part.Contains(s.altitude_mm)) {
-      segments_.push_back(ViewOf(*s.segment, s.stretch, from.stretches));
-    } else {
-      others.has_strong |= s.segment->is_strong;
-    }
-  }
+  const CellCombiner::Others others = CollectPart(cell, *part, from);
   if (!others.has_strong) {
     return false;
   }
-  SortByStretch(segments_);
-  others.above_mm = end < layers.size() ? &layers[end].altitude_mm : nullptr;
   layers_.clear();
   combiner.Combine(segments_, others, layers_);
-  const std::size_t count = begin + layers_.size() + layers.size() - end;
-  if (count >= kMaxCellLayers || layers.size() >= kMaxCellLayers ||
-      !std::all_of(layers_.begin(), layers_.end(),
-                   [&](const TileLayer& layer) { return part.IsNear(layer.altitude_mm); })) {
+  if (!IsCopyable(cell, *part, combiner.profile())) {
     return false;
   }
-  if (begin > 0) {
-    const std::int32_t below_mm = layers[begin - 1].altitude_mm;
-    const std::int32_t* was_mm = begin < layers.size() ? &layers[begin].altitude_mm : nullptr;
-    const std::int32_t* is_mm = layers_.empty() ? others.above_mm : &layers_[0].altitude_mm;
-    if (ColumnSpanOf(below_mm, was_mm, profile).mask !=
-        ColumnSpanOf(below_mm, is_mm, profile).mask) {
-      return false;
-    }
-  }
+  const auto layers = tile_.Layers(cell);
+  const auto references_mm = References(cell);
   const auto copy = [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       out.tile_.layers.push_back(layers[i]);
       out.references_mm_.push_back(references_mm[i]);
     }
   };
-  copy(0, begin);
+  copy(0, part->begin);
   out.tile_.layers.insert(out.tile_.layers.end(), layers_.begin(), layers_.end());
   for (const CellLayer& layer : combiner.layers()) {
     out.references_mm_.push_back(layer.reference_mm);
   }
-  copy(end, layers.size());
+  copy(part->end, layers.size());
   SetCombined(from, combiner);
   return true;
+}
+
+// Collects the cell's segments, too.
+std::optional<CombinedTile::Part> CombinedTile::FindPart(std::size_t cell,
+                                                         const TileSegments& from,
+                                                         const MapProfile& profile) {
+  const auto references_mm = References(cell);
+  if (references_mm.size() < 2 || references_mm.size() >= kMaxCellLayers) {
+    return std::nullopt;
+  }
+  const CellPart revised = CollectPlainly(cell, from);
+  if (revised.is_empty()) {
+    return std::nullopt;
+  }
+  Part part{Grow(revised, plain_, PartReach(profile)), 0, 0};
+  while (part.begin < references_mm.size() &&
+         references_mm[part.begin] < part.altitudes.lowest_mm) {
+    ++part.begin;
+  }
+  part.end = part.begin;
+  while (part.end < references_mm.size() && part.altitudes.Contains(references_mm[part.end])) {
+    ++part.end;
+  }
+  return IsAtHome(cell, part, profile) ? std::optional(part) : std::nullopt;
+}
+
+// Whether each layer of the cell is where its segments are: the part's near it, the others away.
+bool CombinedTile::IsAtHome(std::size_t cell, const Part& part, const MapProfile& profile) const {
+  const auto layers = tile_.Layers(cell);
+  const auto references_mm = References(cell);
+  const std::int64_t below_mm = part.altitudes.lowest_mm - profile.other_layer_mm;
+  const std::int64_t above_mm = part.altitudes.highest_mm + profile.other_layer_mm;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const std::int64_t altitude_mm = layers[i].altitude_mm;
+    const bool is_at_home =
+        i < part.begin ? altitude_mm <= below_mm
+        : i < part.end ? part.altitudes.IsNear(altitude_mm)
+                       : altitude_mm >= above_mm && references_mm[i] > part.altitudes.highest_mm;
+    if (!is_at_home) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// The part's segments into segments_; what the others are to them.
+CellCombiner::Others CombinedTile::CollectPart(std::size_t cell,
+                                               const Part& part,
+                                               const TileSegments& from) {
+  const auto layers = tile_.Layers(cell);
+  CellCombiner::Others others;
+  segments_.clear();
+  for (const CellSegment& s : plain_) {
+    if (part.altitudes.Contains(s.altitude_mm)) {
+      segments_.push_back(ViewOf(*s.segment, s.stretch, from.stretches));
+    } else {
+      others.has_strong |= s.segment->is_strong;
+    }
+  }
+  SortByStretch(segments_);
+  others.above_mm = part.end < layers.size() ? &layers[part.end].altitude_mm : nullptr;
+  return others;
+}
+
+// Whether the other layers stay as they are beside the part's new ones.
+bool CombinedTile::IsCopyable(std::size_t cell, const Part& part, const MapProfile& profile) const {
+  const auto layers = tile_.Layers(cell);
+  const std::size_t count = part.begin + layers_.size() + layers.size() - part.end;
+  if (count >= kMaxCellLayers ||
+      !std::all_of(layers_.begin(), layers_.end(), [&](const TileLayer& layer) {
+        return part.altitudes.IsNear(layer.altitude_mm);
+      })) {
+    return false;
+  }
+  if (part.begin == 0) {
+    return true;
+  }
+  const auto altitude_at = [&](std::size_t i) {
+    return i < layers.size() ? &layers[i].altitude_mm : nullptr;
+  };
+  const std::int32_t below_mm = layers[part.begin - 1].altitude_mm;
+  const std::int32_t* was_mm = altitude_at(part.begin);
+  const std::int32_t* is_mm = layers_.empty() ? altitude_at(part.end) : &layers_[0].altitude_mm;
+  return ColumnSpanOf(below_mm, was_mm, profile).mask ==
+         ColumnSpanOf(below_mm, is_mm, profile).mask;
 }
 
 // All segments of a cell into plain_. Returns where those that are revised are and were.

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -50,6 +51,18 @@ class CombinedTile {
                    const TileSegments& from,
                    CellCombiner& combiner,
                    CombinedTile& out);
+  // What of a cell is combined again: its altitudes, and which of the cell's layers are there.
+  struct Part {
+    CellPart altitudes;
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+  std::optional<Part> FindPart(std::size_t cell,
+                               const TileSegments& from,
+                               const MapProfile& profile);
+  bool IsAtHome(std::size_t cell, const Part& part, const MapProfile& profile) const;
+  CellCombiner::Others CollectPart(std::size_t cell, const Part& part, const TileSegments& from);
+  bool IsCopyable(std::size_t cell, const Part& part, const MapProfile& profile) const;
   CellPart CollectPlainly(std::size_t cell, const TileSegments& from);
   void SetCombined(const TileSegments& from, const CellCombiner& combiner);
   std::span<const std::int32_t> References(std::size_t cell) const;

@@ -215,7 +215,7 @@ std::size_t TileSurveys::bytes() const {
     bytes += stretch.bytes();
   }
   for (const std::string& vehicle : vehicles_) {
-    bytes += sizeof(vehicle) + vehicle.capacity();
+    bytes += sizeof(std::string) + vehicle.capacity();
   }
   return bytes;
 }

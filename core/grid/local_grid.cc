@@ -92,11 +92,11 @@ struct RaySteps {
   int begin;
   int end;
   int misses_end;
+  AltitudeSource source;
 };
 
 void AddLine(const GroundSample& from,
              float slope,
-             AltitudeSource source,
              const RaySteps& steps,
              const RayTable& rays,
              int ray,
@@ -104,7 +104,7 @@ void AddLine(const GroundSample& from,
   const std::uint32_t* below = rays.Cells(ray);
   for (int step = steps.begin; step < steps.end; ++step) {
     TracedCell& cell = cells[below[step]];
-    cell.AddAltitude(from.z_m + slope * (rays.StepRange(step) - from.range_m), source);
+    cell.AddAltitude(from.z_m + slope * (rays.StepRange(step) - from.range_m), steps.source);
     if (step < steps.misses_end) {
       cell.AddMiss();
     }
@@ -124,6 +124,7 @@ void AddRay(const RayProfile& profile,
   int step = 0;
   // The first step from there on that is farther than `range_m`.
   const auto step_behind = [&](float range_m) {
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings): a range is not below 0
     return std::clamp(static_cast<int>(range_m / rays.step_m() + 0.5F), step, last + 1);
   };
   for (std::size_t next = 1; next < profile.ground.size() && step <= last; ++next) {
@@ -131,15 +132,15 @@ void AddRay(const RayProfile& profile,
     const GroundSample& after = profile.ground[next];
     const float slope = (after.z_m - before.z_m) / (after.range_m - before.range_m);
     const int seen_end = step_behind(std::min(after.range_m, end_m));
-    AddLine(before, slope, SourceBefore(after, options), {step, seen_end, misses_end}, rays, ray,
+    AddLine(before, slope, {step, seen_end, misses_end, SourceBefore(after, options)}, rays, ray,
             cells);
     step = seen_end;
     const int end = step_behind(after.range_m);
-    AddLine(before, slope, AltitudeSource::kExtrapolated, {step, end, misses_end}, rays, ray,
+    AddLine(before, slope, {step, end, misses_end, AltitudeSource::kExtrapolated}, rays, ray,
             cells);
     step = end;
   }
-  AddLine(profile.ground.back(), 0.0F, AltitudeSource::kExtrapolated, {step, last + 1, misses_end},
+  AddLine(profile.ground.back(), 0.0F, {step, last + 1, misses_end, AltitudeSource::kExtrapolated},
           rays, ray, cells);
   if (profile.end.is_obstacle && misses_end < rays.steps()) {
     cells[rays.Cells(ray)[misses_end]].AddHit();

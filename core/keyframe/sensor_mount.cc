@@ -139,6 +139,7 @@ Result<SensorMount> SensorMountEstimator::Estimate() const {
   flattest.resize((flattest.size() + 1) / 2);
   const auto median_of = [&flattest](const auto& value) {
     std::vector<double> values;
+    values.reserve(flattest.size());
     for (const Ground& ground : flattest) {
       values.push_back(value(ground));
     }

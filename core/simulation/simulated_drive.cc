@@ -62,6 +62,7 @@ Result<SimulatedDrive> SimulatedDrive::Create(SimulatedWorld world, const DriveO
   SimulatedDrive drive(std::make_shared<const MeshWorld>(std::move(world.mesh)), options);
   std::vector<DrivePath> legs = std::move(world.legs);
   std::vector<DrivePath> oncoming_legs;
+  oncoming_legs.reserve(legs.size());
   for (const DrivePath& leg : legs) {
     oncoming_legs.push_back(leg.Reversed());
   }

@@ -16,6 +16,8 @@ class ListenSocket {
   // is taken.
   static Result<ListenSocket> Open(const std::string& host, std::uint16_t port);
 
+  ListenSocket(const ListenSocket&) = delete;
+  ListenSocket& operator=(const ListenSocket&) = delete;
   ListenSocket(ListenSocket&& other) noexcept
       : address_(std::move(other.address_)),
         port_(other.port_),

@@ -154,7 +154,7 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
   if (!opened) {
     co_return opened.error();
   }
-  const std::shared_ptr<Cursor> cursor = *opened;
+  const std::shared_ptr<Cursor>& cursor = *opened;
   const std::size_t max_tiles = region.at_revision ? kPastTilesPerRead : kTilesPerRead;
   const Blocking<TileBatch> read = [&service, cursor, max_tiles] {
     return NextBatch(service, cursor->query, max_tiles);

@@ -199,7 +199,7 @@ void StretchSurvey::ReleaseOld(std::uint32_t frame, Segment& segment) const {
   const std::int64_t ago_ms = frames_[frame].time_ms - frames_[segment.driven_frame].time_ms;
   if (ago_ms > profile_.driven_hold_ms) {
     segment.driven_frame = Segment::kNone;
-    segment.occupancy = std::max<std::int8_t>(segment.occupancy, -clamp_.usual);
+    segment.occupancy = static_cast<std::int8_t>(std::max<int>(segment.occupancy, -clamp_.usual));
     ReleaseDriven(clamp_, segment.column);
   }
 }

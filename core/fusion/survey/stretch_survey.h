@@ -100,7 +100,7 @@ class StretchSurvey {
                    Occupancy occupancy,
                    std::int64_t weight,
                    std::uint32_t frame,
-                   std::uint32_t segment);
+                   std::uint32_t index);
   // Forgets that the vehicle was there, once it was long ago when `frame` was taken.
   void ReleaseOld(std::uint32_t frame, Segment& segment) const;
   std::int8_t AddOccupancy(int evidence, Occupancy occupancy) const;

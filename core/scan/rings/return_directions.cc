@@ -32,11 +32,11 @@ ReturnDirections MeasureDirections(const PointCloud& cloud, const EgoBox& ego) {
   directions.slope.resize(cloud.size());
   directions.index.resize(cloud.size());
   constexpr std::size_t kPiece = 256;
-  std::array<float, kPiece> x;
-  std::array<float, kPiece> y;
-  std::array<float, kPiece> z;
-  std::array<float, kPiece> azimuth_rad;
-  std::array<float, kPiece> slope;
+  std::array<float, kPiece> x{};
+  std::array<float, kPiece> y{};
+  std::array<float, kPiece> z{};
+  std::array<float, kPiece> azimuth_rad{};
+  std::array<float, kPiece> slope{};
   std::size_t kept = 0;
   for (std::size_t begin = 0; begin < cloud.size(); begin += kPiece) {
     const std::size_t size = std::min(kPiece, cloud.size() - begin);

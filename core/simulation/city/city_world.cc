@@ -73,8 +73,10 @@ std::vector<TrafficParticipant> TrafficOn(const std::vector<DrivePath>& legs,
     TrafficParticipant leading{car, leg, false, kLeading_m, 0.0, 0.0, true};
     traffic.push_back(leading);
     const double first_m = -kOncomingSpeed_m_s * duration_s[leg];
-    for (double start_m = legs[leg].length_m(); start_m > first_m; start_m -= kOncomingStep_m) {
+    double start_m = legs[leg].length_m();
+    while (start_m > first_m) {
       traffic.push_back({car, leg, true, start_m, kOncomingSpeed_m_s, kOncomingLeft_m, false});
+      start_m -= kOncomingStep_m;
     }
   }
   return traffic;

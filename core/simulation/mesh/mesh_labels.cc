@@ -48,8 +48,10 @@ double ShareFacingUp(const TriangleMesh& mesh, double min_up) {
   int flat = 0;
   int facing_up = 0;
   for (int i = 0; i < kProbes * kProbes; ++i) {
-    const Eigen::Array2f at((static_cast<float>(i % kProbes) + 0.5F) / kProbes,
-                            (static_cast<float>(i / kProbes) + 0.5F) / kProbes);
+    const int column = i % kProbes;
+    const int row = i / kProbes;
+    const Eigen::Array2f at((static_cast<float>(column) + 0.5F) / kProbes,
+                            (static_cast<float>(row) + 0.5F) / kProbes);
     MeshRay down;
     down.origin.head<2>() = bounds.min().head<2>().array() + at * bounds.sizes().head<2>().array();
     down.origin.z() = bounds.max().z() + 1.0F;
@@ -75,6 +77,7 @@ std::vector<double> UpperDecks(const std::vector<Facet>& facets, const MeshLabel
   }
   // The largest level first; what is near a larger one belongs to it.
   std::vector<std::pair<double, double>> by_area;
+  by_area.reserve(area_at.size());
   for (const auto& [bin, area_m2] : area_at) {
     by_area.emplace_back(-area_m2, bin * kLevelBin_m);
   }

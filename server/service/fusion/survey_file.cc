@@ -102,11 +102,11 @@ Bytes HashOf(ByteSpan head, ByteSpan payload) {
 }  // namespace
 
 std::uint64_t BuildHash() {
-  static const std::uint64_t hash = [] {
+  static const std::uint64_t kHash = [] {
     const auto program = ReadWhole("/proc/self/exe");
     return program ? Hash64(*program) : 0;
   }();
-  return hash;
+  return kHash;
 }
 
 std::size_t SurveyFileBytes(const SurveyFileHeader& header) {

@@ -44,6 +44,7 @@ class SurveyFiles {
               LogSink log);
   SurveyFiles(const SurveyFiles&) = delete;
   SurveyFiles& operator=(const SurveyFiles&) = delete;
+  ~SurveyFiles() = default;
 
   // Packed; none if there are none to be believed. The file stays: it can be gone on from again.
   std::optional<KeptSurveys> Read(const TileId& id);
