@@ -50,7 +50,7 @@ inline PointCloud Scan(const SyntheticSensor& sensor, const World& world) {
                                       std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
       const std::optional<double> range = world(direction);
       if (range && *range < 100.0) {
-        cloud.points.push_back((*range * direction).cast<float>());
+        cloud.points.emplace_back((*range * direction).cast<float>());
       }
     }
   }

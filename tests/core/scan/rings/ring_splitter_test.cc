@@ -52,7 +52,7 @@ Sample MakeScan(const std::vector<double>& elevations,
                                       std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
       const std::optional<double> range = world(direction);
       if (range && *range < 100.0) {
-        sample.cloud.points.push_back((*range * direction).cast<float>());
+        sample.cloud.points.emplace_back((*range * direction).cast<float>());
         sample.ring.push_back(ring);
       }
     }
