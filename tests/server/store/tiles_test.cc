@@ -159,7 +159,7 @@ TEST_F(TileStoreTest, ScanFindsExactlyTheRectangle) {
     }
   }
   ASSERT_TRUE(Put(MakeKeyframe(1, footprint)).has_value());
-  for (ClaimResult c = Claim(); c.claims.size() > 0 && c.claims[0].id.level == 0; c = Claim()) {
+  for (ClaimResult c = Claim(); !c.claims.empty() && c.claims[0].id.level == 0; c = Claim()) {
     for (const TileClaim& claim : c.claims) {
       ASSERT_TRUE(Finish(claim, Content(1)).has_value());
     }
