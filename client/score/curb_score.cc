@@ -66,6 +66,29 @@ Cell Around(const CellMap& cells, std::uint64_t key) {
   return around;
 }
 
+// What the labels and the judgement say of each cell.
+CellMap CellsOf(std::span<const Eigen::Vector3f> p_level,
+                std::span<const std::uint32_t> labels,
+                std::span<const JudgedReturn> judged) {
+  CellMap cells;
+  for (std::size_t i = 0; i < p_level.size(); ++i) {
+    const Surface surface = SurfaceOf(labels[i]);
+    const bool is_side = surface == Surface::kRoad || surface == Surface::kSidewalk;
+    if (is_side && IsInRange(p_level[i])) {
+      Cell& cell = cells[KeyOf(p_level[i])];
+      (surface == Surface::kRoad ? cell.has_road : cell.has_sidewalk) = true;
+    }
+  }
+  for (const JudgedReturn& judge : judged) {
+    const Eigen::Vector3f& p = p_level[judge.index];
+    if (SurfaceOf(labels[judge.index]) != Surface::kIrrelevant && IsInRange(p)) {
+      Cell& cell = cells[KeyOf(p)];
+      ++(judge.is_called_ground ? cell.ground : cell.obstacle);
+    }
+  }
+  return cells;
+}
+
 double Ratio(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -84,23 +107,7 @@ void CountCurbs(std::span<const Eigen::Vector3f> p_level,
                 std::span<const std::uint32_t> labels,
                 std::span<const JudgedReturn> judged,
                 CurbCounts& counts) {
-  CellMap cells;
-  for (std::size_t i = 0; i < p_level.size(); ++i) {
-    const Surface surface = SurfaceOf(labels[i]);
-    if (surface == Surface::kRoad || surface == Surface::kSidewalk) {
-      if (IsInRange(p_level[i])) {
-        Cell& cell = cells[KeyOf(p_level[i])];
-        (surface == Surface::kRoad ? cell.has_road : cell.has_sidewalk) = true;
-      }
-    }
-  }
-  for (const JudgedReturn& judge : judged) {
-    const Eigen::Vector3f& p = p_level[judge.index];
-    if (SurfaceOf(labels[judge.index]) != Surface::kIrrelevant && IsInRange(p)) {
-      Cell& cell = cells[KeyOf(p)];
-      ++(judge.is_called_ground ? cell.ground : cell.obstacle);
-    }
-  }
+  const CellMap cells = CellsOf(p_level, labels, judged);
   for (const auto& [key, cell] : cells) {
     const Cell around = Around(cells, key);
     const bool is_curb = around.has_road && around.has_sidewalk;

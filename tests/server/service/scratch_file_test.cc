@@ -33,7 +33,7 @@ TEST_F(ScratchFileTest, FailuresAreTyped) {
   EXPECT_EQ(ScratchFile::Create(directory_ / "nowhere").error().code(), StatusCode::kUnavailable);
   auto file = ScratchFile::Create(directory_);
   ASSERT_TRUE(file->Append(1, Bytes{1}).ok());
-  const Status stop(StatusCode::kTimeout, "enough");
+  Status stop(StatusCode::kTimeout, "enough");
   EXPECT_EQ(file->Replay([&](std::uint64_t, ByteSpan) { return stop; }), stop);
 }
 

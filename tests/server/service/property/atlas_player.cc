@@ -163,7 +163,7 @@ UploadRequest AtlasPlayer::RequestOf(const Placing& placing) const {
 void AtlasPlayer::Upload(const Placing& placing) {
   auto answer = Begin<PutKeyframeResult>(
       [&](auto done) { service_->Upload(RequestOf(placing), std::move(done)); });
-  unanswered_.push_back(
+  unanswered_.emplace_back(
       [this, answer = answer.share(), expected = model_.Put(placing), frame = placing.frame] {
         CheckAnswer(StrCat("upload of frame ", frame).c_str(), answer.get(), expected);
       });
@@ -204,7 +204,7 @@ void AtlasPlayer::MovePoses(const std::vector<Placing>& placings) {
   }
   auto answer = Begin<PoseBatchResult>(
       [&](auto done) { service_->UpdatePoses(std::move(request), std::move(done)); });
-  unanswered_.push_back([this, answer = answer.share(), expected = model_.Move(placings)] {
+  unanswered_.emplace_back([this, answer = answer.share(), expected = model_.Move(placings)] {
     CheckAnswer("pose batch", answer.get(), expected);
   });
 }
@@ -213,8 +213,8 @@ void AtlasPlayer::ChangeSession(const Step& step) {
   auto answer = Begin<SessionChangeResult>([&](auto done) {
     service_->ChangeSession({step.session, step.action, "tester", ""}, std::move(done));
   });
-  unanswered_.push_back([this, answer = answer.share(), name = StrCat("session ", step.session),
-                         expected = model_.Change(step.session, step.action)] {
+  unanswered_.emplace_back([this, answer = answer.share(), name = StrCat("session ", step.session),
+                            expected = model_.Change(step.session, step.action)] {
     CheckAnswer(name.c_str(), answer.get(), expected);
   });
 }
