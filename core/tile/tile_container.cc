@@ -1,6 +1,7 @@
 #include "core/tile/tile_container.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/compression.h"
 #include "core/base/hash.h"
@@ -68,20 +69,19 @@ Status CheckHeaderHash(ByteSpan blob, ByteReader& in) {
   return in.ok() && stored == Hash64(header) ? Status() : Damaged("header checksum does not match");
 }
 
-Result<Bytes> ReadSection(ByteReader& in, const TableEntry& entry) {
-  const ByteSpan compressed = in.Raw(entry.compressed);
-  if (!in.ok() || Hash64(compressed) != entry.hash) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("tile: section ", entry.id, " is truncated or damaged"));
-  }
-  Result<Bytes> content = Decompress(compressed, entry.uncompressed);
-  if (!content) {
-    return Error(content.error().WithContext(StrCat("tile: section ", entry.id)));
-  }
-  return content;
-}
+// A blob without a look into its sections.
+struct RawSection {
+  TableEntry entry;
+  ByteSpan compressed;
+};
+struct RawContainer {
+  std::uint64_t key = 0;
+  std::uint64_t profile_hash = 0;
+  std::uint8_t preset = 0;
+  std::vector<RawSection> sections;
+};
 
-Status ReadContainer(ByteSpan blob, TileContainer& container) {
+Status ReadRaw(ByteSpan blob, RawContainer& container) {
   if (blob.size() > kMaxTileBytes) {
     return Damaged("blob is too large");
   }
@@ -94,13 +94,47 @@ Status ReadContainer(ByteSpan blob, TileContainer& container) {
   ATLAS_RETURN_IF_ERROR(ReadTable(in, table));
   ATLAS_RETURN_IF_ERROR(CheckHeaderHash(blob, in));
   for (const TableEntry& entry : table) {
-    Result<Bytes> content = ReadSection(in, entry);
-    if (!content) {
-      return content.error();
+    container.sections.push_back({entry, in.Raw(entry.compressed)});
+    if (!in.ok()) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("tile: section ", entry.id, " is truncated or damaged"));
     }
-    container.sections.push_back({entry.id, *std::move(content)});
   }
   return in.remaining() == 0 ? Status() : Damaged("bytes are left after the last section");
+}
+
+Bytes WriteRaw(const RawContainer& container) {
+  ByteWriter out;
+  out.U32(kMagic);
+  out.U8(kVersion);
+  out.U64(container.key);
+  out.U64(container.profile_hash);
+  out.U8(container.preset);
+  out.U16(static_cast<std::uint16_t>(container.sections.size()));
+  for (const RawSection& section : container.sections) {
+    out.U16(section.entry.id);
+    out.U32(section.entry.uncompressed);
+    out.U32(section.entry.compressed);
+    out.U64(section.entry.hash);
+  }
+  out.U64(Hash64(out.bytes()));
+  for (const RawSection& section : container.sections) {
+    out.Raw(section.compressed);
+  }
+  return out.Take();
+}
+
+Result<Bytes> Unpack(const RawSection& section) {
+  const TableEntry& entry = section.entry;
+  if (Hash64(section.compressed) != entry.hash) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("tile: section ", entry.id, " is truncated or damaged"));
+  }
+  Result<Bytes> content = Decompress(section.compressed, entry.uncompressed);
+  if (!content) {
+    return Error(content.error().WithContext(StrCat("tile: section ", entry.id)));
+  }
+  return content;
 }
 
 }  // namespace
@@ -124,33 +158,66 @@ Bytes EncodeContainerPayload(const TileContainer& container) {
 }
 
 Bytes EncodeContainer(const TileContainer& container) {
-  ByteWriter out;
-  out.U32(kMagic);
-  out.U8(kVersion);
-  out.U64(container.key);
-  out.U64(container.profile_hash);
-  out.U8(container.preset);
-  out.U16(static_cast<std::uint16_t>(container.sections.size()));
-  Bytes bodies;
+  RawContainer raw{container.key, container.profile_hash, container.preset, {}};
+  std::vector<Bytes> compressed;
+  compressed.reserve(container.sections.size());
   for (const TileContainer::Section& section : container.sections) {
-    const Bytes compressed = Compress(section.content, kCompressionLevel);
-    out.U16(section.id);
-    out.U32(static_cast<std::uint32_t>(section.content.size()));
-    out.U32(static_cast<std::uint32_t>(compressed.size()));
-    out.U64(Hash64(compressed));
-    bodies.insert(bodies.end(), compressed.begin(), compressed.end());
+    const Bytes& bytes = compressed.emplace_back(Compress(section.content, kCompressionLevel));
+    const TableEntry entry{section.id, static_cast<std::uint32_t>(section.content.size()),
+                           static_cast<std::uint32_t>(bytes.size()), Hash64(bytes)};
+    raw.sections.push_back({entry, bytes});
   }
-  out.U64(Hash64(out.bytes()));
-  out.Raw(bodies);
-  return out.Take();
+  return WriteRaw(raw);
 }
 
 Result<TileContainer> DecodeContainer(ByteSpan blob) {
-  TileContainer container;
-  if (Status status = ReadContainer(blob, container); !status.ok()) {
+  RawContainer raw;
+  if (Status status = ReadRaw(blob, raw); !status.ok()) {
     return Error(std::move(status));
   }
+  TileContainer container{raw.key, raw.profile_hash, raw.preset, {}};
+  for (const RawSection& section : raw.sections) {
+    Result<Bytes> content = Unpack(section);
+    if (!content) {
+      return Error(content.error());
+    }
+    container.sections.push_back({section.entry.id, *std::move(content)});
+  }
   return container;
+}
+
+Result<Bytes> SelectSections(ByteSpan blob, SectionMask sections) {
+  RawContainer raw;
+  if (Status status = ReadRaw(blob, raw); !status.ok()) {
+    return Error(std::move(status));
+  }
+  std::erase_if(raw.sections, [sections](const RawSection& section) {
+    const std::uint16_t id = section.entry.id;
+    return id < 64 ? (sections >> id & 1u) == 0 : sections != kAllSections;
+  });
+  return WriteRaw(raw);
+}
+
+Result<Bytes> MergeSections(ByteSpan blob, ByteSpan added) {
+  RawContainer merged;
+  RawContainer second;
+  for (const auto& [bytes, raw] : {std::pair{added, &merged}, {blob, &second}}) {
+    if (Status status = ReadRaw(bytes, *raw); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  if (merged.key != second.key || merged.profile_hash != second.profile_hash) {
+    return Error(StatusCode::kInvalidArgument, "tile: sections of different tiles do not go together");
+  }
+  // The first of equals stays.
+  merged.sections.insert(merged.sections.end(), second.sections.begin(), second.sections.end());
+  std::stable_sort(merged.sections.begin(), merged.sections.end(),
+                   [](const RawSection& a, const RawSection& b) { return a.entry.id < b.entry.id; });
+  const auto end = std::unique(
+      merged.sections.begin(), merged.sections.end(),
+      [](const RawSection& a, const RawSection& b) { return a.entry.id == b.entry.id; });
+  merged.sections.erase(end, merged.sections.end());
+  return WriteRaw(merged);
 }
 
 }  // namespace atlas

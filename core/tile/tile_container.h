@@ -30,6 +30,17 @@ Bytes EncodeContainerPayload(const TileContainer& container);
 // The blob, each section compressed.
 Bytes EncodeContainer(const TileContainer& container);
 
+// Sections by their ids: the bit 1 << id; those from 64 on go with all of them.
+using SectionMask = std::uint64_t;
+inline constexpr SectionMask kAllSections = ~SectionMask{0};
+
+// The blob of the same tile with these of its sections only, as they were compressed. Verifies the
+// header, not the sections. Errors as DecodeContainer.
+Result<Bytes> SelectSections(ByteSpan blob, SectionMask sections);
+// The blob with the sections of both, those of `added` where both have one. kInvalidArgument: they
+// are of different tiles.
+Result<Bytes> MergeSections(ByteSpan blob, ByteSpan added);
+
 // Verifies every checksum and size. kUnsupported on another version, kInvalidData otherwise.
 Result<TileContainer> DecodeContainer(ByteSpan blob);
 

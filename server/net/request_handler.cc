@@ -10,6 +10,7 @@
 #include "server/net/on_pool.h"
 #include "server/net/region_reply.h"
 #include "server/net/request_conversion.h"
+#include "server/net/sync_reply.h"
 
 namespace atlas {
 namespace {
@@ -62,6 +63,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyW
     case Envelope::kQueryRegion:
       return request.query_region().has_at_revision() ? QueryThePast(request, out)
                                                       : Query(request, out);
+    case Envelope::kSyncRequest:
+      return Sync(request, out);
     case Envelope::kStatusRequest:
       return ReadStatus(request, out);
     case Envelope::kWaitRequest:
@@ -177,6 +180,17 @@ asio::awaitable<Status> RequestHandler::QueryThePast(const Envelope& request, Re
     co_return place.error();
   }
   co_return co_await SendRegion(service_, reading_pool_, request, *region, out);
+}
+
+asio::awaitable<Status> RequestHandler::Sync(const Envelope& request, ReplyWriter& out) {
+  if (request.sync_request().wait_revision() != 0) {
+    const Result<WaitPlaces::Place> place = places_.Take();
+    if (!place) {
+      co_return place.error();
+    }
+    co_return co_await SendSync(service_, pool_, request, out);
+  }
+  co_return co_await SendSync(service_, pool_, request, out);
 }
 
 asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, ReplyWriter& out) {

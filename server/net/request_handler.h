@@ -45,6 +45,7 @@ class RequestHandler {
   boost::asio::awaitable<Status> ChangeSession(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Sync(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);

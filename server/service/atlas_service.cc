@@ -222,16 +222,31 @@ Result<std::optional<StoredTile>> AtlasService::NextTile(RegionQuery& query) {
   auto tile = query.Next();
   const bool is_damaged = !tile && tile.error().code() == StatusCode::kInvalidData;
   if (is_damaged && !query.is_of_the_past() && query.last_tried()) {
-    const TileId id = *query.last_tried();
-    log_(LogLevel::kError, StrCat("tile ", id, " is damaged and will be built again"));
-    const auto marked =
-        Await<std::uint32_t>([&](auto done) { store_.MarkDirty({id}, std::move(done)); });
-    if (!marked) {
-      log_(LogLevel::kError, marked.error().message());
-    }
-    changes_.Notify();
+    RebuildDamaged(*query.last_tried());
   }
   return tile;
+}
+
+Result<std::optional<SyncPlan>> AtlasService::PlanSync(const SyncRequest& request, bool may_block) {
+  return atlas::PlanSync(request, store_, store_.identity().profile, may_block);
+}
+
+Result<std::optional<StoredTile>> AtlasService::ReadTile(const TileId& id) {
+  auto tile = store_.ReadTile(id);
+  if (!tile && tile.error().code() == StatusCode::kInvalidData) {
+    RebuildDamaged(id);
+  }
+  return tile;
+}
+
+void AtlasService::RebuildDamaged(const TileId& id) {
+  log_(LogLevel::kError, StrCat("tile ", id, " is damaged and will be built again"));
+  const auto marked =
+      Await<std::uint32_t>([&](auto done) { store_.MarkDirty({id}, std::move(done)); });
+  if (!marked) {
+    log_(LogLevel::kError, marked.error().message());
+  }
+  changes_.Notify();
 }
 
 Result<ServiceStatus> AtlasService::ReadStatus() {

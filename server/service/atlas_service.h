@@ -18,6 +18,7 @@
 #include "server/service/history/past_atlas.h"
 #include "server/service/log_sink.h"
 #include "server/service/region/region_query.h"
+#include "server/service/sync/sync_plan.h"
 #include "server/service/upload_check.h"
 #include "server/service/verification/atlas_digest.h"
 #include "server/service/verification/atlas_verify.h"
@@ -93,6 +94,11 @@ class AtlasService {
   // The query's next tile; one that turns out damaged is marked to be built again.
   Result<std::optional<StoredTile>> NextTile(RegionQuery& query);
 
+  // What is to be sent (sync_plan.h); nullopt: that takes the disk, and `may_block` is false.
+  Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request, bool may_block);
+  // nullopt: there is no such tile. kInvalidData: it is damaged, and marked to be built again.
+  Result<std::optional<StoredTile>> ReadTile(const TileId& id);
+
   Result<ServiceStatus> ReadStatus();
   Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
   Result<std::uint64_t> ReadRevision();
@@ -137,6 +143,7 @@ class AtlasService {
   Result<WaitEnd> WaitForWorkers(TimePoint deadline,
                                  const std::stop_token& stop,
                                  DirtyState& state);
+  void RebuildDamaged(const TileId& id);
   Result<PoseBatch> PlacePoses(PoseBatchRequest request);
 
   AtlasStore& store_;

@@ -15,18 +15,14 @@
 #include "core/base/status.h"
 #include "server/store/compaction_types.h"
 #include "server/store/store_types.h"
+#include "server/store/tile_index.h"
 
 namespace atlas {
 
-class AtlasStore {
+class AtlasStore : public TileIndex {
  public:
   template <typename T>
   using Done = std::function<void(Result<T>)>;
-
-  AtlasStore() = default;
-  AtlasStore(const AtlasStore&) = delete;
-  AtlasStore& operator=(const AtlasStore&) = delete;
-  virtual ~AtlasStore() = default;
 
   virtual const AtlasIdentity& identity() const = 0;
   // An opening is noted with the first change that it makes, by the same transaction. Of starts
@@ -89,9 +85,6 @@ class AtlasStore {
 
   // nullopt: there is no such tile.
   virtual Result<std::optional<StoredTile>> ReadTile(const TileId& id) = 0;
-  // Calls `visit` for every tile in the rectangle, in key order, without reading blobs.
-  virtual Status ScanTiles(const TileRect& rect,
-                           const std::function<void(const TileSummary&)>& visit) = 0;
   // Tiles above `after_key` in key order, all levels, up to `limit`; `after_key` -1 is the start.
   virtual Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key,
                                                      std::uint32_t limit) = 0;

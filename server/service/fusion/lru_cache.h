@@ -8,7 +8,7 @@
 #include <mutex>
 #include <utility>
 
-#include "server/service/fusion/lru_list.h"
+#include "core/base/lru_list.h"
 
 namespace atlas {
 

@@ -12,7 +12,7 @@
 #include <unordered_set>
 
 #include "server/service/fusion/kept_surveys.h"
-#include "server/service/fusion/lru_list.h"
+#include "core/base/lru_list.h"
 #include "server/service/fusion/survey_files.h"
 
 namespace atlas {

@@ -19,6 +19,7 @@
 #include "server/store/sqlite/transactions/history_reads.h"
 #include "server/store/sqlite/transactions/session_transactions.h"
 #include "server/store/sqlite/transactions/transactions.h"
+#include "server/store/tile_directory.h"
 
 namespace atlas {
 namespace {
@@ -39,8 +40,9 @@ class SqliteStore final : public AtlasStore {
               std::unique_ptr<Connection> writer)
       : directory_(std::move(directory)),
         identity_(identity),
-        writes_(std::move(writer), {options.max_queued_writes, options.max_group}),
-        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
+        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers),
+        tiles_(options.tile_directory_bytes),
+        writes_(std::move(writer), {options.max_queued_writes, options.max_group}) {}
 
   const AtlasIdentity& identity() const override { return identity_; }
   Result<AtlasLine> ReadLine() override {
@@ -76,7 +78,13 @@ class SqliteStore final : public AtlasStore {
   }
   void FinishTile(FinishedTile tile, Done<FinishResult> done) override {
     const std::uint8_t levels = identity_.profile.levels;
-    Write<FinishResult>(std::move(done), [levels, t = std::move(tile)](Connection& connection) {
+    const TileId id = tile.claim.id;
+    tiles_.BeginChange(id);
+    Done<FinishResult> finish = [this, id, done = std::move(done)](Result<FinishResult> result) {
+      tiles_.EndChange(id);
+      done(std::move(result));
+    };
+    Write<FinishResult>(std::move(finish), [levels, t = std::move(tile)](Connection& connection) {
       return FinishTileInStore(connection, t, levels);
     });
   }
@@ -127,6 +135,8 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<std::optional<StoredTile>>(
         [&id](Connection& connection) { return ReadTileRow(connection, id); });
   }
+  Result<TileBlock> ReadTileBlock(std::uint64_t block) override;
+  TileBlock FindTileBlock(std::uint64_t block) override { return tiles_.Find(block); }
   Status ScanTiles(const TileRect& rect,
                    const std::function<void(const TileSummary&)>& visit) override;
   Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key, std::uint32_t limit) override {
@@ -196,8 +206,9 @@ class SqliteStore final : public AtlasStore {
 
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   AtlasIdentity identity_;
-  WriteQueue writes_;
   ReaderPool readers_;
+  TileDirectory tiles_;
+  WriteQueue writes_;  // ends before what its operations report to
 };
 
 Result<FoundKeyframes> SqliteStore::FindKeyframes(std::span<const KeyframeKey> keys) {
@@ -251,6 +262,21 @@ Result<std::vector<std::int64_t>> SqliteStore::ListKeyframeIds(std::int64_t afte
     }
     return ids;
   });
+}
+
+Result<TileBlock> SqliteStore::ReadTileBlock(std::uint64_t block) {
+  if (TileBlock kept = tiles_.Find(block)) {
+    return kept;
+  }
+  const std::uint64_t version = tiles_.Version(block);
+  Result<TileBlock> read = readers_.Run<TileBlock>([block](Connection& connection) {
+    return Result<TileBlock>(
+        std::make_shared<const std::vector<TileSummary>>(ReadTileBlockRows(connection, block)));
+  });
+  if (read) {
+    tiles_.Insert(block, version, *read);
+  }
+  return read;
 }
 
 Status SqliteStore::ScanTiles(const TileRect& rect,

@@ -18,7 +18,9 @@ struct SqliteStoreOptions {
   std::array<std::uint8_t, 16> new_atlas_id{};
   int writer_cache_kib = 32 * 1024;
   int reader_cache_kib = 4 * 1024;
-  std::size_t max_readers = 16;  // connections; more threads wait for one
+  std::size_t tile_directory_bytes = std::size_t{16}
+                                     << 20;  // which tiles there are (tile_directory.h)
+  std::size_t max_readers = 16;              // connections; more threads wait for one
   std::size_t max_queued_writes = 4'096;
   std::size_t max_group = 64;  // operations a commit
 };

@@ -6,6 +6,7 @@
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/tables/start_table.h"
+#include "server/store/tile_block.h"
 #include "server/store/tile_ranges.h"
 
 namespace atlas {
@@ -199,6 +200,20 @@ void ScanTileRows(Connection& connection,
       }
     }
   }
+}
+
+std::vector<TileSummary> ReadTileBlockRows(Connection& connection, std::uint64_t block) {
+  Query row = connection.Prepare(
+      "SELECT key, revision, payload_hash, blob_bytes FROM tiles INDEXED BY tile_summaries "
+      "WHERE key BETWEEN ? AND ? ORDER BY key");
+  row.Bind(FirstKeyOf(block)).Bind(FirstKeyOf(block + 1) - 1);
+  std::vector<TileSummary> tiles;
+  while (row.Step()) {
+    if (const auto summary = ReadSummary(row)) {
+      tiles.push_back(*summary);
+    }
+  }
+  return tiles;
 }
 
 std::vector<TileSummary> ListTileRows(Connection& connection,

@@ -24,6 +24,8 @@ bool StoreTile(Connection& connection,
 void ScanTileRows(Connection& connection,
                   const TileRect& rect,
                   const std::function<void(const TileSummary&)>& visit);
+// Of a block of tiles (tile_block.h), in key order.
+std::vector<TileSummary> ReadTileBlockRows(Connection& connection, std::uint64_t block);
 std::vector<TileSummary> ListTileRows(Connection& connection,
                                       std::int64_t after_key,
                                       std::uint32_t limit);

@@ -1,4 +1,4 @@
-#include "server/service/fusion/lru_list.h"
+#include "core/base/lru_list.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,0 +1,174 @@
+#include "server/net/sync_conversion.h"
+
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+#include "proto/wire/convert.h"
+
+namespace atlas {
+namespace {
+
+Status Refuse(const std::string& why) {
+  return {StatusCode::kInvalidArgument, StrCat("sync: ", why)};
+}
+
+Eigen::Vector2d PointFromWire(const wire::Area::Point& point) {
+  return 1e-6 *
+         Eigen::Vector2d(static_cast<double>(point.x_um()), static_cast<double>(point.y_um()));
+}
+
+double LengthFromWire(std::uint64_t length_um) {
+  return 1e-6 * static_cast<double>(length_um);
+}
+
+Result<SyncArea::Shape> ShapeFromWire(const wire::Area& area) {
+  switch (area.shape_case()) {
+    case wire::Area::kDisc:
+      return SyncDisc{PointFromWire(area.disc().center()), LengthFromWire(area.disc().radius_um())};
+    case wire::Area::kBox:
+      return SyncBox{PointFromWire(area.box().min()), PointFromWire(area.box().max())};
+    case wire::Area::kCorridor: {
+      SyncCorridor corridor{{}, LengthFromWire(area.corridor().half_width_um())};
+      for (const wire::Area::Point& point : area.corridor().route()) {
+        corridor.route_m.push_back(PointFromWire(point));
+      }
+      return corridor;
+    }
+    case wire::Area::kTiles: {
+      SyncTiles tiles;
+      for (const std::uint64_t key : area.tiles().keys()) {
+        const auto id = TileId::FromKey(key);
+        if (!id) {
+          return Error(id.error().WithContext("sync area"));
+        }
+        tiles.ids.push_back(*id);
+      }
+      return tiles;
+    }
+    case wire::Area::SHAPE_NOT_SET:
+      break;
+  }
+  return Error(Refuse("an area is a disc, a box, a corridor or tiles"));
+}
+
+template <typename Numbers>
+Result<SectionMask> SectionsFromWire(const Numbers& numbers) {
+  SectionMask sections = 0;
+  for (const std::uint32_t number : numbers) {
+    if (number > 63) {
+      return Error(Refuse(StrCat("section ", number, ", expected at most 63")));
+    }
+    sections |= SectionMask{1} << number;
+  }
+  return sections == 0 ? kAllSections : sections;
+}
+
+Result<HeldTiles> HeldFromWire(const wire::SyncRequest& message) {
+  std::vector<HeldTile> tiles;
+  std::vector<HeldBlock> blocks;
+  for (const wire::Held& held : message.held()) {
+    const Result<SectionMask> sections = SectionsFromWire(held.sections());
+    if (!sections) {
+      return Error(sections.error());
+    }
+    if (held.keys_size() != held.payload_hashes_size() || held.blocks_size() != held.masks_size() ||
+        held.blocks_size() != held.digests_size()) {
+      return Error(
+          Refuse("expected a hash for each held tile, a mask and a digest for each block"));
+    }
+    for (int i = 0; i < held.keys_size(); ++i) {
+      tiles.push_back({held.keys(i), held.payload_hashes(i), *sections});
+    }
+    for (int i = 0; i < held.blocks_size(); ++i) {
+      blocks.push_back({held.blocks(i), held.masks(i), held.digests(i), *sections});
+    }
+  }
+  return HeldTiles::Create(std::move(tiles), std::move(blocks));
+}
+
+// Of all that decides on the order.
+std::uint64_t HashOfOrder(const wire::SyncRequest& message) {
+  wire::SyncRequest order;
+  *order.mutable_area() = message.area();
+  order.set_finest_level(message.finest_level());
+  order.set_coarsest_level(message.coarsest_level());
+  return Hash64(BytesFromWire(order.SerializeAsString()));
+}
+
+Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& message) {
+  if (message.cursor().empty()) {
+    return std::nullopt;
+  }
+  ByteReader in(BytesFromWire(message.cursor()));
+  SyncCursor cursor;
+  cursor.revision = in.U64();
+  cursor.priority = std::bit_cast<double>(in.U64());
+  cursor.key = in.U64();
+  const std::uint64_t order = in.U64();
+  if (!in.ok() || in.remaining() > 0 || std::isnan(cursor.priority) ||
+      order != HashOfOrder(message)) {
+    return Error(Refuse("the cursor is not of a reply to this request: ask without one"));
+  }
+  return cursor;
+}
+
+}  // namespace
+
+Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile) {
+  Result<SyncArea::Shape> shape = ShapeFromWire(message.area());
+  if (!shape) {
+    return Error(shape.error());
+  }
+  Result<SyncArea> area = SyncArea::Create(*std::move(shape), profile);
+  if (!area) {
+    return Error(area.error());
+  }
+  const Result<SectionMask> sections = SectionsFromWire(message.sections());
+  if (!sections) {
+    return Error(sections.error());
+  }
+  Result<HeldTiles> held = HeldFromWire(message);
+  if (!held) {
+    return Error(held.error());
+  }
+  const Result<std::optional<SyncCursor>> cursor = CursorFromWire(message);
+  if (!cursor) {
+    return Error(cursor.error());
+  }
+  return SyncRequest{*std::move(area), message.finest_level(), message.coarsest_level(),
+                     *sections,        *std::move(held),       *cursor};
+}
+
+std::string CursorToWire(const SyncCursor& cursor, const wire::SyncRequest& message) {
+  ByteWriter out;
+  out.U64(cursor.revision);
+  out.U64(std::bit_cast<std::uint64_t>(cursor.priority));
+  out.U64(cursor.key);
+  out.U64(HashOfOrder(message));
+  return BytesToWire(out.bytes());
+}
+
+void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out) {
+  out.mutable_removed()->Add(plan.removed.begin(), plan.removed.end());
+  out.set_current_tiles(BytesToWire(plan.current_tiles));
+  out.set_current_blocks(BytesToWire(plan.current_blocks));
+  out.set_not_modified(plan.not_modified);
+  out.mutable_differing_blocks()->Add(plan.differing.begin(), plan.differing.end());
+}
+
+void AnnounceTile(const StoredTile& tile,
+                  std::size_t blob_bytes,
+                  const MapProfile& profile,
+                  wire::SyncManifest& out) {
+  out.add_keys(tile.id.Key());
+  out.add_revisions(tile.revision);
+  out.add_payload_hashes(tile.payload_hash);
+  out.add_bytes(static_cast<std::uint32_t>(blob_bytes));
+  out.add_errors_mm(
+      static_cast<std::uint32_t>(std::lround(1e3 * GeometricError(tile.id.level, profile))));
+}
+
+}  // namespace atlas

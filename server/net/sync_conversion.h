@@ -1,0 +1,24 @@
+// Between the messages of a sync and the plan of what to send.
+#pragma once
+
+#include "proto/wire/envelope.h"
+#include "server/service/atlas_service.h"
+
+namespace atlas {
+
+// kInvalidArgument: an area that is none, a section number above 63, held tiles without hashes, a
+// cursor of another request.
+Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile);
+
+// To go on from: what SyncFromWire reads with the same message.
+std::string CursorToWire(const SyncCursor& cursor, const wire::SyncRequest& message);
+
+// What became of what is held.
+void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out);
+// One tile that follows.
+void AnnounceTile(const StoredTile& tile,
+                  std::size_t blob_bytes,
+                  const MapProfile& profile,
+                  wire::SyncManifest& out);
+
+}  // namespace atlas

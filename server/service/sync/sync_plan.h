@@ -1,0 +1,72 @@
+// What a client that holds some tiles is to be sent, and in which order: first the coarsest tiles
+// of the area, so that there is a map everywhere, then always the tile that removes most error for
+// its bytes, around the vehicle and along its way before what lies off it. A tile never comes
+// before its parent, so that whatever arrived is a map (docs/protocol.md, "Sync").
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/base/bytes.h"
+#include "core/base/status.h"
+#include "server/service/sync/held_tiles.h"
+#include "server/service/sync/sync_area.h"
+#include "server/store/tile_index.h"
+
+namespace atlas {
+
+// Where the reply before ended.
+struct SyncCursor {
+  std::uint64_t revision = 0;  // of the atlas, when the first one began: what changed since comes last
+  double priority = 0.0;       // of the last tile
+  std::uint64_t key = 0;
+};
+
+struct SyncRequest {
+  SyncArea area;
+  std::uint32_t finest_level = 0;
+  std::uint32_t coarsest_level = 0;  // 0: the atlas's coarsest
+  SectionMask sections = kAllSections;
+  HeldTiles held;
+  std::optional<SyncCursor> after;
+};
+
+struct SyncItem {
+  TileSummary tile;
+  SectionMask sections = kAllSections;  // those that are wanted and not held
+  std::uint64_t held_hash = 0;          // of what is held of it and is not like that any more; or 0
+  double priority = 0.0;
+};
+
+struct SyncPlan {
+  std::vector<SyncItem> items;
+  bool is_cut = false;  // there are more: plan again after the last one
+  // A bit for each tile and for each block that is held, by its number, the lowest of the first byte first:
+  // held as it is now, with all sections that are wanted. Those outside of the area have none.
+  Bytes current_tiles;
+  Bytes current_blocks;
+  std::uint64_t not_modified = 0;        // tiles, in blocks or by themselves
+  std::vector<std::uint64_t> removed;    // keys of those that are held and are no more
+  std::vector<std::uint64_t> differing;  // blocks: which of their tiles differ must be asked for
+};
+
+struct SyncLimits {
+  std::size_t max_items = 4'096;
+  std::size_t max_tiles = 262'144;  // in the area, of all levels
+  std::size_t max_blocks = 16'384;  // looked at one by one, a level; larger areas are scanned
+};
+
+// kInvalidArgument: levels that the atlas has not, or an area with too many tiles. nullopt: it
+// takes the disk, and `may_block` is false.
+Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request,
+                                         TileIndex& index,
+                                         const MapProfile& profile,
+                                         bool may_block,
+                                         const SyncLimits& limits = {});
+
+// By how much the map is off where it is of a level: the side of its cells, metres.
+double GeometricError(std::uint8_t level, const MapProfile& profile);
+
+}  // namespace atlas
