@@ -124,6 +124,38 @@ TEST(TileCodecTest, SkipsUnknownSectionsAndMissesColumnsGracefully) {
   EXPECT_EQ(DecodeError(EncodeContainer(container)), StatusCode::kInvalidData);
 }
 
+TEST(TileCodecTest, SectionsAreTakenApartAndPutTogether) {
+  const Tile tile = RandomTile({0, 0, 0}, SmallProfile(), 12);
+  const Bytes blob = EncodeTile(tile, SmallProfile()).blob;
+  EXPECT_EQ(SelectSections(blob, kAllSections).value(), blob);
+  for (SectionMask sections = 0; sections < 1u << 5; sections += 2) {
+    const Bytes part = SelectSections(blob, sections).value();
+    const Bytes rest = SelectSections(blob, ~sections).value();
+    EXPECT_LT(part.size(), sections == 0b11110 ? blob.size() + 1 : blob.size());
+    EXPECT_EQ(MergeSections(part, rest).value(), blob) << sections;
+    EXPECT_EQ(MergeSections(rest, part).value(), blob) << sections;
+    EXPECT_EQ(MergeSections(blob, part).value(), blob) << sections;
+  }
+  // Whoever has the surface alone has the tile without the rest.
+  const auto surface = std::uint64_t{1} << static_cast<int>(TileSection::kSurface);
+  const auto contributors = std::uint64_t{1} << static_cast<int>(TileSection::kContributors);
+  const auto bare =
+      DecodeTile(SelectSections(blob, surface | contributors).value(), SmallProfile());
+  ASSERT_TRUE(bare.has_value()) << bare.error().message();
+  EXPECT_EQ(bare->layers.size(), tile.layers.size());
+}
+
+TEST(TileCodecTest, SectionsOfDifferentTilesDoNotGoTogether) {
+  const Bytes a = EncodeTile(RandomTile({0, 0, 0}, SmallProfile(), 1), SmallProfile()).blob;
+  const Bytes b = EncodeTile(RandomTile({0, 1, 0}, SmallProfile(), 1), SmallProfile()).blob;
+  EXPECT_EQ(MergeSections(a, b).error().code(), StatusCode::kInvalidArgument);
+  for (std::size_t size = 0; size < a.size(); ++size) {
+    const Bytes cut(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_EQ(SelectSections(cut, kAllSections).error().code(), StatusCode::kInvalidData);
+    EXPECT_EQ(MergeSections(a, cut).error().code(), StatusCode::kInvalidData);
+  }
+}
+
 TEST(TileCodecTest, RefusesSectionsThatLie) {
   const Tile tile = RandomTile({0, 0, 0}, SmallProfile(), 11);
   const auto refused = [&](TileSection section, auto change) {

@@ -45,6 +45,29 @@ TEST(EnvelopeTest, RoundTripsThroughAFrame) {
   EXPECT_EQ(parsed->SerializeAsString(), envelope.SerializeAsString());
 }
 
+// Published in docs/protocol.md.
+TEST(EnvelopeTest, GoldenSyncFrame) {
+  wire::Envelope envelope;
+  envelope.set_request_id(2);
+  wire::SyncRequest& sync = *envelope.mutable_sync_request();
+  wire::Area::Disc& disc = *sync.mutable_area()->mutable_disc();
+  disc.mutable_center()->set_x_um(1'500'000);
+  disc.mutable_center()->set_y_um(-2'000'000);
+  disc.set_radius_um(100'000'000);
+  sync.add_sections(2);
+  sync.set_budget_bytes(65'536);
+  wire::Held& held = *sync.add_held();
+  held.add_keys(0x0300'0000'0000'0000);
+  held.add_payload_hashes(0x1122'3344'5566'7788);
+  const Bytes golden = {0x52, 0x41, 0x46, 0x31, 0x37, 0x00, 0x00, 0x00, 0xc9, 0x12, 0xe4, 0xc1,
+                        0x08, 0x02, 0xd2, 0x01, 0x32, 0x0a, 0x13, 0x0a, 0x11, 0x0a, 0x0a, 0x08,
+                        0xc0, 0x8d, 0xb7, 0x01, 0x10, 0xff, 0x91, 0xf4, 0x01, 0x10, 0x80, 0xc2,
+                        0xd7, 0x2f, 0x22, 0x01, 0x02, 0x2a, 0x14, 0x12, 0x08, 0x00, 0x00, 0x00,
+                        0x00, 0x00, 0x00, 0x00, 0x03, 0x1a, 0x08, 0x88, 0x77, 0x66, 0x55, 0x44,
+                        0x33, 0x22, 0x11, 0x30, 0x80, 0x80, 0x04};
+  EXPECT_EQ(EncodeEnvelopeFrame(envelope).value(), golden);
+}
+
 TEST(EnvelopeTest, RefusesTruncation) {
   wire::Envelope envelope;
   envelope.mutable_hello()->set_client_name("a name");
