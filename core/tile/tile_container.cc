@@ -207,12 +207,14 @@ Result<Bytes> MergeSections(ByteSpan blob, ByteSpan added) {
     }
   }
   if (merged.key != second.key || merged.profile_hash != second.profile_hash) {
-    return Error(StatusCode::kInvalidArgument, "tile: sections of different tiles do not go together");
+    return Error(StatusCode::kInvalidArgument,
+                 "tile: sections of different tiles do not go together");
   }
   // The first of equals stays.
   merged.sections.insert(merged.sections.end(), second.sections.begin(), second.sections.end());
-  std::stable_sort(merged.sections.begin(), merged.sections.end(),
-                   [](const RawSection& a, const RawSection& b) { return a.entry.id < b.entry.id; });
+  std::stable_sort(
+      merged.sections.begin(), merged.sections.end(),
+      [](const RawSection& a, const RawSection& b) { return a.entry.id < b.entry.id; });
   const auto end = std::unique(
       merged.sections.begin(), merged.sections.end(),
       [](const RawSection& a, const RawSection& b) { return a.entry.id == b.entry.id; });

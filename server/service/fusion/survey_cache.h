@@ -11,8 +11,8 @@
 #include <optional>
 #include <unordered_set>
 
-#include "server/service/fusion/kept_surveys.h"
 #include "core/base/lru_list.h"
+#include "server/service/fusion/kept_surveys.h"
 #include "server/service/fusion/survey_files.h"
 
 namespace atlas {

@@ -16,10 +16,10 @@
 #include <optional>
 #include <string>
 
+#include "core/base/lru_list.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
 #include "server/service/fusion/kept_surveys.h"
-#include "core/base/lru_list.h"
 #include "server/service/fusion/survey_file.h"
 #include "server/service/log_sink.h"
 #include "server/store/store_types.h"

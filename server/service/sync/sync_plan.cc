@@ -265,8 +265,7 @@ class Planner {
 
   bool IsNew(const SyncItem& item) const {
     return !request_.after || item.priority < request_.after->priority ||
-           (item.priority == request_.after->priority &&
-            item.tile.id.Key() < request_.after->key);
+           (item.priority == request_.after->priority && item.tile.id.Key() < request_.after->key);
   }
 
   static bool ComesBefore(const SyncItem& a, const SyncItem& b) {

@@ -19,8 +19,9 @@ namespace atlas {
 
 // Where the reply before ended.
 struct SyncCursor {
-  std::uint64_t revision = 0;  // of the atlas, when the first one began: what changed since comes last
-  double priority = 0.0;       // of the last tile
+  std::uint64_t revision =
+      0;                  // of the atlas, when the first one began: what changed since comes last
+  double priority = 0.0;  // of the last tile
   std::uint64_t key = 0;
 };
 
@@ -43,8 +44,9 @@ struct SyncItem {
 struct SyncPlan {
   std::vector<SyncItem> items;
   bool is_cut = false;  // there are more: plan again after the last one
-  // A bit for each tile and for each block that is held, by its number, the lowest of the first byte first:
-  // held as it is now, with all sections that are wanted. Those outside of the area have none.
+  // A bit for each tile and for each block that is held, by its number, the lowest of the first
+  // byte first: held as it is now, with all sections that are wanted. Those outside of the area
+  // have none.
   Bytes current_tiles;
   Bytes current_blocks;
   std::uint64_t not_modified = 0;        // tiles, in blocks or by themselves

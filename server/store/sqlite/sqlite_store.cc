@@ -40,9 +40,9 @@ class SqliteStore final : public AtlasStore {
               std::unique_ptr<Connection> writer)
       : directory_(std::move(directory)),
         identity_(identity),
-        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers),
         tiles_(options.tile_directory_bytes),
-        writes_(std::move(writer), {options.max_queued_writes, options.max_group}) {}
+        writes_(std::move(writer), {options.max_queued_writes, options.max_group}),
+        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
   const AtlasIdentity& identity() const override { return identity_; }
   Result<AtlasLine> ReadLine() override {
@@ -206,9 +206,9 @@ class SqliteStore final : public AtlasStore {
 
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   AtlasIdentity identity_;
+  TileDirectory tiles_;  // outlives the writes, which report to it
+  WriteQueue writes_;    // closed last of the connections: only it can empty the write-ahead log
   ReaderPool readers_;
-  TileDirectory tiles_;
-  WriteQueue writes_;  // ends before what its operations report to
 };
 
 Result<FoundKeyframes> SqliteStore::FindKeyframes(std::span<const KeyframeKey> keys) {
