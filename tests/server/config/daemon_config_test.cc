@@ -33,7 +33,7 @@ class DaemonConfigTest : public testing::Test {
   }
 
   std::string File(const std::string& text) const {
-    const std::string path = (directory_ / "atlasd.toml").string();
+    std::string path = (directory_ / "atlasd.toml").string();
     std::ofstream(path) << text;
     return path;
   }
@@ -41,7 +41,7 @@ class DaemonConfigTest : public testing::Test {
     ::setenv(name.c_str(), value.c_str(), 1);
     variables_.push_back(name);
   }
-  static Result<DaemonCommand> Parse(std::vector<std::string> arguments) {
+  static Result<DaemonCommand> Parse(const std::vector<std::string>& arguments) {
     std::vector<const char*> argv = {"atlasd"};
     for (const std::string& argument : arguments) {
       argv.push_back(argument.c_str());
