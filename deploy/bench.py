@@ -12,7 +12,9 @@ import subprocess
 import sys
 import tempfile
 
+import bench_serving
 import bench_updates
+from bench_daemon import Atlas
 
 PIECES = ["00", "02", "04", "08"]  # labelled real scans, docs/data.md
 RUNS = 5
@@ -22,31 +24,6 @@ def emit(name, value, unit, against, reference):
     ratio = value / reference if reference else None
     print(json.dumps({"name": name, "value": round(value, 5), "unit": unit,
                       "against": against, "ratio": ratio and round(ratio, 4)}), flush=True)
-
-
-class Atlas:
-    """A daemon in a directory of its own, and the command line speaking to it."""
-
-    def __init__(self, bin_dir, *profile):
-        self.bin = bin_dir
-        self.folder = tempfile.TemporaryDirectory()
-        self.process = subprocess.Popen(
-            [bin_dir / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
-             "--log-level", "error", *profile], stdout=subprocess.PIPE, text=True)
-        self.server = self.process.stdout.readline().split()[1]
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.terminate()
-        self.process.wait()
-        self.folder.cleanup()
-
-    def run(self, *args):
-        out = subprocess.run([self.bin / "atlas", *map(str, args), "--server", self.server, "--json"],
-                             check=True, stdout=subprocess.PIPE, text=True).stdout
-        return json.loads(out.strip().splitlines()[-1])
 
 
 def drive(name):
@@ -222,17 +199,19 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               "localization": bench_localization, "fusion": bench_fusion, "accuracy": bench_accuracy,
               "curbs": bench_curbs,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
-                 for name, bench in bench_updates.BENCHMARKS.items()}}
+                 for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS}.items()}}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, required=True)
+    parser.add_argument("--nginx", default="nginx", help="for serving")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
+    bench_serving.NGINX = args.nginx
     for name in args.names or BENCHMARKS:
         BENCHMARKS[name](args.bin)
 

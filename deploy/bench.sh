@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the benchmarks named (all, if none) and prints one JSON line a figure:
 # {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion] [accuracy] [curbs]
-#   [speed] [closure] [online] [passes] [corrections] [restarts] [scaling]
+#   [speed] [closure] [online] [passes] [corrections] [restarts] [scaling] [serving]
 # All but fusion, accuracy, online, passes, corrections, restarts and scaling need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the
 # meshes there too. curbs prints a line a threshold instead. curbs, online and passes draw docs/images/*.png.
 set -euo pipefail
@@ -11,6 +11,7 @@ cd "$root"
 . deploy/data.sh
 install_packages "${BUILD_PACKAGES[@]}" "${BENCH_PACKAGES[@]}" python3 xz-utils >&2
 find_data "$root"
+unpack_package nginx build/nginx >&2
 cmake --preset bench >/dev/null
 cmake --build build/bench >&2
-exec /usr/bin/python3 deploy/bench.py --bin build/bench/bin "$@"
+exec /usr/bin/python3 deploy/bench.py --bin build/bench/bin --nginx build/nginx/usr/sbin/nginx "$@"

@@ -1,22 +1,12 @@
 """The benchmarks of deploy/bench.sh on what a change costs: fusion against its oracle, loop closures,
 online updates, passes over the same place, growth with the map. Docs/results.md, "Updates"."""
 
-import json
 import pathlib
-import subprocess
-import sys
+
+from bench_daemon import rows_of
 
 IMAGES = pathlib.Path(__file__).parent.parent / "docs/images"
 WORLDS = ("street", "overpass", "garage")
-
-
-def rows_of(*command):
-    """Each JSON line as it comes."""
-    process = subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, text=True)
-    for line in process.stdout:
-        yield json.loads(line)
-    if process.wait():
-        sys.exit(process.returncode)
 
 
 def bench_speed(bin_dir, emit, drive):

@@ -32,3 +32,12 @@ install_packages() {
   "${sudo[@]}" apt-get update -qq
   "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
+
+# unpack_package PACKAGE DIR: its files without installing it, for a program whose package would start a service.
+unpack_package() {
+  local package=$1 folder=$2
+  [[ -d $folder/usr ]] && return
+  mkdir -p "$folder"
+  (cd "$folder" && apt-get download -qq "$package" 2>/dev/null && dpkg-deb -x "$package"_*.deb .) ||
+    { echo "cannot download the package $package" >&2; return 1; }
+}

@@ -97,6 +97,15 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   return options;
 }
 
+NetOptions NetFrom(const DaemonConfig& config) {
+  NetOptions options;
+  options.threads = config.network_threads > 0
+                        ? config.network_threads
+                        : std::max(1, static_cast<int>(std::thread::hardware_concurrency() / 4));
+  options.tile_frame_bytes = static_cast<std::size_t>(config.reply_mib) << 20;
+  return options;
+}
+
 void Log(LogLevel level, const std::string& message) {
   switch (level) {
     case LogLevel::kDebug:
@@ -121,7 +130,7 @@ int Serve(const DaemonConfig& config) {
   }
   AtlasService service(**store, &NowMs, &Log, ServiceFrom(config));
   const std::string address = socket->address();
-  TcpServer server(service, NetOptions(), *std::move(socket));
+  TcpServer server(service, NetFrom(config), *std::move(socket));
   std::printf("listening %s\n", address.c_str());
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());

@@ -135,9 +135,9 @@ Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
   if (!failure_.ok()) return Error(failure_);
   const Clock::time_point deadline = Clock::now() + timeout;
   while (true) {
-    Result<std::optional<Bytes>> payload = decoder_.Next();
+    const Result<std::optional<ByteSpan>> payload = decoder_.Next();
     if (!payload) return Error(Fail(payload.error().code(), payload.error().message()));
-    if (*payload) return std::move(**payload);
+    if (*payload) return Bytes((*payload)->begin(), (*payload)->end());
     if (Status status = ReadSome(deadline); !status.ok()) return Error(std::move(status));
   }
 }

@@ -74,7 +74,7 @@ ByteSpan BytesFromWire(const std::string& bytes) {
 }
 
 std::string BytesToWire(ByteSpan bytes) {
-  return {bytes.begin(), bytes.end()};
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 wire::Error ErrorToWire(const Status& status) {

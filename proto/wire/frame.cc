@@ -12,6 +12,7 @@ namespace {
 
 // Frozen: "RAF1" (Road Atlas frame, version 1).
 constexpr std::array<std::uint8_t, 4> kMagic = {'R', 'A', 'F', '1'};
+constexpr std::size_t kKeptBytes = 4u << 10;  // of an empty buffer
 
 std::uint32_t PayloadChecksum(ByteSpan payload) {
   return static_cast<std::uint32_t>(Hash64(payload));
@@ -33,15 +34,17 @@ Status BadMagic() {
 
 }  // namespace
 
-Bytes EncodeFrameHeader(ByteSpan payload) {
-  assert(payload.size() <= kMaxFrameBytes);
+Bytes EncodeHeader(const FrameHeader& header) {
+  assert(header.payload_bytes <= kMaxFrameBytes);
   ByteWriter out;
-  for (const std::uint8_t byte : kMagic) {
-    out.U8(byte);
-  }
-  out.U32(static_cast<std::uint32_t>(payload.size()));
-  out.U32(PayloadChecksum(payload));
+  out.Raw(kMagic);
+  out.U32(header.payload_bytes);
+  out.U32(header.checksum);
   return out.Take();
+}
+
+Bytes EncodeFrameHeader(ByteSpan payload) {
+  return EncodeHeader({static_cast<std::uint32_t>(payload.size()), PayloadChecksum(payload)});
 }
 
 Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload_bytes) {
@@ -76,12 +79,19 @@ void FrameDecoder::Push(ByteSpan bytes) {
   if (failure_) {
     return;
   }
-  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(consumed_));
-  consumed_ = 0;
+  DropConsumed();
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
 }
 
-Result<std::optional<Bytes>> FrameDecoder::Next() {
+void FrameDecoder::DropConsumed() {
+  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(consumed_));
+  consumed_ = 0;
+  if (buffer_.capacity() > kKeptBytes + 4 * buffer_.size()) {
+    buffer_.shrink_to_fit();
+  }
+}
+
+Result<std::optional<ByteSpan>> FrameDecoder::Next() {
   if (failure_) {
     return Error(*failure_);
   }
@@ -90,11 +100,13 @@ Result<std::optional<Bytes>> FrameDecoder::Next() {
     failure_ = frame.error();
     buffer_ = {};
     consumed_ = 0;
+  } else if (!*frame) {
+    DropConsumed();
   }
   return frame;
 }
 
-Result<std::optional<Bytes>> FrameDecoder::TakeFrame() {
+Result<std::optional<ByteSpan>> FrameDecoder::TakeFrame() {
   const ByteSpan pending = ByteSpan(buffer_).subspan(consumed_);
   if (!StartsWithMagic(pending)) {
     return Error(BadMagic());
@@ -114,7 +126,7 @@ Result<std::optional<Bytes>> FrameDecoder::TakeFrame() {
     return Error(std::move(status));
   }
   consumed_ += kFrameHeaderBytes + payload.size();
-  return Bytes(payload.begin(), payload.end());
+  return payload;
 }
 
 }  // namespace atlas

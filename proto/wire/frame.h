@@ -18,13 +18,15 @@ inline constexpr std::uint32_t kMaxFrameBytes = 48u << 20;  // payload
 inline constexpr std::uint32_t kProtocolMajor = 1;
 inline constexpr std::uint32_t kProtocolMinor = 4;
 
-// The 12 bytes that go before `payload`.
-Bytes EncodeFrameHeader(ByteSpan payload);
-
 struct FrameHeader {
   std::uint32_t payload_bytes = 0;
-  std::uint32_t checksum = 0;
+  std::uint32_t checksum = 0;  // the low 32 bits of the payload's Hash64
 };
+
+// 12 bytes.
+Bytes EncodeHeader(const FrameHeader& header);
+// Those that go before `payload`.
+Bytes EncodeFrameHeader(ByteSpan payload);
 
 // Exactly kFrameHeaderBytes bytes in. kInvalidData when the magic is wrong (another protocol on
 // this port) or the length is above `max_payload_bytes`.
@@ -33,8 +35,9 @@ Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload
 // kInvalidData when the payload does not have the header's checksum.
 Status CheckFramePayload(const FrameHeader& header, ByteSpan payload);
 
-// Bytes in as they come, payloads out: for peers that read in arbitrary pieces. Holds at most one
-// partial frame; memory grows with what has arrived, never with what a header claims.
+// Bytes in as they come, payloads out: for peers that read in arbitrary pieces. Holds what has
+// arrived and was not handed out; memory grows with that, never with what a header claims, and
+// goes when it is gone.
 class FrameDecoder {
  public:
   explicit FrameDecoder(std::uint32_t max_payload_bytes = kMaxFrameBytes);
@@ -42,13 +45,15 @@ class FrameDecoder {
   // For the frames that Next() has not looked at yet.
   void set_max_payload_bytes(std::uint32_t bytes) { max_payload_bytes_ = bytes; }
   void Push(ByteSpan bytes);
-  // The next whole payload, nullopt if more bytes are needed. An error is final.
-  Result<std::optional<Bytes>> Next();
-  // Bytes have come that Next() did not hand out.
-  bool has_part_of_a_frame() const { return buffer_.size() > consumed_; }
+  // The next whole payload, valid until the next call of anything here; nullopt if more bytes are
+  // needed. An error is final.
+  Result<std::optional<ByteSpan>> Next();
+  // That have come and that Next() did not hand out.
+  std::size_t pending_bytes() const { return buffer_.size() - consumed_; }
 
  private:
-  Result<std::optional<Bytes>> TakeFrame();
+  Result<std::optional<ByteSpan>> TakeFrame();
+  void DropConsumed();
 
   std::uint32_t max_payload_bytes_;
   Bytes buffer_;

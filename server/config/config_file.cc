@@ -1,9 +1,7 @@
 #include "server/config/config_file.h"
 
-#include <algorithm>
-#include <array>
-#include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <toml++/toml.h>
 
@@ -12,30 +10,15 @@
 namespace atlas {
 namespace {
 
-struct Key {
-  std::string_view name;
-  bool is_number;  // else a text
-};
-
-constexpr std::array<Key, 11> kKeys = {{{"listen", false},
-                                        {"data", false},
-                                        {"workers", true},
-                                        {"cache_mib", true},
-                                        {"survey_mib", true},
-                                        {"survey_disk_mib", true},
-                                        {"log_level", false},
-                                        {"map.cell_size", true},
-                                        {"map.segments", true},
-                                        {"map.segment_height", true},
-                                        {"map.preset", false}}};
-
+using Types = std::map<std::string, SettingType>;
 using Settings = std::map<std::string, GivenSetting>;
 
 std::string Origin(const std::filesystem::path& path, const toml::source_region& where) {
   return StrCat(path.string(), ": line ", where.begin.line);
 }
 
-Result<std::string> TextOf(const toml::node& node, bool is_number) {
+Result<std::string> TextOf(const toml::node& node, SettingType type) {
+  const bool is_number = type == SettingType::kNumber;
   if (const auto* text = node.as_string(); text != nullptr && !is_number) {
     return text->get();
   }
@@ -48,35 +31,47 @@ Result<std::string> TextOf(const toml::node& node, bool is_number) {
   return Error(StatusCode::kInvalidArgument, is_number ? "expected a number" : "expected a text");
 }
 
-Status Flatten(const std::filesystem::path& path,
-               const toml::table& table,
-               const std::string& prefix,
-               Settings& settings) {
-  for (const auto& [name, node] : table) {
-    const std::string key = prefix + std::string(name.str());
-    const std::string origin = Origin(path, node.source());
-    const auto* inner = node.as_table();
-    if (inner != nullptr && key == "map") {
-      ATLAS_RETURN_IF_ERROR(Flatten(path, *inner, key + ".", settings));
-      continue;
+class FlatFile {
+ public:
+  FlatFile(const std::filesystem::path& path, const Types& types) : path_(path), types_(types) {}
+
+  Status Add(const toml::table& table, const std::string& prefix = "") {
+    for (const auto& [name, node] : table) {
+      const std::string key = prefix + std::string(name.str());
+      const std::string origin = Origin(path_, node.source());
+      const toml::table* const inner = node.as_table();
+      if (inner != nullptr && IsTable(key)) {
+        ATLAS_RETURN_IF_ERROR(Add(*inner, key + "."));
+        continue;
+      }
+      const auto type = types_.find(key);
+      if (type == types_.end()) {
+        return Status(StatusCode::kInvalidArgument, StrCat(origin, ": unknown key '", key, "'"));
+      }
+      const Result<std::string> text = TextOf(node, type->second);
+      if (!text) {
+        return text.error().WithContext(StrCat(origin, ": '", key, "'"));
+      }
+      settings_[key] = {*text, origin};
     }
-    const auto* const known =
-        std::find_if(kKeys.begin(), kKeys.end(), [&key](const Key& k) { return k.name == key; });
-    if (known == kKeys.end()) {
-      return Status(StatusCode::kInvalidArgument, StrCat(origin, ": unknown key '", key, "'"));
-    }
-    const Result<std::string> text = TextOf(node, known->is_number);
-    if (!text) {
-      return text.error().WithContext(StrCat(origin, ": '", key, "'"));
-    }
-    settings[key] = {*text, origin};
+    return {};
   }
-  return {};
-}
+  Settings Take() { return std::move(settings_); }
+
+ private:
+  bool IsTable(const std::string& key) const {
+    const auto first = types_.lower_bound(key + ".");
+    return first != types_.end() && first->first.starts_with(key + ".");
+  }
+
+  const std::filesystem::path& path_;
+  const Types& types_;
+  Settings settings_;
+};
 
 }  // namespace
 
-Result<Settings> ReadConfigFile(const std::filesystem::path& path) {
+Result<Settings> ReadConfigFile(const std::filesystem::path& path, const Types& types) {
   std::error_code ignored;  // what cannot be looked at cannot be read either
   if (!std::filesystem::exists(path, ignored)) {
     return Error(StatusCode::kNotFound, StrCat("there is no file ", path.string()));
@@ -85,17 +80,17 @@ Result<Settings> ReadConfigFile(const std::filesystem::path& path) {
     return Error(StatusCode::kInvalidArgument,
                  StrCat(path.string(), " is a folder: expected a file"));
   }
-  Settings settings;
+  FlatFile file(path, types);
   try {
     const toml::table table = toml::parse_file(path.string());
-    if (Status status = Flatten(path, table, "", settings); !status.ok()) {
+    if (Status status = file.Add(table); !status.ok()) {
       return Error(std::move(status));
     }
   } catch (const toml::parse_error& error) {
     return Error(StatusCode::kInvalidArgument,
                  StrCat(Origin(path, error.source()), ": ", error.description()));
   }
-  return settings;
+  return file.Take();
 }
 
 }  // namespace atlas

@@ -15,9 +15,11 @@ struct GivenSetting {
   std::string origin;  // "atlasd.toml: line 3", "ATLASD_WORKERS", "--workers"
 };
 
-// By key: "listen", "data", "workers", "cache_mib", "survey_mib", "survey_disk_mib", "log_level",
-// "map.cell_size", "map.segments", "map.segment_height", "map.preset". kInvalidArgument names file
-// and line, kNotFound the file.
-Result<std::map<std::string, GivenSetting>> ReadConfigFile(const std::filesystem::path& path);
+enum class SettingType { kText, kNumber };
+
+// The settings of a file by key, of those that there are; one in a table is "table.key".
+// kInvalidArgument names file and line, kNotFound the file.
+Result<std::map<std::string, GivenSetting>> ReadConfigFile(
+    const std::filesystem::path& path, const std::map<std::string, SettingType>& types);
 
 }  // namespace atlas

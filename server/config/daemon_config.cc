@@ -1,8 +1,11 @@
 #include "server/config/daemon_config.h"
 
+#include <algorithm>
+#include <cassert>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <system_error>
 
@@ -15,50 +18,6 @@
 
 namespace atlas {
 namespace {
-
-struct Setting {
-  const char* key;  // in the file
-  const char* flag;
-  const char* environment;
-  const char* value;  // what kind of one, for --help
-  const char* help;
-};
-
-constexpr Setting kSettings[] = {
-    {"data", "--data", "ATLASD_DATA", "DIR", "directory of the atlas; made if there is none"},
-    {"listen", "--listen", "ATLASD_LISTEN", "HOST:PORT", "loopback only; port 0 takes a free one"},
-    {"workers", "--workers", "ATLASD_WORKERS", "N", "fusion threads; 0 is one a core"},
-    {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "MIB", "memory for decoded keyframes"},
-    {"survey_mib", "--survey-mib", "ATLASD_SURVEY_MIB", "MIB",
-     "memory for what tiles keep from one fusion to the next"},
-    {"survey_disk_mib", "--survey-disk-mib", "ATLASD_SURVEY_DISK_MIB", "MIB",
-     "disk for the same, where memory has no room and after a restart"},
-    {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error"},
-    {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell"},
-    {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
-     "new atlas: segments a column: 2, 4, 8 or 16"},
-    {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT", "M",
-     "new atlas: height of a segment"},
-    {"map.preset", "--preset", "ATLASD_PRESET", "NAME",
-     "new atlas: fusion preset: strict, bounded or paper"},
-};
-
-// What each setting is when it is not given, for --help.
-std::map<std::string, std::string> Defaults() {
-  const DaemonConfig config;
-  const MapProfile map;
-  return {{"data", "must be given"},
-          {"listen", StrCat(config.host, ":", config.port)},
-          {"workers", StrCat(config.workers)},
-          {"cache_mib", StrCat(config.cache_mib)},
-          {"survey_mib", StrCat(config.survey_mib)},
-          {"survey_disk_mib", StrCat(config.survey_disk_mib)},
-          {"log_level", config.log_level},
-          {"map.cell_size", StrCat(map.cell_size_m())},
-          {"map.segments", StrCat(int{map.column_segments})},
-          {"map.segment_height", StrCat(map.segment_height_m())},
-          {"map.preset", StrCat(FusionPresetName(map.preset))}};
-}
 
 using Settings = std::map<std::string, GivenSetting>;
 
@@ -78,12 +37,17 @@ bool IsLoopback(const std::string& host) {
   return host == "::1" || host.starts_with("127.");
 }
 
-Status ApplyListen(const std::string& text, DaemonConfig& config) {
+Status ApplyData(const std::string& /*key*/, const std::string& text, DaemonConfig& config) {
+  config.data = text;
+  return {};
+}
+
+Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig& config) {
   const std::size_t colon = text.rfind(':');
   const auto port = colon == std::string::npos ? std::nullopt
                                                : ParseNumber<std::uint16_t>(text.substr(colon + 1));
   if (!port) {
-    return BadValue("listen", text, "HOST:PORT, the port from 0 to 65535");
+    return BadValue(key, text, "HOST:PORT, the port from 0 to 65535");
   }
   config.port = *port;
   config.host = text.substr(0, colon);
@@ -95,7 +59,7 @@ Status ApplyListen(const std::string& text, DaemonConfig& config) {
   }
   if (!IsLoopback(config.host)) {
     return BadValue(
-        "listen", text,
+        key, text,
         "a loopback address: there is no TLS yet, and nothing leaves this machine in the clear");
   }
   return {};
@@ -116,46 +80,15 @@ Status ApplyCount(const std::string& key, const std::string& text, int low, int 
   return {};
 }
 
-Status ApplyLogLevel(const std::string& text, DaemonConfig& config) {
+Status ApplyLogLevel(const std::string& key, const std::string& text, DaemonConfig& config) {
   if (text != "debug" && text != "info" && text != "warning" && text != "error") {
-    return BadValue("log_level", text, "debug, info, warning or error");
+    return BadValue(key, text, "debug, info, warning or error");
   }
   config.log_level = text;
   return {};
 }
 
-Status Apply(const std::string& key, const std::string& text, DaemonConfig& config) {
-  if (key == "data") {
-    config.data = text;
-    return {};
-  }
-  if (key == "listen") {
-    return ApplyListen(text, config);
-  }
-  if (key == "workers") {
-    return ApplyCount(key, text, 0, 64, config.workers);
-  }
-  if (key == "cache_mib") {
-    return ApplyCount(key, text, 8, 65'536, config.cache_mib);
-  }
-  if (key == "survey_mib") {
-    return ApplyCount(key, text, 0, 1'048'576, config.survey_mib);
-  }
-  if (key == "survey_disk_mib") {
-    return ApplyCount(key, text, 0, 16'777'216, config.survey_disk_mib);
-  }
-  if (key == "log_level") {
-    return ApplyLogLevel(text, config);
-  }
-  if (key == "map.cell_size") {
-    return ApplyNumber(key, text, config.cell_size_m);
-  }
-  if (key == "map.segments") {
-    return ApplyNumber(key, text, config.segments);
-  }
-  if (key == "map.segment_height") {
-    return ApplyNumber(key, text, config.segment_height_m);
-  }
+Status ApplyPreset(const std::string& /*key*/, const std::string& text, DaemonConfig& config) {
   if (!FusionPresetByName(text)) {
     return BadValue("preset", text, "strict, bounded or paper");
   }
@@ -163,11 +96,96 @@ Status Apply(const std::string& key, const std::string& text, DaemonConfig& conf
   return {};
 }
 
+struct Setting {
+  const char* key;  // in the file
+  const char* flag;
+  const char* environment;
+  const char* value;  // what kind of one, for --help
+  const char* help;
+  SettingType type;
+  Status (*apply)(const std::string& key, const std::string& text, DaemonConfig& config);
+};
+
+template <int DaemonConfig::*kMember, int kLow, int kHigh>
+Status ApplyCountTo(const std::string& key, const std::string& text, DaemonConfig& config) {
+  return ApplyCount(key, text, kLow, kHigh, config.*kMember);
+}
+
+template <typename T, std::optional<T> DaemonConfig::*kMember>
+Status ApplyNumberTo(const std::string& key, const std::string& text, DaemonConfig& config) {
+  return ApplyNumber(key, text, config.*kMember);
+}
+
+constexpr Setting kSettings[] = {
+    {"data", "--data", "ATLASD_DATA", "DIR", "directory of the atlas; made if there is none",
+     SettingType::kText, &ApplyData},
+    {"listen", "--listen", "ATLASD_LISTEN", "HOST:PORT", "loopback only; port 0 takes a free one",
+     SettingType::kText, &ApplyListen},
+    {"workers", "--workers", "ATLASD_WORKERS", "N", "fusion threads; 0 is one a core",
+     SettingType::kNumber, &ApplyCountTo<&DaemonConfig::workers, 0, 64>},
+    {"network_threads", "--network-threads", "ATLASD_NETWORK_THREADS", "N",
+     "threads that run connections; 0 is one for every four cores", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::network_threads, 0, 64>},
+    {"cache_mib", "--cache-mib", "ATLASD_CACHE_MIB", "MIB", "memory for decoded keyframes",
+     SettingType::kNumber, &ApplyCountTo<&DaemonConfig::cache_mib, 8, 65'536>},
+    {"survey_mib", "--survey-mib", "ATLASD_SURVEY_MIB", "MIB",
+     "memory for what tiles keep from one fusion to the next", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::survey_mib, 0, 1'048'576>},
+    {"survey_disk_mib", "--survey-disk-mib", "ATLASD_SURVEY_DISK_MIB", "MIB",
+     "disk for the same, where memory has no room and after a restart", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::survey_disk_mib, 0, 16'777'216>},
+    {"reply_mib", "--reply-mib", "ATLASD_REPLY_MIB", "MIB", "memory for tiles ready to be sent",
+     SettingType::kNumber, &ApplyCountTo<&DaemonConfig::reply_mib, 0, 65'536>},
+    {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error",
+     SettingType::kText, &ApplyLogLevel},
+    {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell",
+     SettingType::kNumber, &ApplyNumberTo<double, &DaemonConfig::cell_size_m>},
+    {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
+     "new atlas: segments a column: 2, 4, 8 or 16", SettingType::kNumber,
+     &ApplyNumberTo<int, &DaemonConfig::segments>},
+    {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT", "M",
+     "new atlas: height of a segment", SettingType::kNumber,
+     &ApplyNumberTo<double, &DaemonConfig::segment_height_m>},
+    {"map.preset", "--preset", "ATLASD_PRESET", "NAME",
+     "new atlas: fusion preset: strict, bounded or paper", SettingType::kText, &ApplyPreset},
+};
+
+// What each setting is when it is not given, for --help.
+std::map<std::string, std::string> Defaults() {
+  const DaemonConfig config;
+  const MapProfile map;
+  return {{"data", "must be given"},
+          {"listen", StrCat(config.host, ":", config.port)},
+          {"workers", StrCat(config.workers)},
+          {"network_threads", StrCat(config.network_threads)},
+          {"cache_mib", StrCat(config.cache_mib)},
+          {"survey_mib", StrCat(config.survey_mib)},
+          {"survey_disk_mib", StrCat(config.survey_disk_mib)},
+          {"reply_mib", StrCat(config.reply_mib)},
+          {"log_level", config.log_level},
+          {"map.cell_size", StrCat(map.cell_size_m())},
+          {"map.segments", StrCat(int{map.column_segments})},
+          {"map.segment_height", StrCat(map.segment_height_m())},
+          {"map.preset", StrCat(FusionPresetName(map.preset))}};
+}
+
+Status Apply(const std::string& key, const std::string& text, DaemonConfig& config) {
+  const auto* const setting =
+      std::find_if(std::begin(kSettings), std::end(kSettings),
+                   [&key](const Setting& candidate) { return candidate.key == key; });
+  assert(setting != std::end(kSettings));  // whoever collects them refuses others
+  return setting->apply(key, text, config);
+}
+
 // File, then environment, then flags: later ones win.
 Result<Settings> Collect(const Settings& flags, const std::string& file) {
+  std::map<std::string, SettingType> types;
+  for (const Setting& setting : kSettings) {
+    types[setting.key] = setting.type;
+  }
   Settings settings;
   if (!file.empty()) {
-    Result<Settings> read = ReadConfigFile(file);
+    Result<Settings> read = ReadConfigFile(file, types);
     if (!read) {
       return read;
     }

@@ -17,9 +17,11 @@ struct DaemonConfig {
   std::string host = "127.0.0.1";
   std::uint16_t port = 7447;
   int workers = 0;             // fusion threads; 0: one a core
+  int network_threads = 0;     // that run connections; 0: one for every four cores
   int cache_mib = 128;         // decoded keyframes, all workers together
   int survey_mib = 1024;       // what tiles keep from one fusion to the next
   int survey_disk_mib = 4096;  // the same on disk; 0: nothing
+  int reply_mib = 64;          // tiles ready to be sent
   std::string log_level = "info";
 
   // Of the map, given by whoever starts the daemon; checked against an atlas that exists already.

@@ -10,19 +10,22 @@
 namespace atlas {
 
 struct NetOptions {
-  std::size_t max_connections = 1024;
+  int threads = 2;  // that run connections
+  std::size_t max_connections = 4096;
   std::uint32_t max_hello_bytes = 16u << 10;  // payload of a connection's first frame
   std::uint32_t max_frame_bytes = kMaxFrameBytes;
   std::size_t max_requests_in_flight = 64;     // a connection
   std::size_t max_queued_bytes = 4u << 20;     // replies waiting for a slow reader, a connection
   std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection
   std::size_t max_held_bytes = 512u << 20;     // requests and parts of them, all connections
+  std::size_t tile_frame_bytes = 64u << 20;    // tiles ready to be sent, all connections
   std::size_t max_waits = 16;                  // waits, digests, verifications, all connections
   int service_threads = 4;                     // that may block on the disk
   int reading_threads = 2;                     // for digests and verifications, which read all
   std::chrono::milliseconds handshake{5'000};
-  std::chrono::milliseconds idle{3'600'000};      // between two frames
-  std::chrono::milliseconds frame{30'000};        // from a frame's first byte to its last
+  std::chrono::milliseconds idle{3'600'000};  // between two frames
+  std::chrono::milliseconds frame{30'000};    // from a frame's first byte to its last, and besides
+  std::size_t min_bytes_per_s = 8u << 10;     // as much time as its bytes take at this rate
   std::chrono::milliseconds write_stall{30'000};  // without a byte taken by the peer
   std::chrono::milliseconds linger{1'000};        // for a refused peer that still sends to read why
   std::chrono::milliseconds drain{10'000};        // for requests in flight at shutdown

@@ -19,9 +19,10 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/byte_budget.h"
-#include "server/net/peer_connection.h"
-#include "server/net/request_handler.h"
+#include "server/net/connection/byte_budget.h"
+#include "server/net/connection/net_thread.h"
+#include "server/net/places.h"
+#include "server/net/requests/request_handler.h"
 
 namespace atlas {
 namespace {
@@ -41,12 +42,21 @@ class TcpServer::Impl {
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
         budget_(options.max_held_bytes),
+        places_(options.max_connections),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
-        signals_(io_, SIGTERM, SIGINT) {}
+        signals_(io_, SIGTERM, SIGINT) {
+    for (int i = 0; i < options.threads; ++i) {
+      threads_.push_back(std::make_unique<NetThread>(handler_, budget_, options_));
+    }
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
-  // Calls on the pools and writes of the store report to `io_`: none may be left when it goes.
+  // Calls on the pools and writes of the store report to the threads: none may be left when they
+  // go.
   ~Impl() {
+    for (const auto& thread : threads_) {
+      thread->Stop();
+    }
     pool_.join();
     reading_pool_.join();
     service_.Flush();
@@ -74,9 +84,10 @@ class TcpServer::Impl {
  private:
   asio::awaitable<void> Accept() {
     while (acceptor_.is_open()) {
+      NetThread& thread = LeastBusyThread();
       error_code error;
-      tcp::socket socket =
-          co_await acceptor_.async_accept(asio::redirect_error(asio::use_awaitable, error));
+      tcp::socket socket = co_await acceptor_.async_accept(
+          thread.io(), asio::redirect_error(asio::use_awaitable, error));
       if (error == asio::error::operation_aborted) {
         co_return;
       }
@@ -87,23 +98,27 @@ class TcpServer::Impl {
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
         continue;
       }
-      Admit(std::move(socket));
+      Admit(std::move(socket), thread);
     }
   }
 
-  void Admit(tcp::socket socket) {
-    std::erase_if(connections_, [](const auto& weak) { return weak.expired(); });
-    if (connections_.size() >= options_.max_connections) {
+  // One of those with the fewest connections.
+  NetThread& LeastBusyThread() const {
+    return **std::min_element(threads_.begin(), threads_.end(), [](const auto& a, const auto& b) {
+      return a->connections() < b->connections();
+    });
+  }
+
+  void Admit(tcp::socket socket, NetThread& thread) {
+    Places::Place place = places_.Take();
+    if (place == nullptr) {
       NoteRefusal();
       Refuse(std::move(socket));
       return;
     }
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
-    const auto connection =
-        std::make_shared<PeerConnection>(std::move(socket), handler_, budget_, options_);
-    connections_.push_back(connection);
-    connection->Start();
+    thread.Serve(std::move(socket), std::move(place));
   }
 
   // One line a second, however many come.
@@ -113,7 +128,7 @@ class TcpServer::Impl {
     if (now - refusal_noted_at_ < std::chrono::seconds(1)) {
       return;
     }
-    spdlog::warn("connections refused: {} by now, {} are open", refused_, connections_.size());
+    spdlog::warn("connections refused: {} by now, {} are open", refused_, places_.taken());
     refusal_noted_at_ = now;
   }
 
@@ -140,10 +155,8 @@ class TcpServer::Impl {
     error_code ignored;  // it may be closed already
     acceptor_.close(ignored);
     signals_.cancel(ignored);
-    for (const auto& weak : connections_) {
-      if (const auto connection = weak.lock()) {
-        connection->Drain();
-      }
+    for (const auto& thread : threads_) {
+      thread->Drain();
     }
     drain_limit_ = std::make_unique<asio::steady_timer>(io_, options_.drain);
     drain_limit_->async_wait([this](error_code error) {
@@ -157,8 +170,7 @@ class TcpServer::Impl {
 
   asio::awaitable<void> StopWhenIdle() {
     asio::steady_timer pause(io_);
-    while (!std::all_of(connections_.begin(), connections_.end(),
-                        [](const auto& weak) { return weak.expired(); })) {
+    while (places_.taken() > 0) {
       pause.expires_after(std::chrono::milliseconds(10));
       co_await pause.async_wait(asio::use_awaitable);
     }
@@ -171,10 +183,11 @@ class TcpServer::Impl {
   asio::thread_pool reading_pool_;
   RequestHandler handler_;
   ByteBudget budget_;
-  asio::io_context io_{1};  // after what its coroutines refer to
+  Places places_;  // of connections
+  std::vector<std::unique_ptr<NetThread>> threads_;
+  asio::io_context io_{1};  // what accepts; after what its coroutines refer to
   tcp::acceptor acceptor_;
   asio::signal_set signals_;
-  std::vector<std::weak_ptr<PeerConnection>> connections_;
   std::uint64_t refused_ = 0;  // connections
   std::chrono::steady_clock::time_point refusal_noted_at_;
   std::unique_ptr<asio::steady_timer> drain_limit_;

@@ -165,13 +165,9 @@ Result<WaitOutcome> AtlasService::WaitUntilClean(const Patience& patience) {
 }
 
 Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& patience) {
-  const auto current = ReadRevision();
-  if (!current) {
-    return current.error();
-  }
-  if (revision > *current) {
+  if (const std::uint64_t current = store_.revision(); revision > current) {
     return Status(StatusCode::kInvalidArgument,
-                  StrCat("cannot wait for revision ", revision, ", the atlas is at ", *current));
+                  StrCat("cannot wait for revision ", revision, ", the atlas is at ", current));
   }
   DirtyState state;
   const auto end = WaitFor(
@@ -262,14 +258,6 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
                        ResidentBytes()};
 }
 
-Result<std::uint64_t> AtlasService::ReadRevision() {
-  const auto state = store_.ReadDirtyState();
-  if (!state) {
-    return Error(state.error());
-  }
-  return state->revision;
-}
-
 Result<AtlasService::WaitEnd> AtlasService::WaitForWorkers(TimePoint deadline,
                                                            const std::stop_token& stop,
                                                            DirtyState& state) {
@@ -297,11 +285,11 @@ Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
     if (!digest) {
       return Error(digest.error());
     }
-    const auto after = ReadRevision();
+    const auto after = store_.ReadDirtyState();
     if (!after) {
       return Error(after.error());
     }
-    if (*after == before.revision) {
+    if (after->revision == before.revision) {
       digest->revision = before.revision;
       return digest;
     }

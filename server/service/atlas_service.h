@@ -94,14 +94,16 @@ class AtlasService {
   // The query's next tile; one that turns out damaged is marked to be built again.
   Result<std::optional<StoredTile>> NextTile(RegionQuery& query);
 
-  // What is to be sent (sync_plan.h); nullopt: that takes the disk, and `may_block` is false.
+  // What is to be sent (sync_plan.h); nullopt: that takes the disk or long, and `may_block` is
+  // false.
   Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request, bool may_block);
   // nullopt: there is no such tile. kInvalidData: it is damaged, and marked to be built again.
   Result<std::optional<StoredTile>> ReadTile(const TileId& id);
 
   Result<ServiceStatus> ReadStatus();
   Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
-  Result<std::uint64_t> ReadRevision();
+  // Of the last change on disk; never blocks.
+  std::uint64_t revision() const { return store_.revision(); }
 
   // Of a clean atlas that did not change meanwhile; kTimeout if that takes longer, kInvalidData if
   // damage keeps it from becoming clean.

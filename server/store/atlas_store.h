@@ -25,6 +25,9 @@ class AtlasStore : public TileIndex {
   using Done = std::function<void(Result<T>)>;
 
   virtual const AtlasIdentity& identity() const = 0;
+  // Of the last change on disk; whoever was told of a change finds it counted. Never blocks, and is
+  // of no snapshot: a reader may see what is just being committed.
+  virtual std::uint64_t revision() const = 0;
   // An opening is noted with the first change that it makes, by the same transaction. Of starts
   // before a damaged one nothing is known.
   virtual Result<AtlasLine> ReadLine() = 0;

@@ -17,6 +17,8 @@ FLOOR_4 = FLOOR_3 + ["core/keyframe", "core/tile"]
 FUSED = FLOOR_1 + ["core/keyframe", "core/tile", "core/fusion", "core/fusion/observation", "server/store"]
 STORE = FLOOR_1 + ["server/store"]
 WIRE = ["proto/wire", "proto/roadatlas/v1"]
+SERVING = FLOOR_1 + WIRE + ["server/service"]
+NET = ["server/net/net_options.h", "server/net/places.h"]
 COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/output", "client/connection"]
 ALLOWED = {
     "core/base": [],
@@ -66,7 +68,10 @@ ALLOWED = {
     "server/service/compaction": FUSED + ["server/service/fusion", "server/service/upload_check.h"],
     "server/service/history": FUSED + ["server/service/fusion", "server/service/region",
                                        "server/service/verification"],
-    "server/net": FLOOR_1 + WIRE + ["server/service"],
+    "server/net": SERVING + ["server/net/connection", "server/net/requests"],
+    "server/net/connection": SERVING + NET + ["server/net/requests", "server/net/stream"],
+    "server/net/requests": SERVING + NET + ["core/tile", "server/net/stream"],
+    "server/net/stream": FLOOR_1 + WIRE + NET,
     "server/config": FLOOR_1,
     "server": FLOOR_1 + ["server/config", "server/net", "server/service", "server/store",
                          "server/store/sqlite"],

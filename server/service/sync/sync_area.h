@@ -51,6 +51,8 @@ class SyncArea {
   TileRect Bounds(std::uint8_t level) const;
   // The tiles, where it is made of them.
   const std::vector<TileId>* tiles() const;
+  // Of the vehicle and its way.
+  std::size_t way_points() const { return way_m_.size(); }
   // How far a tile is from the vehicle and its way, metres; what lies farther along the way counts
   // as farther off. 0 where the area says nothing of a vehicle.
   double Distance(const TileId& id) const;

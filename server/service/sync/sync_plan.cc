@@ -72,7 +72,7 @@ class Planner {
   }
 
  private:
-  // False: it takes the disk.
+  // False: it takes the disk, or long.
   Result<bool> RunLevel() {
     parents_ = std::exchange(here_, {});
     if (request_.area.tiles() != nullptr) {
@@ -113,6 +113,10 @@ class Planner {
   }
 
   Result<bool> RunBlocks(const std::vector<std::uint64_t>& blocks) {
+    work_ += blocks.size() * std::max<std::size_t>(request_.area.way_points(), 1);
+    if (!may_block_ && work_ > limits_.max_work_at_once) {
+      return false;
+    }
     for (const std::uint64_t block : blocks) {
       TileBlock tiles = index_.FindTileBlock(block);
       if (tiles == nullptr) {
@@ -324,6 +328,7 @@ class Planner {
   std::vector<bool> is_tile_seen_;  // of those that are held
   std::vector<bool> is_block_seen_;
   std::size_t tiles_ = 0;
+  std::size_t work_ = 0;
   SyncPlan plan_;
 };
 

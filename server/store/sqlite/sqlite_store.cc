@@ -32,6 +32,10 @@ ConnectionOptions ReaderOptions(const SqliteStoreOptions& options, std::filesyst
   return {std::move(file), ConnectionOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
 }
 
+std::uint64_t ReadRevision(Connection& connection) {
+  return ReadCounter(connection, Counter::kRevision);
+}
+
 class SqliteStore final : public AtlasStore {
  public:
   SqliteStore(const SqliteStoreOptions& options,
@@ -41,10 +45,11 @@ class SqliteStore final : public AtlasStore {
       : directory_(std::move(directory)),
         identity_(identity),
         tiles_(options.tile_directory_bytes),
-        writes_(std::move(writer), {options.max_queued_writes, options.max_group}),
+        writes_(std::move(writer), {options.max_queued_writes, options.max_group, &ReadRevision}),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
   const AtlasIdentity& identity() const override { return identity_; }
+  std::uint64_t revision() const override { return writes_.revision(); }
   Result<AtlasLine> ReadLine() override {
     return readers_.Run<AtlasLine>([](Connection& connection) {
       return AtlasLine{ReadStarts(connection), ReadCounter(connection, Counter::kRevision)};

@@ -54,7 +54,7 @@ TEST(FrameTest, DecodesByteByByte) {
     auto next = decoder.Next();
     ASSERT_TRUE(next.has_value()) << next.error().message();
     if (*next) {
-      payloads.push_back(**next);
+      payloads.emplace_back((*next)->begin(), (*next)->end());
     }
   }
   EXPECT_EQ(payloads, (std::vector<Bytes>{FromText("first"), {}, FromText("third one")}));
@@ -80,7 +80,7 @@ TEST(FrameTest, DecodesAnyPieces) {
     decoder.Push(ByteSpan(stream).subspan(at, size));
     at += size;
     for (auto next = decoder.Next(); next.value().has_value(); next = decoder.Next()) {
-      received.push_back(**next);
+      received.emplace_back((*next)->begin(), (*next)->end());
     }
   }
   EXPECT_EQ(received, sent);

@@ -116,7 +116,7 @@ TEST_F(SyncTest, EverythingComesCoarseFirstAsItIsStored) {
   const SyncReply sync = Ask(*peer, SyncOf(3));
   EXPECT_EQ(KeysOf(sync.tiles), StoredKeys());
   EXPECT_EQ(sync.end.cursor(), "");
-  EXPECT_EQ(sync.end.revision(), service_->ReadRevision().value());
+  EXPECT_EQ(sync.end.revision(), service_->revision());
   std::set<std::uint64_t> sent;
   for (const wire::TileMessage& tile : sync.tiles) {
     const TileId id = TileId::FromKey(tile.key()).value();

@@ -11,7 +11,10 @@
 namespace atlas {
 
 WriteQueue::WriteQueue(std::unique_ptr<Connection> connection, const Options& options)
-    : connection_(std::move(connection)), options_(options), thread_([this] { Loop(); }) {}
+    : connection_(std::move(connection)),
+      options_(options),
+      revision_(options_.read_revision(*connection_)),
+      thread_([this] { Loop(); }) {}
 
 WriteQueue::~WriteQueue() {
   {
@@ -95,7 +98,9 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
         return results[i];  // SQLite gave the whole transaction up
       }
     }
+    const std::uint64_t revision = options_.read_revision(*connection_);
     connection_->Execute("COMMIT");
+    revision_.store(revision);
     return {};
   } catch (const std::exception& error) {
     return RollBack(StatusFromException(error));

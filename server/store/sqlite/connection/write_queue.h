@@ -3,8 +3,10 @@
 // leaves no trace and does not disturb the others of its group.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -22,6 +24,10 @@ class WriteQueue {
   struct Options {
     std::size_t max_queued = 4'096;  // operations; more are refused at once
     std::size_t max_group = 64;      // measured: 14 x the rate of one operation a commit
+    // What revision() is: read in each transaction, and once at the start.
+    std::function<std::uint64_t(Connection&)> read_revision = [](Connection&) {
+      return std::uint64_t{0};
+    };
   };
   struct Operation {
     std::function<Status(Connection&)> run;     // in a savepoint
@@ -37,6 +43,8 @@ class WriteQueue {
   void Submit(Operation operation);
   // Waits until everything queued so far is finished.
   void Flush();
+  // Of what is committed, before those who committed it are told. From any thread.
+  std::uint64_t revision() const { return revision_.load(); }
 
  private:
   bool Enqueue(Operation& operation, std::size_t max_queued);
@@ -49,6 +57,7 @@ class WriteQueue {
 
   std::unique_ptr<Connection> connection_;
   Options options_;
+  std::atomic<std::uint64_t> revision_;
   std::mutex mutex_;
   std::condition_variable has_work_;
   std::deque<Operation> queue_;

@@ -1,4 +1,4 @@
-#include "server/net/atlas_wait.h"
+#include "server/net/requests/atlas_wait.h"
 
 #include <algorithm>
 #include <utility>
@@ -8,7 +8,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "core/base/str_cat.h"
-#include "server/net/on_pool.h"
+#include "server/net/requests/on_pool.h"
 
 namespace atlas {
 namespace {

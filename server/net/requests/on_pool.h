@@ -11,7 +11,7 @@
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/thread_pool.hpp>
 
-#include "server/net/one_shot.h"
+#include "server/net/requests/one_shot.h"
 
 namespace atlas {
 

@@ -1,4 +1,4 @@
-#include "server/net/sync_conversion.h"
+#include "server/net/requests/sync_conversion.h"
 
 #include <bit>
 #include <cmath>
@@ -159,16 +159,15 @@ void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out) {
   out.mutable_differing_blocks()->Add(plan.differing.begin(), plan.differing.end());
 }
 
-void AnnounceTile(const StoredTile& tile,
-                  std::size_t blob_bytes,
+void AnnounceTile(const TileBody& tile,
+                  std::uint8_t level,
                   const MapProfile& profile,
                   wire::SyncManifest& out) {
-  out.add_keys(tile.id.Key());
-  out.add_revisions(tile.revision);
-  out.add_payload_hashes(tile.payload_hash);
-  out.add_bytes(static_cast<std::uint32_t>(blob_bytes));
-  out.add_errors_mm(
-      static_cast<std::uint32_t>(std::lround(1e3 * GeometricError(tile.id.level, profile))));
+  out.add_keys(tile.id().key);
+  out.add_revisions(tile.id().revision);
+  out.add_payload_hashes(tile.id().payload_hash);
+  out.add_bytes(static_cast<std::uint32_t>(tile.blob_bytes()));
+  out.add_errors_mm(static_cast<std::uint32_t>(std::lround(1e3 * GeometricError(level, profile))));
 }
 
 }  // namespace atlas

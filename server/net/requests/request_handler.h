@@ -1,19 +1,24 @@
 // One request in, its replies out: the wire's side of every use case of AtlasService.
 #pragma once
 
+#include <memory>
+#include <optional>
+
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/thread_pool.hpp>
 
 #include "proto/wire/envelope.h"
 #include "server/net/net_options.h"
-#include "server/net/reply_writer.h"
-#include "server/net/wait_places.h"
+#include "server/net/requests/sync_reply.h"
+#include "server/net/requests/tile_frames.h"
+#include "server/net/requests/wait_places.h"
+#include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {
 
-// Shared by all connections; used on the network thread only. What may block runs on `pool`, what
-// reads the whole store on `reading_pool`. All arguments outlive this.
+// Shared by all connections and their threads. What may block runs on `pool`, what reads the whole
+// store on `reading_pool`. All arguments outlive this.
 class RequestHandler {
  public:
   RequestHandler(AtlasService& service,
@@ -24,18 +29,21 @@ class RequestHandler {
         pool_(pool),
         reading_pool_(reading_pool),
         options_(options),
-        places_(options.max_waits) {}
+        places_(options.max_waits),
+        frames_(options.tile_frame_bytes) {}
 
-  // The first frame of a connection. False when it ends the connection; the error was then sent.
-  boost::asio::awaitable<bool> Greet(wire::Envelope request, ReplyWriter& out);
-  // Every later one: sends its replies, or one error.
-  boost::asio::awaitable<void> Handle(wire::Envelope request, ReplyWriter& out);
+  // The first frame of a connection. False when it ends the connection; the error is then queued.
+  bool Greet(const wire::Envelope& request, ReplyWriter& out) const;
+  // Every later one, which gets its replies, or one error. What can be answered from memory is, at
+  // once; else the rest is to be awaited.
+  std::optional<boost::asio::awaitable<void>> Handle(wire::Envelope request, ReplyWriter& out);
 
  private:
   using Envelope = wire::Envelope;
   template <typename Request, typename T>
   using Writing = void (AtlasService::*)(Request, AtlasStore::Done<T>);
 
+  boost::asio::awaitable<void> Await(Envelope request, ReplyWriter& out);
   boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
   template <typename Request, typename T>
@@ -45,7 +53,10 @@ class RequestHandler {
   boost::asio::awaitable<Status> ChangeSession(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> Sync(const Envelope& request, ReplyWriter& out);
+  // False: what is left takes long, or the disk, or the peer does not take it.
+  static bool SyncAtOnce(SyncReply& reply, ReplyWriter& out);
+  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
+  boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
   boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);
@@ -59,6 +70,7 @@ class RequestHandler {
   boost::asio::thread_pool& reading_pool_;
   const NetOptions& options_;
   WaitPlaces places_;
+  TileFrames frames_;
 };
 
 }  // namespace atlas

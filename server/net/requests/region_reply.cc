@@ -1,4 +1,4 @@
-#include "server/net/region_reply.h"
+#include "server/net/requests/region_reply.h"
 
 #include <memory>
 #include <optional>
@@ -7,8 +7,8 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/atlas_wait.h"
-#include "server/net/on_pool.h"
+#include "server/net/requests/atlas_wait.h"
+#include "server/net/requests/on_pool.h"
 
 namespace atlas {
 namespace {
@@ -63,10 +63,7 @@ struct Cursor {
 Result<std::shared_ptr<Cursor>> OpenCursor(AtlasService& service,
                                            const RegionRequest& region,
                                            const Patience& patience) {
-  const Result<std::uint64_t> current = service.ReadRevision();
-  if (!current) {
-    return Error(current.error());
-  }
+  const std::uint64_t current = service.revision();
   RegionQuery::Options options;
   options.end_bytes = kFrameOverheadBytes;
   options.tile_cost = &TileCost;
@@ -74,7 +71,7 @@ Result<std::shared_ptr<Cursor>> OpenCursor(AtlasService& service,
   if (!query) {
     return Error(query.error());
   }
-  return std::make_shared<Cursor>(Cursor{std::move(*query), region.at_revision.value_or(*current)});
+  return std::make_shared<Cursor>(Cursor{std::move(*query), region.at_revision.value_or(current)});
 }
 
 struct Sent {
@@ -88,16 +85,20 @@ asio::awaitable<Result<bool>> SendBatch(std::uint64_t request_id,
                                         Sent& sent,
                                         ReplyWriter& out) {
   for (const StoredTile& tile : batch) {
-    Result<Bytes> frame = EncodeEnvelopeFrame(TileEnvelope(request_id, tile));
-    if (!frame) {
-      co_return Error(frame.error());
+    Result<Bytes> bytes = EncodeEnvelopeFrame(TileEnvelope(request_id, tile));
+    if (!bytes) {
+      co_return Error(bytes.error());
     }
+    const ReplyFrame frame(*std::move(bytes));
     ++sent.tiles;
-    sent.bytes += frame->size();
-    if (!co_await out.Send(std::move(*frame))) {
+    sent.bytes += frame.size();
+    const bool is_open = co_await out.WaitForRoom();
+    if (!is_open) {
       co_return false;
     }
+    out.Push(frame);
   }
+  out.Flush();
   co_return true;
 }
 
@@ -181,7 +182,8 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
   if (!end) {
     co_return end.error();
   }
-  co_await out.Send(std::move(*end));
+  out.Push(ReplyFrame(*std::move(end)));
+  out.Flush();
   co_return Status();
 }
 

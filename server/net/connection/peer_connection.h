@@ -1,9 +1,12 @@
 // One peer: reads its frames, lets its requests run side by side, keeps it within its limits. Lives
-// on the network thread; owned by its own coroutines.
+// on its network thread; owned by its own coroutines.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 #include <boost/asio/awaitable.hpp>
@@ -12,20 +15,31 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include "proto/wire/frame.h"
-#include "server/net/byte_budget.h"
+#include "server/net/connection/byte_budget.h"
 #include "server/net/net_options.h"
-#include "server/net/reply_writer.h"
-#include "server/net/request_handler.h"
+#include "server/net/places.h"
+#include "server/net/requests/request_handler.h"
+#include "server/net/stream/peer_stream.h"
+#include "server/net/stream/reply_writer.h"
 
 namespace atlas {
 
 class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
  public:
-  // `handler`, `budget` and `options` outlive this.
+  using Clock = std::chrono::steady_clock;
+
+  // All outlive this; `buffer` is its thread's, to read into: what is in there is handled before
+  // anybody else runs.
+  struct Surroundings {
+    RequestHandler& handler;
+    ByteBudget& budget;
+    std::span<std::uint8_t> buffer;
+    const NetOptions& options;
+  };
+
   PeerConnection(boost::asio::ip::tcp::socket socket,
-                 RequestHandler& handler,
-                 ByteBudget& budget,
-                 const NetOptions& options);
+                 Places::Place place,
+                 const Surroundings& surroundings);
   PeerConnection(const PeerConnection&) = delete;
   PeerConnection& operator=(const PeerConnection&) = delete;
   ~PeerConnection() { budget_.GiveBack(held_bytes_); }
@@ -34,23 +48,28 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   void Start();
   // Takes no further request; closes when those in flight are answered.
   void Drain();
-  void CloseNow() { writer_.CloseNow(); }
+  void CloseNow();
+  // To be called now and then: closes when the peer owes something for too long.
+  void CheckDeadlines(Clock::time_point now);
 
   const std::string& peer() const { return peer_; }
 
  private:
-  using MaybeRequest = Result<std::optional<wire::Envelope>>;
+  enum class Phase {
+    kOpen,
+    kLingering,  // everything was sent; what still comes is dropped
+    kClosed,
+  };
 
   boost::asio::awaitable<void> Read();
   boost::asio::awaitable<void> Write();
-  boost::asio::awaitable<void> Serve(wire::Envelope request, std::size_t bytes);
-  boost::asio::awaitable<void> WatchDeadline();
+  boost::asio::awaitable<void> Serve(boost::asio::awaitable<void> request, std::size_t bytes);
   // Requests until the peer closes, breaks a rule (the error) or the connection drains.
   boost::asio::awaitable<Status> ReadRequests();
-  // The next whole frame's envelope; an error ends the connection. nullopt: the peer closed.
-  boost::asio::awaitable<MaybeRequest> NextRequest();
-  MaybeRequest TakeRequest();
-  boost::asio::awaitable<bool> Greet(wire::Envelope hello);
+  // The requests of which all bytes have come.
+  boost::asio::awaitable<Status> TakeRequests();
+  Status TakeRequest(ByteSpan payload);
+  bool HasRoom() const;
   boost::asio::awaitable<void> WaitForRoom();
   // Reads on and drops what comes: closing a socket with unread bytes resets it, and the peer would
   // lose the replies that are still under way.
@@ -58,25 +77,29 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   Status Hold(std::size_t bytes);
   void Release(std::size_t bytes);
   void DropUnread();
-  void ExpectFrame(bool is_mid_frame);
+  void ExpectFrame();
   void Finish();
 
-  boost::asio::ip::tcp::socket socket_;
+  PeerStream stream_;
+  Places::Place place_;
   RequestHandler& handler_;
   ByteBudget& budget_;
+  const std::span<std::uint8_t> buffer_;
   const NetOptions& options_;
-  std::string peer_;
+  const std::string peer_;
   ReplyWriter writer_;
   FrameDecoder decoder_;
-  std::size_t held_bytes_ = 0;   // of `budget_`: what was received and is not answered yet
-  std::size_t frame_bytes_ = 0;  // size of the frame last decoded
+  std::size_t held_bytes_ = 0;  // of `budget_`: what was received and is not answered yet
   boost::asio::cancellation_signal stop_reading_;
-  boost::asio::steady_timer deadline_;  // of what the peer owes next
-  boost::asio::steady_timer changed_;   // cancelled when a request is done
+  boost::asio::steady_timer changed_;  // cancelled when a request is done
+  Clock::time_point deadline_;         // of what the peer owes next
+  Clock::time_point frame_began_;      // of which a part has come
   std::size_t requests_ = 0;
   std::size_t request_bytes_ = 0;
+  Phase phase_ = Phase::kOpen;
   bool is_greeted_ = false;
   bool is_mid_frame_ = false;
+  bool is_held_up_ = false;  // by its own requests and replies: it is not read from
   bool is_refused_ = false;
   bool is_draining_ = false;
   bool is_reading_ = true;

@@ -1,4 +1,4 @@
-#include "server/net/request_handler.h"
+#include "server/net/requests/request_handler.h"
 
 #include <memory>
 #include <utility>
@@ -6,32 +6,26 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/atlas_wait.h"
-#include "server/net/on_pool.h"
-#include "server/net/region_reply.h"
-#include "server/net/request_conversion.h"
-#include "server/net/sync_reply.h"
+#include "server/net/requests/atlas_wait.h"
+#include "server/net/requests/on_pool.h"
+#include "server/net/requests/region_reply.h"
+#include "server/net/requests/request_conversion.h"
+#include "server/net/requests/sync_reply.h"
 
 namespace atlas {
 namespace {
 
 namespace asio = boost::asio;
 
+constexpr std::size_t kBytesAtOnce = 1u << 20;  // of a reply, then it is the others' turn
+
 }  // namespace
 
-asio::awaitable<bool> RequestHandler::Greet(Envelope request, ReplyWriter& out) {
+bool RequestHandler::Greet(const Envelope& request, ReplyWriter& out) const {
   const AtlasIdentity& identity = service_.identity();
-  if (Status status = CheckHello(request, identity.profile); !status.ok()) {
-    co_await out.SendError(request.request_id(), std::move(status));
-    co_return false;
-  }
-  const Blocking<std::uint64_t> read = [this] {
-    return service_.ReadRevision();
-  };
-  const Result<std::uint64_t> revision = co_await OnPool(pool_, read);
-  if (!revision) {
-    co_await out.SendError(request.request_id(), revision.error());
-    co_return false;
+  if (const Status status = CheckHello(request, identity.profile); !status.ok()) {
+    out.PushError(request.request_id(), status);
+    return false;
   }
   Envelope reply = ReplyTo(request);
   wire::HelloReply& hello = *reply.mutable_hello_reply();
@@ -40,12 +34,25 @@ asio::awaitable<bool> RequestHandler::Greet(Envelope request, ReplyWriter& out) 
   hello.set_profile(ProfileToWire(identity.profile));
   hello.set_atlas_id(BytesToWire(identity.atlas_id));
   hello.set_epoch(identity.epoch);
-  hello.set_revision(*revision);
+  hello.set_revision(service_.revision());
   hello.set_max_frame_bytes(options_.max_frame_bytes);
-  co_return co_await out.Send(std::move(reply));
+  out.Push(reply);
+  return true;
 }
 
-asio::awaitable<void> RequestHandler::Handle(Envelope request, ReplyWriter& out) {
+std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, ReplyWriter& out) {
+  if (!request.has_sync_request()) {
+    return Await(std::move(request), out);
+  }
+  auto reply = std::make_shared<SyncReply>(service_, frames_, std::move(request));
+  const bool may_begin = reply->message().wait_revision() == 0;
+  if (may_begin && SyncAtOnce(*reply, out)) {
+    return std::nullopt;
+  }
+  return Sync(std::move(reply), out);
+}
+
+asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) {
   Status status = co_await Dispatch(request, out);
   if (!status.ok()) {
     co_await out.SendError(request.request_id(), std::move(status));
@@ -63,8 +70,6 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyW
     case Envelope::kQueryRegion:
       return request.query_region().has_at_revision() ? QueryThePast(request, out)
                                                       : Query(request, out);
-    case Envelope::kSyncRequest:
-      return Sync(request, out);
     case Envelope::kStatusRequest:
       return ReadStatus(request, out);
     case Envelope::kWaitRequest:
@@ -156,7 +161,7 @@ asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWrit
     co_return region.error();
   }
   if (query.wait_revision() != 0) {
-    const Result<WaitPlaces::Place> place = places_.Take();
+    const Result<Places::Place> place = places_.Take();
     if (!place) {
       co_return place.error();
     }
@@ -175,22 +180,55 @@ asio::awaitable<Status> RequestHandler::QueryThePast(const Envelope& request, Re
   if (!region) {
     co_return region.error();
   }
-  const Result<WaitPlaces::Place> place = places_.Take();
+  const Result<Places::Place> place = places_.Take();
   if (!place) {
     co_return place.error();
   }
   co_return co_await SendRegion(service_, reading_pool_, request, *region, out);
 }
 
-asio::awaitable<Status> RequestHandler::Sync(const Envelope& request, ReplyWriter& out) {
-  if (request.sync_request().wait_revision() != 0) {
-    const Result<WaitPlaces::Place> place = places_.Take();
+bool RequestHandler::SyncAtOnce(SyncReply& reply, ReplyWriter& out) {
+  std::vector<ReplyFrame> frames;
+  for (std::size_t bytes = 0; out.has_room() && bytes < kBytesAtOnce;) {
+    const Result<SyncReply::Step> step = reply.Next(false, frames);
+    if (!step) {
+      out.PushError(reply.request_id(), step.error());
+      return true;
+    }
+    for (const ReplyFrame& frame : frames) {
+      out.Push(frame);
+      bytes += frame.size();
+    }
+    frames.clear();
+    if (*step != SyncReply::Step::kMore) {
+      return *step == SyncReply::Step::kDone;
+    }
+  }
+  return false;
+}
+
+asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out) {
+  Status status = co_await WaitAndSync(reply, out);
+  if (!status.ok()) {
+    co_await out.SendError(reply->request_id(), std::move(status));
+  }
+}
+
+asio::awaitable<Status> RequestHandler::WaitAndSync(std::shared_ptr<SyncReply> reply,
+                                                    ReplyWriter& out) {
+  const wire::SyncRequest& message = reply->message();
+  if (message.wait_revision() != 0) {
+    const Result<Places::Place> place = places_.Take();
     if (!place) {
       co_return place.error();
     }
-    co_return co_await SendSync(service_, pool_, request, out);
+    const Patience patience{TimeoutFromWire(message.timeout_ms()), out.peer_left()};
+    Status status = co_await WaitForRevision(service_, pool_, message.wait_revision(), patience);
+    if (!status.ok()) {
+      co_return status;
+    }
   }
-  co_return co_await SendSync(service_, pool_, request, out);
+  co_return co_await SendSync(std::move(reply), pool_, out);
 }
 
 asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, ReplyWriter& out) {
@@ -208,7 +246,7 @@ asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, Repl
 }
 
 asio::awaitable<Status> RequestHandler::Wait(const Envelope& request, ReplyWriter& out) {
-  const Result<WaitPlaces::Place> place = places_.Take();
+  const Result<Places::Place> place = places_.Take();
   if (!place) {
     co_return place.error();
   }
@@ -244,7 +282,7 @@ asio::awaitable<Status> RequestHandler::ListSessions(const Envelope& request, Re
 }
 
 asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWriter& out) {
-  const Result<WaitPlaces::Place> place = places_.Take();
+  const Result<Places::Place> place = places_.Take();
   if (!place) {
     co_return place.error();
   }
@@ -270,7 +308,7 @@ asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWri
 }
 
 asio::awaitable<Status> RequestHandler::DigestThePast(const Envelope& request, ReplyWriter& out) {
-  const Result<WaitPlaces::Place> place = places_.Take();
+  const Result<Places::Place> place = places_.Take();
   if (!place) {
     co_return place.error();
   }
@@ -290,7 +328,7 @@ asio::awaitable<Status> RequestHandler::DigestThePast(const Envelope& request, R
 }
 
 asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWriter& out) {
-  const Result<WaitPlaces::Place> place = places_.Take();
+  const Result<Places::Place> place = places_.Take();
   if (!place) {
     co_return place.error();
   }
@@ -322,7 +360,7 @@ asio::awaitable<Status> RequestHandler::Compact(const Envelope& request, ReplyWr
   if (!status.ok()) {
     co_return status;
   }
-  const Result<WaitPlaces::Place> place = places_.Take();
+  const Result<Places::Place> place = places_.Take();
   if (!place) {
     co_return place.error();
   }

@@ -5,7 +5,7 @@
 #include <boost/asio/thread_pool.hpp>
 
 #include "proto/wire/envelope.h"
-#include "server/net/reply_writer.h"
+#include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {

@@ -1,4 +1,4 @@
-#include "server/net/request_conversion.h"
+#include "server/net/requests/request_conversion.h"
 
 #include <optional>
 #include <string>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "proto/wire/envelope.h"
+#include "proto/wire/tile_body.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {
@@ -16,8 +17,8 @@ std::string CursorToWire(const SyncCursor& cursor, const wire::SyncRequest& mess
 // What became of what is held.
 void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out);
 // One tile that follows.
-void AnnounceTile(const StoredTile& tile,
-                  std::size_t blob_bytes,
+void AnnounceTile(const TileBody& tile,
+                  std::uint8_t level,
                   const MapProfile& profile,
                   wire::SyncManifest& out);
 

@@ -1,0 +1,35 @@
+// What all connections together may hold of requests, so that many peers cannot fill the memory
+// that each of them alone may not. Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <cassert>
+#include <cstddef>
+
+namespace atlas {
+
+class ByteBudget {
+ public:
+  explicit ByteBudget(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+
+  // False, and nothing taken, when that is more than is left.
+  bool Take(std::size_t bytes) {
+    std::size_t taken_bytes = taken_bytes_.load();
+    do {
+      if (bytes > max_bytes_ - taken_bytes) {
+        return false;
+      }
+    } while (!taken_bytes_.compare_exchange_weak(taken_bytes, taken_bytes + bytes));
+    return true;
+  }
+  void GiveBack(std::size_t bytes) {
+    [[maybe_unused]] const std::size_t taken_bytes = taken_bytes_.fetch_sub(bytes);
+    assert(bytes <= taken_bytes);
+  }
+
+ private:
+  const std::size_t max_bytes_;
+  std::atomic<std::size_t> taken_bytes_ = 0;
+};
+
+}  // namespace atlas

@@ -1,0 +1,100 @@
+#include "server/net/connection/net_thread.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <spdlog/spdlog.h>
+
+namespace atlas {
+namespace {
+
+namespace asio = boost::asio;
+using std::chrono::milliseconds;
+
+constexpr std::size_t kReadBytes = 64u << 10;
+
+// How often to look for what is late: a quarter of what is waited for, and often enough for people.
+milliseconds LookEvery(const NetOptions& options) {
+  const milliseconds shortest = std::min(
+      {options.handshake, options.idle, options.frame, options.write_stall, options.linger});
+  return std::clamp(shortest / 4, milliseconds(1), milliseconds(250));
+}
+
+}  // namespace
+
+NetThread::NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptions& options)
+    : handler_(handler),
+      budget_(budget),
+      options_(options),
+      buffer_(kReadBytes),
+      connection_places_(options.max_connections),
+      work_(asio::make_work_guard(io_)),
+      thread_([this] { Run(); }) {}
+
+void NetThread::Serve(asio::ip::tcp::socket socket, Places::Place place) {
+  // Its own place is only to be counted: it is there where the server's was.
+  auto begin = [this, socket = std::move(socket), place = std::move(place),
+                own = connection_places_.Take()]() mutable {
+    const auto both =
+        std::make_shared<std::pair<Places::Place, Places::Place>>(std::move(place), std::move(own));
+    const auto connection = std::make_shared<PeerConnection>(
+        std::move(socket), both,
+        PeerConnection::Surroundings{handler_, budget_, buffer_, options_});
+    connections_.push_back(connection);
+    connection->Start();
+  };
+  asio::post(io_, std::move(begin));
+}
+
+void NetThread::Drain() {
+  asio::post(io_, [this] {
+    for (const auto& weak : connections_) {
+      if (const auto connection = weak.lock()) {
+        connection->Drain();
+      }
+    }
+  });
+}
+
+void NetThread::Stop() {
+  io_.stop();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+asio::awaitable<void> NetThread::CheckDeadlines() {
+  asio::steady_timer timer(io_);
+  while (true) {
+    timer.expires_after(LookEvery(options_));
+    co_await timer.async_wait(asio::use_awaitable);
+    const auto now = PeerConnection::Clock::now();
+    std::erase_if(connections_, [now](const auto& weak) {
+      const auto connection = weak.lock();
+      if (connection) {
+        connection->CheckDeadlines(now);
+      }
+      return connection == nullptr;
+    });
+  }
+}
+
+void NetThread::Run() {
+  asio::co_spawn(io_, CheckDeadlines(), asio::detached);
+  while (!io_.stopped()) {
+    try {
+      io_.run();
+    } catch (const std::exception& error) {  // of no connection: those end by themselves
+      spdlog::error("network thread: {}", error.what());
+    }
+  }
+}
+
+}  // namespace atlas

@@ -1,0 +1,59 @@
+// One of the threads that run connections. A connection stays on the thread that it began on, so
+// that nothing of it is shared but what is behind RequestHandler.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+
+#include "server/net/connection/byte_budget.h"
+#include "server/net/connection/peer_connection.h"
+#include "server/net/net_options.h"
+#include "server/net/places.h"
+#include "server/net/requests/request_handler.h"
+
+namespace atlas {
+
+class NetThread {
+ public:
+  // All outlive this. Runs from the start.
+  NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptions& options);
+  NetThread(const NetThread&) = delete;
+  NetThread& operator=(const NetThread&) = delete;
+  ~NetThread() { Stop(); }
+
+  // For the sockets of its connections.
+  boost::asio::io_context& io() { return io_; }
+  std::size_t connections() const { return connection_places_.taken(); }
+
+  // From any thread: begins a connection, which keeps the place until it ends.
+  void Serve(boost::asio::ip::tcp::socket socket, Places::Place place);
+  // From any thread: connections end when they have answered what they have read.
+  void Drain();
+  // Connections that are left are cut.
+  void Stop();
+
+ private:
+  boost::asio::awaitable<void> CheckDeadlines();
+  void Run();
+
+  RequestHandler& handler_;
+  ByteBudget& budget_;
+  const NetOptions& options_;
+  std::vector<std::uint8_t> buffer_;
+  Places connection_places_;
+  boost::asio::io_context io_{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
+  std::vector<std::weak_ptr<PeerConnection>> connections_;
+  std::thread thread_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,273 @@
+#include "server/net/requests/sync_reply.h"
+
+#include <limits>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "core/base/str_cat.h"
+#include "server/net/requests/atlas_wait.h"
+#include "server/net/requests/on_pool.h"
+#include "server/net/requests/request_conversion.h"
+#include "server/net/requests/sync_conversion.h"
+
+namespace atlas {
+namespace {
+
+namespace asio = boost::asio;
+
+// The first batch is there soon, the others are worth their manifest.
+constexpr std::size_t kFirstTiles = 4;
+constexpr std::size_t kTilesPerBatch = 32;
+constexpr std::size_t kBatchBytes = 512u << 10;
+// At most, in bytes of a reply: a manifest without its tiles, a tile in it, the end.
+constexpr std::size_t kManifestBytes = kFrameHeaderBytes + 64;
+constexpr std::size_t kAnnouncementBytes = 40;
+constexpr std::size_t kEndBytes = kFrameHeaderBytes + 96;
+constexpr std::size_t kTileFrameBytes = kFrameHeaderBytes + 11;  // besides its body
+constexpr std::size_t kSmallRequestBytes = 16u
+                                           << 10;  // reads and plans in well under a millisecond
+
+}  // namespace
+
+SyncReply::SyncReply(AtlasService& service, TileFrames& frames, wire::Envelope request)
+    : service_(service), frames_(frames), envelope_(std::move(request)) {
+  if (message().timeout_ms() > 0) {
+    deadline_ = Clock::now() + TimeoutFromWire(message().timeout_ms());
+  }
+}
+
+Result<SyncReply::Step> SyncReply::Next(bool may_block, std::vector<ReplyFrame>& out) {
+  if (!has_begun_) {
+    const Result<Step> begun = Begin(may_block);
+    if (!begun || *begun == Step::kBlocked) {
+      return begun;
+    }
+  }
+  Batch batch;
+  batch.manifest = ReplyTo(envelope_);
+  const bool is_first = sent_bytes_ == 0;
+  if (is_first) {
+    *batch.manifest.mutable_sync_manifest() = holdings_;
+  }
+  const Result<Step> filled = Fill(may_block, batch);
+  if (!filled) {
+    return filled;
+  }
+  if (batch.tiles.empty() && !batch.end && *filled == Step::kBlocked) {
+    return Step::kBlocked;
+  }
+  if (Status status = Emit(batch, out); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return batch.end ? Step::kDone : Step::kMore;
+}
+
+Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
+  if (!may_block && envelope_.ByteSizeLong() > kSmallRequestBytes) {
+    return Step::kBlocked;
+  }
+  if (!request_) {
+    Result<SyncRequest> request = SyncFromWire(message(), profile());
+    if (!request) {
+      return Error(request.error());
+    }
+    request_ = *std::move(request);
+    last_ = request_->after.value_or(SyncCursor{
+        service_.revision(), std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
+  }
+  const Result<Step> planned = Plan(may_block);
+  if (!planned || *planned == Step::kBlocked) {
+    return planned;
+  }
+  HoldingsToWire(plan_, holdings_);
+  const std::uint64_t least = kManifestBytes + holdings_.ByteSizeLong() + kEndBytes;
+  if (!Fits(least)) {
+    return Error(
+        StatusCode::kInvalidArgument,
+        StrCat("sync: a budget of ", message().budget_bytes(), " bytes, expected at least the ",
+               least, " that it takes without any tile"));
+  }
+  has_begun_ = true;
+  return Step::kMore;
+}
+
+Result<SyncReply::Step> SyncReply::Plan(bool may_block) {
+  auto plan = service_.PlanSync(*request_, may_block);
+  if (!plan) {
+    return Error(plan.error());
+  }
+  if (!*plan) {
+    return Step::kBlocked;
+  }
+  plan_ = **std::move(plan);
+  next_ = 0;
+  return Step::kMore;
+}
+
+// With tiles, and the end, if that is reached.
+Result<SyncReply::Step> SyncReply::Fill(bool may_block, Batch& batch) {
+  wire::SyncManifest& manifest = *batch.manifest.mutable_sync_manifest();
+  std::uint64_t bytes = sent_bytes_ + kManifestBytes + manifest.ByteSizeLong();
+  const std::size_t max_tiles = sent_bytes_ == 0 ? kFirstTiles : kTilesPerBatch;
+  while (batch.tiles.size() < max_tiles && batch.tile_bytes < kBatchBytes) {
+    if (next_ == plan_.items.size() && plan_.is_cut) {
+      request_->after = last_;
+      const Result<Step> planned = Plan(may_block);
+      if (!planned || *planned == Step::kBlocked) {
+        return planned;
+      }
+    }
+    if (next_ == plan_.items.size()) {
+      batch.end = End::kWhole;
+      return Step::kDone;
+    }
+    if (IsLate()) {
+      batch.end = End::kCut;
+      return Step::kDone;
+    }
+    const SyncItem& item = plan_.items[next_];
+    Body body;
+    const Result<Step> found = FindTile(item, may_block, body);
+    if (!found || *found == Step::kBlocked) {
+      return found;
+    }
+    if (body != nullptr) {
+      const std::size_t frame_bytes = kTileFrameBytes + body->bytes().size();
+      bytes += frame_bytes + kAnnouncementBytes;
+      if (!Fits(bytes + kEndBytes)) {
+        batch.end = End::kCut;
+        return Step::kDone;
+      }
+      AnnounceTile(*body, item.tile.id.level, profile(), manifest);
+      batch.tile_bytes += frame_bytes;
+      batch.tiles.push_back(std::move(body));
+    }
+    last_.priority = item.priority;
+    last_.key = item.tile.id.Key();
+    ++next_;
+  }
+  return Step::kMore;
+}
+
+Result<SyncReply::Step> SyncReply::FindTile(const SyncItem& item, bool may_block, Body& body) {
+  body = frames_.Find({item.tile.id.Key(), item.tile.revision, item.sections});
+  if (body != nullptr) {
+    return Step::kMore;
+  }
+  if (!may_block) {
+    return Step::kBlocked;
+  }
+  Result<Body> read = ReadTile(item);
+  if (!read) {
+    return Error(read.error());
+  }
+  body = *std::move(read);
+  return Step::kMore;
+}
+
+// With the sections that are to be sent.
+Result<SyncReply::Body> SyncReply::ReadTile(const SyncItem& item) {
+  Result<std::optional<StoredTile>> read = service_.ReadTile(item.tile.id);
+  if (!read && read.error().code() == StatusCode::kInvalidData) {
+    return nullptr;
+  }
+  if (!read) {
+    return Error(read.error());
+  }
+  if (!*read) {
+    return nullptr;
+  }
+  StoredTile& tile = **read;
+  // Of other content than was planned nothing is held.
+  const SectionMask sections =
+      tile.payload_hash == item.tile.payload_hash ? item.sections : request_->sections;
+  if (sections != kAllSections) {
+    Result<Bytes> blob = SelectSections(tile.blob, sections);
+    if (!blob) {
+      return Error(blob.error());
+    }
+    tile.blob = *std::move(blob);
+  }
+  Result<TileBody> made =
+      TileBody::Create({tile.id.Key(), tile.revision, tile.payload_hash}, tile.blob);
+  if (!made) {
+    return Error(made.error());
+  }
+  auto body = std::make_shared<const TileBody>(*std::move(made));
+  frames_.Insert({tile.id.Key(), tile.revision, sections}, body);
+  return body;
+}
+
+Status SyncReply::Emit(const Batch& batch, std::vector<ReplyFrame>& out) {
+  const std::size_t first = out.size();
+  if (sent_bytes_ == 0 || !batch.tiles.empty()) {
+    Result<Bytes> frame = EncodeEnvelopeFrame(batch.manifest);
+    if (!frame) {
+      return frame.error();
+    }
+    out.emplace_back(*std::move(frame));
+  }
+  for (const Body& tile : batch.tiles) {
+    out.emplace_back(tile, request_id());
+  }
+  sent_tiles_ += static_cast<std::uint32_t>(batch.tiles.size());
+  for (std::size_t i = first; i < out.size(); ++i) {
+    sent_bytes_ += out[i].size();
+  }
+  if (batch.end) {
+    Result<Bytes> frame = EndFrame(*batch.end);
+    if (!frame) {
+      return frame.error();
+    }
+    out.emplace_back(*std::move(frame));
+  }
+  return {};
+}
+
+Result<Bytes> SyncReply::EndFrame(End how) const {
+  wire::Envelope envelope = ReplyTo(envelope_);
+  wire::SyncEnd& end = *envelope.mutable_sync_end();
+  end.set_tiles(sent_tiles_);
+  end.set_revision(last_.revision);
+  if (how == End::kCut) {
+    end.set_cursor(CursorToWire(last_, message()));
+  }
+  end.set_bytes(sent_bytes_);
+  for (int pass = 0; pass < 2; ++pass) {
+    end.set_bytes(sent_bytes_ + kFrameHeaderBytes + envelope.ByteSizeLong());
+  }
+  return EncodeEnvelopeFrame(envelope);
+}
+
+asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
+                                 asio::thread_pool& pool,
+                                 ReplyWriter& out) {
+  const auto executor = co_await asio::this_coro::executor;
+  const auto frames = std::make_shared<std::vector<ReplyFrame>>();
+  const Blocking<SyncReply::Step> read = [reply, frames] {
+    return reply->Next(true, *frames);
+  };
+  while (co_await out.WaitForRoom()) {
+    frames->clear();
+    Result<SyncReply::Step> step = reply->Next(false, *frames);
+    if (step && *step == SyncReply::Step::kBlocked) {
+      step = co_await OnPool(pool, read);
+    }
+    if (!step) {
+      co_return step.error();
+    }
+    for (const ReplyFrame& frame : *frames) {
+      out.Push(frame);
+    }
+    out.Flush();
+    if (*step == SyncReply::Step::kDone) {
+      break;
+    }
+    co_await asio::post(executor, asio::use_awaitable);  // the others' turn
+  }
+  co_return Status();
+}
+
+}  // namespace atlas

@@ -1,0 +1,69 @@
+// The bytes to and from one peer, through TLS or not. Nothing here blocks: what the socket does not
+// give or take now is awaited. For the thread of the socket's executor.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/cancellation_signal.hpp>
+#include <boost/asio/ip/tcp.hpp>
+
+#include "core/base/bytes.h"
+#include "server/net/stream/tls_context.h"
+
+namespace atlas {
+
+class PeerStream {
+ public:
+  static constexpr std::size_t kMaxPieces = 64;
+
+  struct Moved {
+    std::size_t bytes = 0;
+    bool is_blocked = false;  // there is no more for now
+    bool is_closed = false;   // there will be no more: the peer closed, or is gone
+  };
+
+  // Without a session the bytes go as they are; with one, the first reads and writes are its
+  // handshake.
+  explicit PeerStream(boost::asio::ip::tcp::socket socket, SslSession session = nullptr);
+
+  // "ADDRESS:PORT" of the peer.
+  std::string PeerName() const;
+  boost::asio::any_io_executor executor() { return socket_.get_executor(); }
+
+  Moved Read(std::span<std::uint8_t> into);
+  // Up to kMaxPieces pieces, in order; how many bytes of them left.
+  Moved Write(std::span<const ByteSpan> pieces);
+
+  // Return when it is worth another try, when the stream is closed, or when `stop` is emitted.
+  boost::asio::awaitable<void> WaitUntilReadable(boost::asio::cancellation_slot stop);
+  boost::asio::awaitable<void> WaitUntilWritable();
+
+  // Bytes have come that were not read.
+  bool has_unread();
+  // That the peer showed and that was verified; once bytes were read.
+  std::optional<PeerCertificate> certificate() const;
+  bool is_encrypted() const { return session_ != nullptr; }
+  // Why TLS closed it; empty: it did not.
+  const std::string& failure() const { return failure_; }
+  void CloseSending();
+  void Close();
+
+ private:
+  Moved ReadSession(std::span<std::uint8_t> into);
+  Moved WriteSession(std::span<const ByteSpan> pieces);
+  // Of a call to the session that did not succeed.
+  Moved NotMovedBy(int result, bool& waits_for_other);
+
+  boost::asio::ip::tcp::socket socket_;
+  SslSession session_;
+  bool read_waits_to_write_ = false;  // in a handshake
+  bool write_waits_to_read_ = false;
+  std::string failure_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,216 @@
+#include "tests/bench/serving/load_run.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <random>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "core/base/str_cat.h"
+
+namespace atlas::testing {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+Status Failure(const char* what) {
+  return {StatusCode::kUnavailable, StrCat(what, ": ", std::strerror(errno))};
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (number_ >= 0) {
+      ::close(number_);
+    }
+  }
+  int get() const { return number_; }
+
+ private:
+  int number_;
+};
+
+struct LoadPeer {
+  explicit LoadPeer(int fd) : socket(fd) {}
+
+  Descriptor socket;
+  std::unique_ptr<ReplyParser> parser;
+  Bytes unsent;
+  std::size_t sent_bytes = 0;
+  std::size_t awaited = 0;  // replies of the batch under way
+  std::size_t asked = 0;    // tiles of it
+  Clock::time_point began;
+  bool is_greeted = false;
+};
+
+class LoadRun {
+ public:
+  LoadRun(LoadProtocol& protocol, std::span<const LoadTile> tiles, const LoadOptions& options)
+      : protocol_(protocol),
+        tiles_(tiles),
+        options_(options),
+        poll_(::epoll_create1(0)),
+        random_(options.seed),
+        buffer_(1u << 18) {}
+
+  Result<LoadResult> Run() {
+    if (Status status = Drive(); !status.ok()) {
+      return Error(std::move(status));
+    }
+    for (const auto& peer : peers_) {
+      result_.tile_bytes += peer->parser->tile_bytes();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  Status Drive() {
+    for (const LoadTile& tile : tiles_) {
+      order_.push_back(&tile);
+    }
+    std::shuffle(order_.begin(), order_.end(), random_);
+    for (int i = 0; i < options_.connections; ++i) {
+      ATLAS_RETURN_IF_ERROR(Connect());
+    }
+    const auto begin = Clock::now();
+    end_ = begin + options_.time;
+    for (auto& peer : peers_) {
+      ATLAS_RETURN_IF_ERROR(Begin(*peer));
+    }
+    while (busy_ > 0) {
+      std::array<epoll_event, 64> events{};
+      const int count =
+          ::epoll_wait(poll_.get(), events.data(), static_cast<int>(events.size()), 10'000);
+      if (count == 0) {
+        return {StatusCode::kTimeout, "no reply within 10 s"};
+      }
+      for (int i = 0; i < count; ++i) {
+        ATLAS_RETURN_IF_ERROR(
+            OnEvent(*static_cast<LoadPeer*>(events[static_cast<std::size_t>(i)].data.ptr)));
+      }
+    }
+    result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    return {};
+  }
+
+  Status Connect() {
+    auto peer = std::make_unique<LoadPeer>(::socket(AF_INET, SOCK_STREAM, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(options_.port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (::connect(peer->socket.get(), reinterpret_cast<const sockaddr*>(&address),
+                  sizeof(address)) != 0) {
+      return Failure("connect");
+    }
+    const int on = 1;
+    ::setsockopt(peer->socket.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    peer->parser = protocol_.NewParser();
+    peer->is_greeted = protocol_.Greeting().empty();
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.ptr = peer.get();
+    if (::epoll_ctl(poll_.get(), EPOLL_CTL_ADD, peer->socket.get(), &event) != 0) {
+      return Failure("epoll_ctl");
+    }
+    peers_.push_back(std::move(peer));
+    return {};
+  }
+
+  // The next batch.
+  Status Begin(LoadPeer& peer) {
+    peer.unsent.clear();
+    peer.sent_bytes = 0;
+    if (!peer.is_greeted) {
+      peer.unsent = protocol_.Greeting();
+      peer.awaited = 1;
+      peer.asked = 0;
+    } else {
+      batch_.clear();
+      for (std::size_t i = 0; i < options_.tiles_per_batch; ++i) {
+        batch_.push_back(order_[next_++ % order_.size()]);
+      }
+      peer.awaited = protocol_.Ask(batch_, options_.mode, peer.unsent);
+      peer.asked = batch_.size();
+    }
+    ++busy_;
+    peer.began = Clock::now();
+    return Send(peer);
+  }
+
+  // Small enough for any socket's buffer, so that it never has to wait for long.
+  static Status Send(LoadPeer& peer) {
+    while (peer.sent_bytes < peer.unsent.size()) {
+      const ssize_t size = ::send(peer.socket.get(), peer.unsent.data() + peer.sent_bytes,
+                                  peer.unsent.size() - peer.sent_bytes, MSG_NOSIGNAL);
+      if (size <= 0) {
+        return Failure("send");
+      }
+      peer.sent_bytes += static_cast<std::size_t>(size);
+    }
+    return {};
+  }
+
+  Status OnEvent(LoadPeer& peer) {
+    const ssize_t size = ::recv(peer.socket.get(), buffer_.data(), buffer_.size(), 0);
+    ++result_.calls;
+    if (size <= 0) {
+      return size == 0 ? Status(StatusCode::kUnavailable, "the server closed a connection")
+                       : Failure("recv");
+    }
+    result_.wire_bytes += static_cast<std::uint64_t>(size);
+    if (!peer.parser->Take(ByteSpan(buffer_).first(static_cast<std::size_t>(size)))) {
+      return {StatusCode::kInvalidData, "the server answered something else"};
+    }
+    const std::uint64_t replies = peer.parser->TakeReplies();
+    if (replies < peer.awaited) {
+      peer.awaited -= replies;
+      return {};
+    }
+    const auto now = Clock::now();
+    --busy_;
+    if (peer.is_greeted) {
+      ++result_.batches;
+      result_.tiles += peer.asked;
+      result_.batch_ms.push_back(
+          std::chrono::duration<float, std::milli>(now - peer.began).count());
+    }
+    peer.is_greeted = true;
+    return now < end_ ? Begin(peer) : Status();
+  }
+
+  LoadProtocol& protocol_;
+  std::span<const LoadTile> tiles_;
+  const LoadOptions& options_;
+  Descriptor poll_;
+  std::mt19937_64 random_;
+  Bytes buffer_;
+  std::vector<std::unique_ptr<LoadPeer>> peers_;
+  std::vector<const LoadTile*> order_;
+  std::size_t next_ = 0;
+  std::vector<const LoadTile*> batch_;
+  std::size_t busy_ = 0;  // peers with a batch under way
+  Clock::time_point end_;
+  LoadResult result_;
+};
+
+}  // namespace
+
+Result<LoadResult> RunLoad(LoadProtocol& protocol,
+                           std::span<const LoadTile> tiles,
+                           const LoadOptions& options) {
+  return LoadRun(protocol, tiles, options).Run();
+}
+
+}  // namespace atlas::testing

@@ -1,0 +1,100 @@
+#include "server/net/requests/sync_reply.h"
+
+#include <vector>
+
+#include "proto/wire/convert.h"
+#include "tests/server/service/service_fixture.h"
+
+namespace atlas {
+namespace {
+
+class SyncReplyTest : public ServiceTest {
+ protected:
+  void SetUp() override {
+    Open();
+    UploadDrive(6);
+    Digest();
+  }
+
+  SyncReply ReplyTo(std::uint64_t budget_bytes = 0) {
+    wire::Envelope envelope;
+    envelope.set_request_id(9);
+    auto& disc = *envelope.mutable_sync_request()->mutable_area()->mutable_disc();
+    disc.set_radius_um(100'000'000);
+    envelope.mutable_sync_request()->set_budget_bytes(budget_bytes);
+    return {*service_, frames_, envelope};
+  }
+  static Bytes BytesOf(const std::vector<ReplyFrame>& frames) {
+    ByteWriter out;
+    for (const ReplyFrame& frame : frames) {
+      out.Raw(frame.head());
+      if (frame.tile()) {
+        out.Raw(frame.tile()->bytes());
+      }
+      out.Raw(frame.tail());
+      EXPECT_EQ(frame.size(), frame.head().size() + frame.tail().size() +
+                                  (frame.tile() ? frame.tile()->bytes().size() : 0));
+    }
+    return out.Take();
+  }
+  // All of it.
+  Bytes Run(SyncReply& reply, bool may_block) {
+    std::vector<ReplyFrame> frames;
+    while (true) {
+      const auto step = reply.Next(may_block, frames);
+      EXPECT_TRUE(step.has_value());
+      EXPECT_NE(*step, SyncReply::Step::kBlocked);
+      if (!step || *step != SyncReply::Step::kMore) {
+        return BytesOf(frames);
+      }
+    }
+  }
+
+  TileFrames frames_{1u << 20};
+};
+
+TEST_F(SyncReplyTest, DoesNothingWithoutTheDiskThatItNeeds) {
+  SyncReply reply = ReplyTo();
+  std::vector<ReplyFrame> frames;
+  const auto step = reply.Next(false, frames);
+  ASSERT_TRUE(step.has_value());
+  EXPECT_EQ(*step, SyncReply::Step::kBlocked);
+  EXPECT_TRUE(frames.empty());
+  EXPECT_FALSE(Run(reply, true).empty()) << "and may be asked again";
+}
+
+TEST_F(SyncReplyTest, FromMemoryIsTheSameBytes) {
+  SyncReply first = ReplyTo();
+  const Bytes bytes = Run(first, true);
+  EXPECT_GT(bytes.size(), 1'000u);
+  SyncReply second = ReplyTo();
+  EXPECT_EQ(Run(second, false), bytes);
+}
+
+TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
+  SyncReply whole = ReplyTo();
+  const Bytes expected = Run(whole, true);
+  // Room for a few tiles only: each step finds some in memory and needs the disk for others.
+  TileFrames few(8u << 10);
+  wire::Envelope envelope;
+  envelope.set_request_id(9);
+  envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(100'000'000);
+  SyncReply reply(*service_, few, envelope);
+  std::uint64_t tiles = 0;
+  std::uint64_t ends = 0;
+  std::vector<ReplyFrame> frames;
+  for (bool may_block = false; ends == 0; may_block = !may_block) {
+    frames.clear();
+    const auto step = reply.Next(may_block, frames);
+    ASSERT_TRUE(step.has_value());
+    EXPECT_FALSE(may_block && *step == SyncReply::Step::kBlocked);
+    for (const ReplyFrame& frame : frames) {
+      tiles += frame.tile() ? 1u : 0u;
+    }
+    ends += *step == SyncReply::Step::kDone ? 1u : 0u;
+  }
+  EXPECT_EQ(tiles, static_cast<std::uint64_t>(service_->ReadStatus()->counts.tiles));
+}
+
+}  // namespace
+}  // namespace atlas
