@@ -35,9 +35,13 @@ using boost::system::error_code;
 
 class TcpServer::Impl {
  public:
-  Impl(AtlasService& service, const NetOptions& options, ListenSocket socket)
+  Impl(AtlasService& service,
+       const NetOptions& options,
+       ListenSocket socket,
+       ServerSecurity security)
       : options_(options),
         service_(service),
+        security_(std::move(security)),
         pool_(static_cast<std::size_t>(options.service_threads)),
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
@@ -81,6 +85,15 @@ class TcpServer::Impl {
     asio::post(io_, [this] { Drain(); });
   }
 
+  void ChangeSecurity(ServerSecurity security) {
+    asio::post(io_, [this, security = std::move(security)] {
+      security_ = security;
+      for (const auto& thread : threads_) {
+        thread->ChangeAccess(security_.access);
+      }
+    });
+  }
+
  private:
   asio::awaitable<void> Accept() {
     while (acceptor_.is_open()) {
@@ -118,7 +131,15 @@ class TcpServer::Impl {
     }
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
-    thread.Serve(std::move(socket), std::move(place));
+    SslSession session;
+    if (security_.tls != nullptr) {
+      session = security_.tls->NewSession(socket.native_handle());
+      if (session == nullptr) {
+        spdlog::error("TLS: no session for a new connection: {}", TakeTlsErrors());
+        return;
+      }
+    }
+    thread.Serve({std::move(socket), std::move(place), std::move(session), security_.access});
   }
 
   // One line a second, however many come.
@@ -141,7 +162,7 @@ class TcpServer::Impl {
     const Result<Bytes> frame = EncodeEnvelopeFrame(envelope);
     error_code ignored;  // the peer is closed either way
     socket.non_blocking(true, ignored);
-    if (frame) {
+    if (frame && security_.tls == nullptr) {  // behind TLS it would take a handshake to say so
       socket.write_some(asio::buffer(*frame), ignored);
     }
     socket.shutdown(tcp::socket::shutdown_both, ignored);
@@ -179,6 +200,7 @@ class TcpServer::Impl {
 
   NetOptions options_;
   AtlasService& service_;
+  ServerSecurity security_;
   asio::thread_pool pool_;
   asio::thread_pool reading_pool_;
   RequestHandler handler_;
@@ -193,8 +215,11 @@ class TcpServer::Impl {
   std::unique_ptr<asio::steady_timer> drain_limit_;
 };
 
-TcpServer::TcpServer(AtlasService& service, const NetOptions& options, ListenSocket socket)
-    : impl_(std::make_unique<Impl>(service, options, std::move(socket))) {}
+TcpServer::TcpServer(AtlasService& service,
+                     const NetOptions& options,
+                     ListenSocket socket,
+                     ServerSecurity security)
+    : impl_(std::make_unique<Impl>(service, options, std::move(socket), std::move(security))) {}
 TcpServer::~TcpServer() = default;
 
 void TcpServer::Run() {
@@ -202,6 +227,9 @@ void TcpServer::Run() {
 }
 void TcpServer::Stop() {
   impl_->Stop();
+}
+void TcpServer::ChangeSecurity(ServerSecurity security) {
+  impl_->ChangeSecurity(std::move(security));
 }
 
 }  // namespace atlas

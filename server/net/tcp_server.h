@@ -1,10 +1,11 @@
-// Accepts connections and runs the network thread.
+// Accepts connections and spreads them over the network threads.
 #pragma once
 
 #include <memory>
 
 #include "server/net/listen_socket.h"
 #include "server/net/net_options.h"
+#include "server/net/server_security.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {
@@ -12,7 +13,10 @@ namespace atlas {
 class TcpServer {
  public:
   // SIGTERM and SIGINT are its own from here on: whoever learns the address may stop the daemon.
-  TcpServer(AtlasService& service, const NetOptions& options, ListenSocket socket);
+  TcpServer(AtlasService& service,
+            const NetOptions& options,
+            ListenSocket socket,
+            ServerSecurity security = {});
   TcpServer(const TcpServer&) = delete;
   TcpServer& operator=(const TcpServer&) = delete;
   ~TcpServer();
@@ -23,6 +27,9 @@ class TcpServer {
   void Run();
   // From any thread.
   void Stop();
+  // From any thread: what new connections find from now on, and whom of those that are there it
+  // closes. TLS stays with or without, as it was at the start.
+  void ChangeSecurity(ServerSecurity security);
 
  private:
   class Impl;

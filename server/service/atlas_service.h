@@ -74,6 +74,7 @@ class AtlasService {
   ~AtlasService();
 
   const AtlasIdentity& identity() const { return store_.identity(); }
+  std::int64_t NowMs() const { return clock_(); }  // since 1970
 
   // Checked on the calling thread; `done` is called once it is on disk, or refused.
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);

@@ -68,9 +68,11 @@ ALLOWED = {
     "server/service/compaction": FUSED + ["server/service/fusion", "server/service/upload_check.h"],
     "server/service/history": FUSED + ["server/service/fusion", "server/service/region",
                                        "server/service/verification"],
-    "server/net": SERVING + ["server/net/connection", "server/net/requests"],
-    "server/net/connection": SERVING + NET + ["server/net/requests", "server/net/stream"],
-    "server/net/requests": SERVING + NET + ["core/tile", "server/net/stream"],
+    "server/net": SERVING + ["server/net/access", "server/net/connection", "server/net/requests",
+                             "server/net/stream/tls_context.h"],
+    "server/net/access": FLOOR_1 + WIRE + ["server/net/stream/tls_context.h"],
+    "server/net/connection": SERVING + NET + ["server/net/access", "server/net/requests", "server/net/stream"],
+    "server/net/requests": SERVING + NET + ["core/tile", "server/net/access", "server/net/stream"],
     "server/net/stream": FLOOR_1 + WIRE + NET,
     "server/config": FLOOR_1,
     "server": FLOOR_1 + ["server/config", "server/net", "server/service", "server/store",
@@ -87,14 +89,16 @@ ALLOWED = {
                             "client/cli/commands/map"],
     "client/cli": FLOOR_1 + ["client/cli/command_line", "client/cli/commands"],
 }
+NET_ROOMS = ["server/net/connection", "server/net/requests", "server/net/stream"]
 # Libraries that stay behind a few doors: pattern -> folders that may include it.
 FENCED = {
-    r"<boost/asio|<boost/beast": ["server/net", "server", "client/connection"],
-    r"\.pb\.h\"": ["proto/wire", "server/net", "client/connection"],
+    r"<boost/asio|<boost/beast": ["server/net", *NET_ROOMS, "server", "client/connection"],
+    r"\.pb\.h\"": ["proto/wire", "server/net", *NET_ROOMS, "client/connection"],
+    r"<openssl": ["server/net/access", "server/net/stream", "server/service/verification"],
     r"<SQLiteCpp|<sqlite3": ["server/store/sqlite/connection"],
     r"<CLI/": ["client/cli/command_line", "server/config"],
     r"<toml\+\+": ["server/config"],
-    r"<spdlog": ["server", "server/config", "server/net"],
+    r"<spdlog": ["server", "server/config", "server/net", *NET_ROOMS],
     r"<zstd|<xxhash": ["core/base"],
     r"<png": ["client/render"],
 }

@@ -38,29 +38,39 @@ NetThread::NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptio
       work_(asio::make_work_guard(io_)),
       thread_([this] { Run(); }) {}
 
-void NetThread::Serve(asio::ip::tcp::socket socket, Places::Place place) {
-  // Its own place is only to be counted: it is there where the server's was.
-  auto begin = [this, socket = std::move(socket), place = std::move(place),
-                own = connection_places_.Take()]() mutable {
-    const auto both =
-        std::make_shared<std::pair<Places::Place, Places::Place>>(std::move(place), std::move(own));
+void NetThread::Serve(PeerConnection::Arrival arrival) {
+  // A place here, beside the server's own, only counts: the server gives no more than there are.
+  using Pair = std::pair<Places::Place, Places::Place>;
+  arrival.place = std::make_shared<Pair>(std::move(arrival.place), connection_places_.Take());
+  auto begin = [this, arrival = std::move(arrival)]() mutable {
     const auto connection = std::make_shared<PeerConnection>(
-        std::move(socket), both,
-        PeerConnection::Surroundings{handler_, budget_, buffer_, options_});
+        std::move(arrival), PeerConnection::Surroundings{handler_, budget_, buffer_, options_});
     connections_.push_back(connection);
     connection->Start();
   };
   asio::post(io_, std::move(begin));
 }
 
-void NetThread::Drain() {
-  asio::post(io_, [this] {
+// On its own thread.
+template <typename Action>
+void NetThread::ForEach(Action action) {
+  asio::post(io_, [this, action = std::move(action)] {
     for (const auto& weak : connections_) {
       if (const auto connection = weak.lock()) {
-        connection->Drain();
+        action(*connection);
       }
     }
   });
+}
+
+void NetThread::ChangeAccess(std::shared_ptr<const AccessControl> access) {
+  ForEach([access = std::move(access)](PeerConnection& connection) {
+    connection.ChangeAccess(access);
+  });
+}
+
+void NetThread::Drain() {
+  ForEach([](PeerConnection& connection) { connection.Drain(); });
 }
 
 void NetThread::Stop() {

@@ -34,14 +34,18 @@ class NetThread {
   boost::asio::io_context& io() { return io_; }
   std::size_t connections() const { return connection_places_.taken(); }
 
-  // From any thread: begins a connection, which keeps the place until it ends.
-  void Serve(boost::asio::ip::tcp::socket socket, Places::Place place);
+  // From any thread: begins a connection.
+  void Serve(PeerConnection::Arrival arrival);
+  // From any thread: these rules hold from now on, for those who are there, too.
+  void ChangeAccess(std::shared_ptr<const AccessControl> access);
   // From any thread: connections end when they have answered what they have read.
   void Drain();
   // Connections that are left are cut.
   void Stop();
 
  private:
+  template <typename Action>
+  void ForEach(Action action);
   boost::asio::awaitable<void> CheckDeadlines();
   void Run();
 

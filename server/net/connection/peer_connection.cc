@@ -10,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
+#include "server/net/access/access_check.h"
 
 namespace atlas {
 namespace {
@@ -42,11 +43,9 @@ class Completion {
 
 }  // namespace
 
-PeerConnection::PeerConnection(asio::ip::tcp::socket socket,
-                               Places::Place place,
-                               const Surroundings& surroundings)
-    : stream_(std::move(socket)),
-      place_(std::move(place)),
+PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings)
+    : stream_(std::move(arrival.socket), std::move(arrival.session)),
+      place_(std::move(arrival.place)),
       handler_(surroundings.handler),
       budget_(surroundings.budget),
       buffer_(surroundings.buffer),
@@ -55,7 +54,8 @@ PeerConnection::PeerConnection(asio::ip::tcp::socket socket,
       writer_(stream_, options_),
       decoder_(options_.max_hello_bytes),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
-      deadline_(Clock::now() + options_.handshake) {}
+      frame_clock_(Clock::now(), options_),
+      access_(std::move(arrival.access)) {}
 
 void PeerConnection::Start() {
   const auto self = shared_from_this();
@@ -98,6 +98,9 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
     }
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
+      if (!stream_.failure().empty()) {
+        spdlog::warn("{}: TLS: {}", peer_, stream_.failure());
+      }
       co_return Status();
     }
     if (came.bytes > 0) {
@@ -130,12 +133,14 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
     if (!status.ok()) {
       co_return status;
     }
-    is_mid_frame_ = false;
+    frame_clock_.Expect(Clock::now(), 0);
     if (!HasRoom()) {
       co_await WaitForRoom();
     }
   }
-  ExpectFrame();
+  if (is_greeted_) {
+    frame_clock_.Expect(Clock::now(), decoder_.pending_bytes());
+  }
   co_return Status();
 }
 
@@ -147,9 +152,14 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
     return envelope.error();
   }
   if (!is_greeted_) {
-    is_greeted_ = handler_.Greet(*envelope, writer_);
+    is_greeted_ = Greet(*envelope);
     is_refused_ = !is_greeted_;
     decoder_.set_max_payload_bytes(options_.max_frame_bytes);
+    Release(frame_bytes);
+    return {};
+  }
+  if (const Status denied = CheckMayAsk(identity_, *envelope); !denied.ok()) {
+    writer_.PushError(envelope->request_id(), denied);
     Release(frame_bytes);
     return {};
   }
@@ -165,14 +175,40 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
   return {};
 }
 
+bool PeerConnection::Greet(const wire::Envelope& hello) {
+  credentials_ = Credentials::Of(stream_.certificate(), hello.hello().token());
+  const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
+  if (!identity) {
+    spdlog::warn("{}: {}", peer_, identity.error().message());
+    writer_.PushError(hello.request_id(), identity.error());
+    return false;
+  }
+  identity_ = *identity;
+  return handler_.Greet(hello, identity_, writer_);
+}
+
+void PeerConnection::ChangeAccess(std::shared_ptr<const AccessControl> access) {
+  access_ = std::move(access);
+  if (!is_greeted_) {
+    return;
+  }
+  const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
+  if (!identity) {
+    spdlog::warn("{}: {}, no longer: {}", peer_, identity_.name, identity.error().message());
+    CloseNow();
+    return;
+  }
+  identity_ = *identity;
+}
+
 asio::awaitable<void> PeerConnection::Serve(asio::awaitable<void> request, std::size_t bytes) {
   co_await std::move(request);
   requests_ -= 1;
   request_bytes_ -= bytes;
   Release(bytes);
   changed_.cancel();
-  if (requests_ == 0 && !is_mid_frame_) {
-    ExpectFrame();
+  if (requests_ == 0 && !frame_clock_.is_mid_frame()) {
+    frame_clock_.Expect(Clock::now(), 0);
   }
   Finish();
 }
@@ -203,14 +239,13 @@ asio::awaitable<void> PeerConnection::WaitForRoom() {
     co_await changed_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
   }
   is_held_up_ = false;
-  is_mid_frame_ = false;  // its clock begins anew
-  ExpectFrame();
+  frame_clock_.Restart(Clock::now(), decoder_.pending_bytes());
 }
 
 asio::awaitable<void> PeerConnection::Linger() {
   stream_.CloseSending();
   phase_ = Phase::kLingering;
-  deadline_ = Clock::now() + (is_refused_ ? options_.linger : options_.drain);
+  linger_until_ = Clock::now() + (is_refused_ ? options_.linger : options_.drain);
   while (phase_ == Phase::kLingering) {
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
@@ -226,19 +261,16 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
   if (phase_ == Phase::kClosed) {
     return;
   }
-  if (writer_.IsStalled(now)) {
+  if (writer_.IsStalled(now) || (phase_ == Phase::kLingering && now >= linger_until_)) {
     CloseNow();
     return;
   }
-  if (now < deadline_) {
-    return;
-  }
-  if (phase_ == Phase::kLingering) {
-    CloseNow();
-  } else if (is_reading_ && !is_held_up_ && (requests_ == 0 || is_mid_frame_)) {
-    spdlog::warn(
-        "{}: {}", peer_,
-        is_mid_frame_ ? "the rest of a frame did not come in time" : "nothing came in time");
+  const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
+                           (requests_ == 0 || frame_clock_.is_mid_frame());
+  if (is_expected && now >= frame_clock_.deadline()) {
+    spdlog::warn("{}: {}", peer_,
+                 frame_clock_.is_mid_frame() ? "the rest of a frame did not come in time"
+                                             : "nothing came in time");
     CloseNow();
   }
 }
@@ -262,21 +294,6 @@ void PeerConnection::Release(std::size_t bytes) {
 void PeerConnection::DropUnread() {
   decoder_ = FrameDecoder(options_.max_frame_bytes);
   Release(held_bytes_ - request_bytes_);
-}
-
-// Sets the clock of the next frame, or of the rest of one: what has come of it buys time for the
-// rest. The Hello's runs from the start.
-void PeerConnection::ExpectFrame() {
-  const Clock::time_point now = Clock::now();
-  const std::size_t part_bytes = decoder_.pending_bytes();
-  if (part_bytes > 0 && !is_mid_frame_) {
-    frame_began_ = now;
-  }
-  is_mid_frame_ = part_bytes > 0;
-  if (is_greeted_) {
-    const auto bought = std::chrono::milliseconds(1'000 * part_bytes / options_.min_bytes_per_s);
-    deadline_ = is_mid_frame_ ? frame_began_ + options_.frame + bought : now + options_.idle;
-  }
 }
 
 void PeerConnection::Finish() {

@@ -15,7 +15,9 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include "proto/wire/frame.h"
+#include "server/net/access/access_control.h"
 #include "server/net/connection/byte_budget.h"
+#include "server/net/connection/frame_clock.h"
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
@@ -37,9 +39,15 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
     const NetOptions& options;
   };
 
-  PeerConnection(boost::asio::ip::tcp::socket socket,
-                 Places::Place place,
-                 const Surroundings& surroundings);
+  // A socket that was accepted, and what it may do.
+  struct Arrival {
+    boost::asio::ip::tcp::socket socket;
+    Places::Place place;
+    SslSession session;  // null: in the clear
+    std::shared_ptr<const AccessControl> access;
+  };
+
+  PeerConnection(Arrival arrival, const Surroundings& surroundings);
   PeerConnection(const PeerConnection&) = delete;
   PeerConnection& operator=(const PeerConnection&) = delete;
   ~PeerConnection() { budget_.GiveBack(held_bytes_); }
@@ -51,6 +59,8 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   void CloseNow();
   // To be called now and then: closes when the peer owes something for too long.
   void CheckDeadlines(Clock::time_point now);
+  // From now on these rules hold: closes when the peer may not come in any more.
+  void ChangeAccess(std::shared_ptr<const AccessControl> access);
 
   const std::string& peer() const { return peer_; }
 
@@ -69,6 +79,8 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // The requests of which all bytes have come.
   boost::asio::awaitable<Status> TakeRequests();
   Status TakeRequest(ByteSpan payload);
+  // False: it may not come in.
+  bool Greet(const wire::Envelope& hello);
   bool HasRoom() const;
   boost::asio::awaitable<void> WaitForRoom();
   // Reads on and drops what comes: closing a socket with unread bytes resets it, and the peer would
@@ -77,7 +89,6 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   Status Hold(std::size_t bytes);
   void Release(std::size_t bytes);
   void DropUnread();
-  void ExpectFrame();
   void Finish();
 
   PeerStream stream_;
@@ -92,13 +103,15 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   std::size_t held_bytes_ = 0;  // of `budget_`: what was received and is not answered yet
   boost::asio::cancellation_signal stop_reading_;
   boost::asio::steady_timer changed_;  // cancelled when a request is done
-  Clock::time_point deadline_;         // of what the peer owes next
-  Clock::time_point frame_began_;      // of which a part has come
+  FrameClock frame_clock_;             // of what the peer owes next
+  Clock::time_point linger_until_;
+  std::shared_ptr<const AccessControl> access_;
+  Credentials credentials_;  // that it showed
+  Identity identity_;        // from the greeting on
   std::size_t requests_ = 0;
   std::size_t request_bytes_ = 0;
   Phase phase_ = Phase::kOpen;
   bool is_greeted_ = false;
-  bool is_mid_frame_ = false;
   bool is_held_up_ = false;  // by its own requests and replies: it is not read from
   bool is_refused_ = false;
   bool is_draining_ = false;

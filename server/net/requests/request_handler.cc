@@ -21,9 +21,11 @@ constexpr std::size_t kBytesAtOnce = 1u << 20;  // of a reply, then it is the ot
 
 }  // namespace
 
-bool RequestHandler::Greet(const Envelope& request, ReplyWriter& out) const {
-  const AtlasIdentity& identity = service_.identity();
-  if (const Status status = CheckHello(request, identity.profile); !status.ok()) {
+bool RequestHandler::Greet(const Envelope& request,
+                           const Identity& identity,
+                           ReplyWriter& out) const {
+  const AtlasIdentity& atlas = service_.identity();
+  if (const Status status = CheckHello(request, atlas.profile); !status.ok()) {
     out.PushError(request.request_id(), status);
     return false;
   }
@@ -31,11 +33,13 @@ bool RequestHandler::Greet(const Envelope& request, ReplyWriter& out) const {
   wire::HelloReply& hello = *reply.mutable_hello_reply();
   hello.set_protocol_major(kProtocolMajor);
   hello.set_protocol_minor(kProtocolMinor);
-  hello.set_profile(ProfileToWire(identity.profile));
-  hello.set_atlas_id(BytesToWire(identity.atlas_id));
-  hello.set_epoch(identity.epoch);
+  hello.set_profile(ProfileToWire(atlas.profile));
+  hello.set_atlas_id(BytesToWire(atlas.atlas_id));
+  hello.set_epoch(atlas.epoch);
   hello.set_revision(service_.revision());
   hello.set_max_frame_bytes(options_.max_frame_bytes);
+  hello.set_name(identity.name);
+  hello.set_role(std::string(RoleName(identity.role)));
   out.Push(reply);
   return true;
 }

@@ -8,6 +8,7 @@
 #include <boost/asio/thread_pool.hpp>
 
 #include "proto/wire/envelope.h"
+#include "server/net/access/access_control.h"
 #include "server/net/net_options.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
@@ -32,8 +33,10 @@ class RequestHandler {
         places_(options.max_waits),
         frames_(options.tile_frame_bytes) {}
 
-  // The first frame of a connection. False when it ends the connection; the error is then queued.
-  bool Greet(const wire::Envelope& request, ReplyWriter& out) const;
+  std::int64_t NowMs() const { return service_.NowMs(); }
+  // The first frame of a connection, of a peer that may come in. False when it ends the connection;
+  // the error is then queued.
+  bool Greet(const wire::Envelope& request, const Identity& identity, ReplyWriter& out) const;
   // Every later one, which gets its replies, or one error. What can be answered from memory is, at
   // once; else the rest is to be awaited.
   std::optional<boost::asio::awaitable<void>> Handle(wire::Envelope request, ReplyWriter& out);

@@ -6,6 +6,7 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <openssl/ssl.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -46,6 +47,35 @@ bool IsWritable(int fd, std::chrono::milliseconds patience) {
 BlockingPeer::BlockingPeer(std::uint16_t port, int buffer_bytes)
     : fd_(Connect(port, buffer_bytes)) {}
 
+BlockingPeer::BlockingPeer(std::uint16_t port, const Tls& tls, int buffer_bytes)
+    : fd_(Connect(port, buffer_bytes)) {
+  SSL_CTX* const context = SSL_CTX_new(TLS_client_method());
+  SSL_CTX_set_verify(context, SSL_VERIFY_PEER, nullptr);
+  EXPECT_EQ(SSL_CTX_load_verify_file(context, tls.authority.c_str()), 1);
+  if (tls.own) {
+    EXPECT_EQ(SSL_CTX_use_certificate_chain_file(context, tls.own->certificate.c_str()), 1);
+    EXPECT_EQ(SSL_CTX_use_PrivateKey_file(context, tls.own->key.c_str(), SSL_FILETYPE_PEM), 1);
+  }
+  SSL_CTX_set_max_proto_version(context, tls.max_version);
+  session_.reset(SSL_new(context));
+  SSL_CTX_free(context);  // the session has its share
+  SSL_set_fd(session_.get(), fd_);
+  if (SSL_connect(session_.get()) != 1) {
+    session_.reset();
+  }
+}
+
+void BlockingPeer::SslFree::operator()(ssl_st* session) const {
+  SSL_free(session);
+}
+
+std::string BlockingPeer::PeerName() const {
+  std::array<char, 128> name{};
+  X509_NAME_get_text_by_NID(X509_get_subject_name(SSL_get0_peer_certificate(session_.get())),
+                            NID_commonName, name.data(), name.size());
+  return name.data();
+}
+
 BlockingPeer::~BlockingPeer() {
   if (fd_ >= 0) {
     ::close(fd_);
@@ -54,7 +84,9 @@ BlockingPeer::~BlockingPeer() {
 
 bool BlockingPeer::SendBytes(ByteSpan bytes) const {
   while (!bytes.empty()) {
-    const ssize_t sent = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    const ssize_t sent =
+        session_ ? SSL_write(session_.get(), bytes.data(), static_cast<int>(bytes.size()))
+                 : ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent <= 0) {
       return false;
     }
@@ -95,7 +127,9 @@ std::optional<wire::Envelope> BlockingPeer::Receive(std::size_t* size_bytes) {
       return ParseEnvelope(**next).value();
     }
     std::array<std::uint8_t, 16'384> chunk{};
-    const ssize_t size = ::recv(fd_, chunk.data(), chunk.size(), 0);
+    const ssize_t size =
+        session_ ? SSL_read(session_.get(), chunk.data(), static_cast<int>(chunk.size()))
+                 : ::recv(fd_, chunk.data(), chunk.size(), 0);
     if (size <= 0) {
       EXPECT_TRUE(size == 0 || errno != EAGAIN) << "the daemon neither answered nor closed";
       return std::nullopt;
@@ -104,11 +138,14 @@ std::optional<wire::Envelope> BlockingPeer::Receive(std::size_t* size_bytes) {
   }
 }
 
-wire::Envelope BlockingPeer::Greet(std::uint32_t major, const std::string& profile) {
+wire::Envelope BlockingPeer::Greet(std::uint32_t major,
+                                   const std::string& profile,
+                                   const std::string& token) {
   wire::Envelope hello;
   hello.set_request_id(1);
   hello.mutable_hello()->set_protocol_major(major);
   hello.mutable_hello()->set_profile(profile);
+  hello.mutable_hello()->set_token(token);
   Send(hello);
   return Receive().value_or(wire::Envelope());
 }

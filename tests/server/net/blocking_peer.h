@@ -4,10 +4,15 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "proto/wire/envelope.h"
+#include "tests/server/net/test_certificates.h"
+
+struct ssl_st;
 
 namespace atlas {
 
@@ -15,11 +20,23 @@ class BlockingPeer {
  public:
   // Connects to a port of loopback. `buffer_bytes`: of the socket's buffers; 0 leaves the system's.
   explicit BlockingPeer(std::uint16_t port, int buffer_bytes = 0);
+  // Through TLS: whom it believes, and what it shows if asked. `max_version` as OpenSSL has it; 0:
+  // the newest.
+  struct Tls {
+    std::filesystem::path authority;
+    std::optional<CertificateFiles> own = std::nullopt;
+    int max_version = 0;
+  };
+  BlockingPeer(std::uint16_t port, const Tls& tls, int buffer_bytes = 0);
   BlockingPeer(const BlockingPeer&) = delete;
   BlockingPeer& operator=(const BlockingPeer&) = delete;
   ~BlockingPeer();
 
   bool is_connected() const { return fd_ >= 0; }
+  // The handshake went well, as far as this end knows.
+  bool is_encrypted() const { return session_ != nullptr; }
+  // The common name that the daemon showed.
+  std::string PeerName() const;
 
   // False when the daemon closed.
   bool SendBytes(ByteSpan bytes) const;
@@ -34,10 +51,17 @@ class BlockingPeer {
   bool IsClosed() { return !Receive().has_value(); }
 
   // Sends a Hello; its reply, or the error that came instead.
-  wire::Envelope Greet(std::uint32_t major = kProtocolMajor, const std::string& profile = "");
+  wire::Envelope Greet(std::uint32_t major = kProtocolMajor,
+                       const std::string& profile = "",
+                       const std::string& token = "");
 
  private:
+  struct SslFree {
+    void operator()(ssl_st* session) const;
+  };
+
   int fd_;
+  std::unique_ptr<ssl_st, SslFree> session_;
   FrameDecoder decoder_;
 };
 

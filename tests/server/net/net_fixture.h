@@ -26,7 +26,7 @@ class NetTest : public ServiceTest {
     Result<ListenSocket> socket = ListenSocket::Open("127.0.0.1", 0);
     ASSERT_TRUE(socket.has_value()) << socket.error().message();
     port_ = socket->port();
-    server_ = std::make_unique<TcpServer>(*service_, net_, *std::move(socket));
+    server_ = std::make_unique<TcpServer>(*service_, net_, *std::move(socket), security_);
   }
   void Run() {
     run_ = std::async(std::launch::async, [this] { server_->Run(); });
@@ -108,6 +108,7 @@ class NetTest : public ServiceTest {
   }
 
   NetOptions net_;
+  ServerSecurity security_;
   std::unique_ptr<TcpServer> server_;
   std::uint16_t port_ = 0;
 

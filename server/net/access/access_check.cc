@@ -1,0 +1,64 @@
+#include "server/net/access/access_check.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/base/str_cat.h"
+#include "core/geometry/keyframe_key.h"
+
+namespace atlas {
+namespace {
+
+Status Deny(const Identity& identity, const std::string& what) {
+  return {StatusCode::kPermissionDenied,
+          StrCat(identity.name.empty() ? "without a certificate or a token" : identity.name,
+                 ", with the role ", RoleName(identity.role), ", may not ", what)};
+}
+
+bool IsOwn(const Identity& identity, const wire::KeyframeKey& key) {
+  return identity.name.empty() || key.vehicle() == identity.name;
+}
+
+Status CheckUpload(const Identity& identity, const wire::UploadKeyframe& upload) {
+  if (identity.role != Role::kVehicle) {
+    return Deny(identity, "upload keyframes");
+  }
+  return IsOwn(identity, upload.key())
+             ? Status()
+             : Deny(identity, StrCat("upload for the vehicle ", NameFrom(upload.key().vehicle())));
+}
+
+Status CheckPoses(const Identity& identity, const wire::UpdatePoses& poses) {
+  if (identity.role == Role::kMerge) {
+    return {};
+  }
+  const bool is_own =
+      identity.role == Role::kVehicle &&
+      std::all_of(poses.updates().begin(), poses.updates().end(),
+                  [&identity](const auto& update) { return IsOwn(identity, update.key()); });
+  return is_own ? Status() : Deny(identity, "correct poses of others");
+}
+
+}  // namespace
+
+Status CheckMayAsk(const Identity& identity, const wire::Envelope& request) {
+  if (identity.role == Role::kAdmin) {
+    return {};
+  }
+  switch (request.body_case()) {
+    case wire::Envelope::kUploadKeyframe:
+      return CheckUpload(identity, request.upload_keyframe());
+    case wire::Envelope::kUpdatePoses:
+      return CheckPoses(identity, request.update_poses());
+    case wire::Envelope::kChangeSession:
+      return Deny(identity, "change sessions");
+    case wire::Envelope::kCompactRequest:
+      return Deny(identity, "compact the atlas");
+    case wire::Envelope::kVerifyRequest:
+      return identity.role == Role::kMerge ? Status() : Deny(identity, "verify the atlas");
+    default:
+      return {};
+  }
+}
+
+}  // namespace atlas

@@ -1,0 +1,231 @@
+// Who comes in, over TLS and with tokens, and what they may do.
+#include <chrono>
+#include <cstddef>
+#include <future>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openssl/ssl.h>
+
+#include "tests/server/net/net_fixture.h"
+#include "tests/server/net/test_certificates.h"
+
+namespace atlas {
+namespace {
+
+constexpr const char* kTokenLine =  // "open sesame"
+    " never 41ef4bb0b23661e66301aac36066912dac037827b4ae63a7b1165a5aa93ed4eb\n";
+
+std::shared_ptr<const AccessControl> AccessOf(const std::string& tokens,
+                                              Role anonymous = Role::kNone) {
+  return std::make_shared<const AccessControl>(TokenList::Parse(tokens, "tokens").value(),
+                                               anonymous);
+}
+
+class TlsTest : public NetTest {
+ protected:
+  // Certificates of vehicles count, and the token of a `role`.
+  void ServeTls(const std::string& role = "admin", std::string daemon_name = "daemon") {
+    ca_ = std::make_unique<TestAuthority>(directory_, "fleet");
+    security_ = SecurityOf(daemon_name, AccessOf("alice " + role + kTokenLine));
+    Serve();
+  }
+  ServerSecurity SecurityOf(const std::string& daemon_name,
+                            std::shared_ptr<const AccessControl> access) const {
+    const CertificateFiles own = ca_->Issue(daemon_name);
+    const auto tls = TlsContext::Load({own.certificate, own.key, ca_->certificate()});
+    EXPECT_TRUE(tls.has_value()) << tls.error().message();
+    return {*tls, std::move(access)};
+  }
+  BlockingPeer::Tls Anonymous() const { return {ca_->certificate()}; }
+  BlockingPeer::Tls As(const std::string& name, const std::string& unit = "") const {
+    return {ca_->certificate(), ca_->Issue(name, unit)};
+  }
+  static StatusCode Ask(BlockingPeer& peer, const wire::Envelope& request) {
+    EXPECT_TRUE(peer.Send(request));
+    const auto reply = peer.Receive();
+    EXPECT_TRUE(reply.has_value());
+    return CodeOf(reply);
+  }
+  wire::Envelope UploadBy(const std::string& vehicle) {
+    UploadRequest upload = DriveUpload(0);
+    upload.key.session.vehicle = vehicle;
+    return UploadOf(std::move(upload), 3);
+  }
+  static wire::Envelope Retraction() {
+    wire::Envelope envelope;
+    envelope.set_request_id(4);
+    envelope.mutable_change_session()->set_action(wire::ChangeSession::RETRACT);
+    return envelope;
+  }
+  static wire::Envelope Verification() {
+    wire::Envelope envelope;
+    envelope.set_request_id(5);
+    envelope.mutable_verify_request()->set_timeout_ms(10'000);
+    return envelope;
+  }
+
+  std::unique_ptr<TestAuthority> ca_;
+};
+
+TEST_F(TlsTest, AVehicleIsWhomItsCertificateNames) {
+  ServeTls();
+  BlockingPeer car(port_, As("car.7"));
+  ASSERT_TRUE(car.is_encrypted());
+  EXPECT_EQ(car.PeerName(), "daemon");
+  const wire::Envelope hello = car.Greet();
+  EXPECT_EQ(hello.hello_reply().name(), "car.7");
+  EXPECT_EQ(hello.hello_reply().role(), "vehicle");
+  EXPECT_EQ(Ask(car, UploadBy("car.7")), StatusCode::kOk);
+  EXPECT_EQ(Ask(car, UploadBy("car.8")), StatusCode::kPermissionDenied);
+  EXPECT_EQ(Ask(car, Retraction()), StatusCode::kPermissionDenied);
+  EXPECT_EQ(Ask(car, Verification()), StatusCode::kPermissionDenied);
+  EXPECT_EQ(Ask(car, StatusOf(9)), StatusCode::kOk) << "and stays connected";
+}
+
+TEST_F(TlsTest, APoseIsCorrectedByItsVehicleAndByTheMerge) {
+  ServeTls();
+  BlockingPeer car(port_, As("car.7"));
+  car.Greet();
+  ASSERT_EQ(Ask(car, UploadBy("car.7")), StatusCode::kOk);
+  wire::Envelope correction;
+  correction.set_request_id(6);
+  auto& update = *correction.mutable_update_poses()->add_updates();
+  update.mutable_key()->CopyFrom(UploadBy("car.7").upload_keyframe().key());
+  update.mutable_pose()->CopyFrom(UploadBy("car.7").upload_keyframe().pose());
+  EXPECT_EQ(Ask(car, correction), StatusCode::kOk);
+  BlockingPeer other(port_, As("car.8"));
+  other.Greet();
+  EXPECT_EQ(Ask(other, correction), StatusCode::kPermissionDenied);
+  BlockingPeer merge(port_, As("aligner", "merge"));
+  EXPECT_EQ(merge.Greet().hello_reply().role(), "merge");
+  EXPECT_EQ(Ask(merge, correction), StatusCode::kOk);
+  EXPECT_EQ(Ask(merge, UploadBy("aligner")), StatusCode::kPermissionDenied);
+  EXPECT_EQ(Ask(merge, Verification()), StatusCode::kOk);
+}
+
+TEST_F(TlsTest, ATokenSaysWhoAPersonIs) {
+  ServeTls("reader");
+  BlockingPeer alice(port_, Anonymous());
+  const wire::Envelope hello = alice.Greet(kProtocolMajor, "", "open sesame");
+  EXPECT_EQ(hello.hello_reply().name(), "alice");
+  EXPECT_EQ(hello.hello_reply().role(), "reader");
+  EXPECT_EQ(Ask(alice, StatusOf(2)), StatusCode::kOk);
+  EXPECT_EQ(Ask(alice, UploadBy("alice")), StatusCode::kPermissionDenied);
+}
+
+TEST_F(TlsTest, NobodyInParticularStaysOutside) {
+  ServeTls();
+  for (const char* token : {"", "open sesam"}) {
+    BlockingPeer peer(port_, Anonymous());
+    const wire::Envelope reply = peer.Greet(kProtocolMajor, "", token);
+    EXPECT_EQ(CodeOf(reply), StatusCode::kPermissionDenied) << token;
+    EXPECT_FALSE(reply.error().retry());
+    EXPECT_TRUE(peer.IsClosed());
+  }
+}
+
+TEST_F(TlsTest, ACertificateOfAnotherAuthorityOpensNothing) {
+  ServeTls();
+  const TestAuthority others(directory_, "others");
+  BlockingPeer peer(port_, {ca_->certificate(), others.Issue("car.7")});
+  // In TLS 1.3 the client may not know yet that it was refused.
+  EXPECT_TRUE(!peer.is_encrypted() || peer.Greet().body_case() == wire::Envelope::BODY_NOT_SET);
+  BlockingPeer good(port_, As("car.7"));
+  EXPECT_TRUE(good.Greet().has_hello_reply());
+}
+
+TEST_F(TlsTest, ACertificateWithoutAUsefulNameOpensNothing) {
+  ServeTls();
+  BlockingPeer spaced(port_, As("a car"));
+  EXPECT_EQ(CodeOf(spaced.Greet()), StatusCode::kPermissionDenied);
+  BlockingPeer boss(port_, As("car.7", "boss"));
+  EXPECT_EQ(CodeOf(boss.Greet()), StatusCode::kPermissionDenied);
+}
+
+TEST_F(TlsTest, WithoutTlsOrWithAnOldOneNobodyIsHeard) {
+  ServeTls();
+  BlockingPeer plain(port_);
+  EXPECT_EQ(plain.Greet().body_case(), wire::Envelope::BODY_NOT_SET);
+  EXPECT_TRUE(plain.IsClosed());
+  BlockingPeer::Tls old = As("car.7");
+  old.max_version = TLS1_2_VERSION;
+  EXPECT_FALSE(BlockingPeer(port_, old).is_encrypted());
+  BlockingPeer good(port_, As("car.7"));
+  EXPECT_TRUE(good.Greet().has_hello_reply());
+}
+
+TEST_F(TlsTest, AHandshakeHasADeadline) {
+  net_.handshake = std::chrono::milliseconds(100);
+  ServeTls();
+  BlockingPeer silent(port_);
+  EXPECT_TRUE(silent.IsClosed());
+  BlockingPeer half(port_);
+  half.SendBytes(Bytes{0x16, 0x03, 0x01, 0x02, 0x00});  // a record's head, and no more
+  EXPECT_TRUE(half.IsClosed());
+}
+
+TEST_F(TlsTest, LargeRepliesComeWholeThroughSmallBuffers) {
+  ServeTls();
+  UploadDrive(12);
+  Digest();
+  BlockingPeer slow(port_, As("car.7"), 4'096);
+  slow.Greet();
+  constexpr std::uint64_t kQueries = 40;
+  auto sending = std::async(std::launch::async, [&slow] {
+    for (std::uint64_t id = 1; id <= kQueries; ++id) {
+      slow.Send(QueryOf(id));
+    }
+  });
+  sending.get();
+  std::uint64_t ended = 0;
+  while (ended < kQueries) {
+    const auto reply = slow.Receive();
+    ASSERT_TRUE(reply.has_value());
+    ended += reply->has_query_end() ? 1u : 0u;
+  }
+}
+
+TEST_F(TlsTest, ATokenThatIsTakenBackClosesItsConnections) {
+  ServeTls();
+  BlockingPeer alice(port_, Anonymous());
+  ASSERT_TRUE(alice.Greet(kProtocolMajor, "", "open sesame").has_hello_reply());
+  BlockingPeer car(port_, As("car.7"));
+  ASSERT_TRUE(car.Greet().has_hello_reply());
+  server_->ChangeSecurity(SecurityOf("renewed", AccessOf("")));
+  EXPECT_TRUE(alice.IsClosed());
+  EXPECT_EQ(Ask(car, StatusOf(1)), StatusCode::kOk);
+  BlockingPeer again(port_, Anonymous());
+  EXPECT_EQ(again.PeerName(), "renewed") << "the new certificate";
+  EXPECT_EQ(CodeOf(again.Greet(kProtocolMajor, "", "open sesame")), StatusCode::kPermissionDenied);
+}
+
+TEST_F(TlsTest, ARoleThatChangedHoldsAtOnce) {
+  ServeTls("reader");
+  BlockingPeer alice(port_, Anonymous());
+  ASSERT_TRUE(alice.Greet(kProtocolMajor, "", "open sesame").has_hello_reply());
+  EXPECT_EQ(Ask(alice, Verification()), StatusCode::kPermissionDenied);
+  server_->ChangeSecurity({security_.tls, AccessOf(std::string("alice admin") + kTokenLine)});
+  BlockingPeer marker(port_, Anonymous());  // accepted after the change
+  marker.Greet(kProtocolMajor, "", "open sesame");
+  EXPECT_EQ(Ask(alice, Verification()), StatusCode::kOk);
+}
+
+TEST_F(TlsTest, FilesThatAreOfNoUseAreNamed) {
+  ca_ = std::make_unique<TestAuthority>(directory_, "fleet");
+  const CertificateFiles one = ca_->Issue("one");
+  const CertificateFiles two = ca_->Issue("two");
+  const auto missing = TlsContext::Load({directory_ / "none.pem", one.key, {}});
+  EXPECT_EQ(missing.error().code(), StatusCode::kNotFound);
+  EXPECT_THAT(missing.error().message(), ::testing::HasSubstr("none.pem"));
+  const auto mixed = TlsContext::Load({one.certificate, two.key, {}});
+  EXPECT_EQ(mixed.error().code(), StatusCode::kInvalidData);
+  EXPECT_THAT(mixed.error().message(), ::testing::HasSubstr("two.key"));
+  const auto no_authority = TlsContext::Load({one.certificate, one.key, one.key});
+  EXPECT_EQ(no_authority.error().code(), StatusCode::kInvalidData);
+}
+
+}  // namespace
+}  // namespace atlas
