@@ -6,9 +6,11 @@
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -106,6 +108,33 @@ NetOptions NetFrom(const DaemonConfig& config) {
   return options;
 }
 
+Result<ServerSecurity> SecurityFrom(const DaemonConfig& config) {
+  const std::optional<Role> anonymous = RoleByName(config.AnonymousRole());
+  if (!anonymous) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("access.anonymous is '", config.AnonymousRole(),
+                        "', expected none, reader, vehicle, merge or admin"));
+  }
+  TokenList tokens;
+  if (!config.tokens.empty()) {
+    Result<TokenList> read = TokenList::Read(config.tokens);
+    if (!read) {
+      return Error(read.error());
+    }
+    tokens = *std::move(read);
+  }
+  ServerSecurity security;
+  security.access = std::make_shared<const AccessControl>(std::move(tokens), *anonymous);
+  if (!config.tls_certificate.empty()) {
+    auto tls = TlsContext::Load({config.tls_certificate, config.tls_key, config.tls_client_ca});
+    if (!tls) {
+      return Error(tls.error());
+    }
+    security.tls = *std::move(tls);
+  }
+  return security;
+}
+
 void Log(LogLevel level, const std::string& message) {
   switch (level) {
     case LogLevel::kDebug:
@@ -120,6 +149,10 @@ void Log(LogLevel level, const std::string& message) {
 }
 
 int Serve(const DaemonConfig& config) {
+  Result<ServerSecurity> security = SecurityFrom(config);
+  if (!security) {
+    return Fail(security.error());
+  }
   Result<ListenSocket> socket = ListenSocket::Open(config.host, config.port);
   if (!socket) {
     return Fail(socket.error());
@@ -130,7 +163,7 @@ int Serve(const DaemonConfig& config) {
   }
   AtlasService service(**store, &NowMs, &Log, ServiceFrom(config));
   const std::string address = socket->address();
-  TcpServer server(service, NetFrom(config), *std::move(socket));
+  TcpServer server(service, NetFrom(config), *std::move(socket), *std::move(security));
   std::printf("listening %s\n", address.c_str());
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());

@@ -18,17 +18,27 @@ std::string Origin(const std::filesystem::path& path, const toml::source_region&
 }
 
 Result<std::string> TextOf(const toml::node& node, SettingType type) {
-  const bool is_number = type == SettingType::kNumber;
-  if (const auto* text = node.as_string(); text != nullptr && !is_number) {
-    return text->get();
+  switch (type) {
+    case SettingType::kText:
+      if (const auto* text = node.as_string()) {
+        return text->get();
+      }
+      return Error(StatusCode::kInvalidArgument, "expected a text");
+    case SettingType::kTruth:
+      if (const auto* truth = node.as_boolean()) {
+        return std::string(truth->get() ? "true" : "false");
+      }
+      return Error(StatusCode::kInvalidArgument, "expected true or false");
+    case SettingType::kNumber:
+      break;
   }
-  if (const auto* number = node.as_integer(); number != nullptr && is_number) {
+  if (const auto* number = node.as_integer()) {
     return StrCat(number->get());
   }
-  if (const auto* number = node.as_floating_point(); number != nullptr && is_number) {
+  if (const auto* number = node.as_floating_point()) {
     return StrCat(number->get());
   }
-  return Error(StatusCode::kInvalidArgument, is_number ? "expected a number" : "expected a text");
+  return Error(StatusCode::kInvalidArgument, "expected a number");
 }
 
 class FlatFile {

@@ -15,7 +15,7 @@ struct GivenSetting {
   std::string origin;  // "atlasd.toml: line 3", "ATLASD_WORKERS", "--workers"
 };
 
-enum class SettingType { kText, kNumber };
+enum class SettingType { kText, kNumber, kTruth };
 
 // The settings of a file by key, of those that there are; one in a table is "table.key".
 // kInvalidArgument names file and line, kNotFound the file.

@@ -33,10 +33,6 @@ std::optional<T> ParseNumber(const std::string& text) {
   return error == std::errc() && next == end ? std::optional<T>(value) : std::nullopt;
 }
 
-bool IsLoopback(const std::string& host) {
-  return host == "::1" || host.starts_with("127.");
-}
-
 Status ApplyData(const std::string& /*key*/, const std::string& text, DaemonConfig& config) {
   config.data = text;
   return {};
@@ -56,11 +52,6 @@ Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig
   }
   if (config.host.size() > 2 && config.host.front() == '[' && config.host.back() == ']') {
     config.host = config.host.substr(1, config.host.size() - 2);
-  }
-  if (!IsLoopback(config.host)) {
-    return BadValue(
-        key, text,
-        "a loopback address: there is no TLS yet, and nothing leaves this machine in the clear");
   }
   return {};
 }
@@ -85,6 +76,53 @@ Status ApplyLogLevel(const std::string& key, const std::string& text, DaemonConf
     return BadValue(key, text, "debug, info, warning or error");
   }
   config.log_level = text;
+  return {};
+}
+
+template <std::filesystem::path DaemonConfig::*kMember>
+Status ApplyFile(const std::string& /*key*/, const std::string& text, DaemonConfig& config) {
+  config.*kMember = text;
+  return {};
+}
+
+Status ApplyAnonymous(const std::string& /*key*/, const std::string& text, DaemonConfig& config) {
+  config.anonymous = text;
+  return {};
+}
+
+Status ApplyAllowPlaintext(const std::string& key, const std::string& text, DaemonConfig& config) {
+  if (text != "true" && text != "false") {
+    return BadValue(key, text, "true or false");
+  }
+  config.allow_plaintext = text == "true";
+  return {};
+}
+
+Status CheckListen(const DaemonConfig& config, const GivenSetting& listen) {
+  if (config.is_loopback() || !config.tls_certificate.empty() || config.allow_plaintext) {
+    return {};
+  }
+  return BadValue("listen", listen.text,
+                  "a loopback address, or TLS (tls.certificate, tls.key), or to be told that the "
+                  "network may read along (access.allow_plaintext)")
+      .WithContext(listen.origin);
+}
+
+// Of all settings together.
+Status CheckSecurity(const DaemonConfig& config) {
+  const bool has_tls = !config.tls_certificate.empty();
+  if (has_tls == config.tls_key.empty()) {
+    return {StatusCode::kInvalidArgument,
+            "tls.certificate and tls.key: one without the other is of no use"};
+  }
+  if (!has_tls && !config.tls_client_ca.empty()) {
+    return {StatusCode::kInvalidArgument,
+            "tls.client_ca: without tls.certificate no peer shows a certificate"};
+  }
+  if (config.AnonymousRole() == "none" && config.tls_client_ca.empty() && config.tokens.empty()) {
+    return {StatusCode::kInvalidArgument,
+            "nobody could come in: expected tls.client_ca, access.tokens or access.anonymous"};
+  }
   return {};
 }
 
@@ -119,8 +157,8 @@ Status ApplyNumberTo(const std::string& key, const std::string& text, DaemonConf
 constexpr Setting kSettings[] = {
     {"data", "--data", "ATLASD_DATA", "DIR", "directory of the atlas; made if there is none",
      SettingType::kText, &ApplyData},
-    {"listen", "--listen", "ATLASD_LISTEN", "HOST:PORT", "loopback only; port 0 takes a free one",
-     SettingType::kText, &ApplyListen},
+    {"listen", "--listen", "ATLASD_LISTEN", "HOST:PORT",
+     "port 0 takes a free one; beyond loopback TLS is expected", SettingType::kText, &ApplyListen},
     {"workers", "--workers", "ATLASD_WORKERS", "N", "fusion threads; 0 is one a core",
      SettingType::kNumber, &ApplyCountTo<&DaemonConfig::workers, 0, 64>},
     {"network_threads", "--network-threads", "ATLASD_NETWORK_THREADS", "N",
@@ -138,6 +176,20 @@ constexpr Setting kSettings[] = {
      SettingType::kNumber, &ApplyCountTo<&DaemonConfig::reply_mib, 0, 65'536>},
     {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error",
      SettingType::kText, &ApplyLogLevel},
+    {"tls.certificate", "--tls-certificate", "ATLASD_TLS_CERTIFICATE", "FILE",
+     "PEM: the daemon's certificate and those above it; speak TLS 1.3 alone", SettingType::kText,
+     &ApplyFile<&DaemonConfig::tls_certificate>},
+    {"tls.key", "--tls-key", "ATLASD_TLS_KEY", "FILE", "PEM: its private key", SettingType::kText,
+     &ApplyFile<&DaemonConfig::tls_key>},
+    {"tls.client_ca", "--tls-client-ca", "ATLASD_TLS_CLIENT_CA", "FILE",
+     "PEM: who vouches for vehicles", SettingType::kText, &ApplyFile<&DaemonConfig::tls_client_ca>},
+    {"access.tokens", "--tokens", "ATLASD_TOKENS", "FILE", "tokens of people", SettingType::kText,
+     &ApplyFile<&DaemonConfig::tokens>},
+    {"access.anonymous", "--anonymous", "ATLASD_ANONYMOUS", "ROLE",
+     "of whoever shows nothing: none, reader, vehicle, merge or admin", SettingType::kText,
+     &ApplyAnonymous},
+    {"access.allow_plaintext", "--allow-plaintext", "ATLASD_ALLOW_PLAINTEXT", "BOOL",
+     "listen beyond loopback without TLS", SettingType::kTruth, &ApplyAllowPlaintext},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell",
      SettingType::kNumber, &ApplyNumberTo<double, &DaemonConfig::cell_size_m>},
     {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
@@ -163,6 +215,12 @@ std::map<std::string, std::string> Defaults() {
           {"survey_disk_mib", StrCat(config.survey_disk_mib)},
           {"reply_mib", StrCat(config.reply_mib)},
           {"log_level", config.log_level},
+          {"tls.certificate", "none"},
+          {"tls.key", "none"},
+          {"tls.client_ca", "none"},
+          {"access.tokens", "none"},
+          {"access.anonymous", "admin on loopback without tokens and client_ca, else none"},
+          {"access.allow_plaintext", "false"},
           {"map.cell_size", StrCat(map.cell_size_m())},
           {"map.segments", StrCat(int{map.column_segments})},
           {"map.segment_height", StrCat(map.segment_height_m())},
@@ -203,6 +261,15 @@ Result<Settings> Collect(const Settings& flags, const std::string& file) {
 }
 
 }  // namespace
+
+bool DaemonConfig::is_loopback() const {
+  return host == "::1" || host.starts_with("127.");
+}
+
+std::string DaemonConfig::AnonymousRole() const {
+  const bool is_private = is_loopback() && tls_client_ca.empty() && tokens.empty();
+  return anonymous.value_or(is_private ? "admin" : "none");
+}
 
 Result<MapProfile> DaemonConfig::NewProfile() const {
   MapProfile profile;
@@ -295,6 +362,14 @@ Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
   }
   if (command.config.data.empty()) {
     return Error(StatusCode::kInvalidArgument, "--data DIR is required");
+  }
+  if (const auto listen = settings->find("listen"); listen != settings->end()) {
+    if (Status status = CheckListen(command.config, listen->second); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  if (Status status = CheckSecurity(command.config); !status.ok()) {
+    return Error(std::move(status));
   }
   return command;
 }

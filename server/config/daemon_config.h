@@ -24,6 +24,19 @@ struct DaemonConfig {
   int reply_mib = 64;          // tiles ready to be sent
   std::string log_level = "info";
 
+  // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.
+  std::filesystem::path tls_certificate;
+  std::filesystem::path tls_key;
+  std::filesystem::path tls_client_ca;   // of vehicles; empty: no certificate of a peer counts
+  std::filesystem::path tokens;          // of people (token_list.h); empty: none
+  std::optional<std::string> anonymous;  // the role of whoever shows neither
+  bool allow_plaintext = false;          // off loopback, without TLS
+
+  bool is_loopback() const;
+  // "admin" where everybody is on this machine and nobody is expected to show anything, else
+  // "none", unless it was given.
+  std::string AnonymousRole() const;
+
   // Of the map, given by whoever starts the daemon; checked against an atlas that exists already.
   std::optional<double> cell_size_m;
   std::optional<int> segments;

@@ -149,7 +149,7 @@ TEST_F(DaemonConfigTest, MalformedTomlIsAnErrorWithItsLine) {
   EXPECT_THAT(RefusedFile("data = '/x'\ndata = '/y'\n"), HasSubstr("line 2"));
 }
 
-TEST_F(DaemonConfigTest, OnlyLoopbackIsListenedOn) {
+TEST_F(DaemonConfigTest, InTheClearOnlyLoopbackIsListenedOn) {
   for (const char* address : {"0.0.0.0:7447", "192.168.1.1:7447", "[::]:7447", "example:7447"}) {
     EXPECT_THAT(
         Refusal({"--data", "/x", "--listen", address}),
@@ -160,6 +160,53 @@ TEST_F(DaemonConfigTest, OnlyLoopbackIsListenedOn) {
   for (const char* address : {"127.0.0.1:0", "127.1.2.3:1", "localhost:7447", "[::1]:7447"}) {
     EXPECT_TRUE(Parse({"--data", "/x", "--listen", address}).has_value()) << address;
   }
+}
+
+TEST_F(DaemonConfigTest, BeyondLoopbackItTakesTlsOrToBeTold) {
+  const std::vector<std::string> tls = {"--tls-certificate", "c.pem", "--tls-key", "k.pem"};
+  const std::vector<std::string> beyond = {"--data", "/x", "--listen", "0.0.0.0:7447"};
+  const auto with = [](std::vector<std::string> all, const std::vector<std::string>& more) {
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  EXPECT_THAT(Refusal(with(beyond, tls)), HasSubstr("nobody could come in"));
+  const auto vehicles = Parse(with(with(beyond, tls), {"--tls-client-ca", "ca.pem"}));
+  ASSERT_TRUE(vehicles.has_value()) << vehicles.error().message();
+  EXPECT_EQ(vehicles->config.AnonymousRole(), "none");
+  EXPECT_TRUE(Parse(with(with(beyond, tls), {"--tokens", "tokens.txt"})).has_value());
+  EXPECT_TRUE(Parse(with(with(beyond, tls), {"--anonymous", "reader"})).has_value());
+  EXPECT_TRUE(
+      Parse(with(beyond, {"--allow-plaintext", "true", "--anonymous", "reader"})).has_value());
+  EXPECT_THAT(Refusal(with(beyond, {"--allow-plaintext", "true"})),
+              HasSubstr("nobody could come in"));
+  EXPECT_THAT(Refusal(with(beyond, {"--allow-plaintext", "perhaps"})), HasSubstr("true or false"));
+}
+
+TEST_F(DaemonConfigTest, OnThisMachineWhoeverComesIsAdminUntilSomethingIsExpected) {
+  EXPECT_EQ(Parse({"--data", "/x"})->config.AnonymousRole(), "admin");
+  EXPECT_EQ(Parse({"--data", "/x", "--tokens", "t"})->config.AnonymousRole(), "none");
+  EXPECT_EQ(
+      Parse({"--data", "/x", "--tokens", "t", "--anonymous", "reader"})->config.AnonymousRole(),
+      "reader");
+}
+
+TEST_F(DaemonConfigTest, HalvesOfTlsAreRefused) {
+  EXPECT_THAT(Refusal({"--data", "/x", "--tls-certificate", "c"}), HasSubstr("tls.key"));
+  EXPECT_THAT(Refusal({"--data", "/x", "--tls-key", "k"}), HasSubstr("tls.certificate"));
+  EXPECT_THAT(Refusal({"--data", "/x", "--tls-client-ca", "a"}), HasSubstr("tls.client_ca"));
+}
+
+TEST_F(DaemonConfigTest, TablesOfTheFileAreRead) {
+  const auto read = Parse(
+      {"--config", File("data = '/x'\n[tls]\ncertificate = 'c'\nkey = 'k'\nclient_ca = 'a'\n"
+                        "[access]\ntokens = 't'\nanonymous = 'reader'\nallow_plaintext = true\n")});
+  ASSERT_TRUE(read.has_value()) << read.error().message();
+  EXPECT_EQ(read->config.tls_key, "k");
+  EXPECT_EQ(read->config.tls_client_ca, "a");
+  EXPECT_EQ(read->config.tokens, "t");
+  EXPECT_TRUE(read->config.allow_plaintext);
+  EXPECT_THAT(RefusedFile("data = '/x'\n[access]\nallow_plaintext = 1\n"),
+              HasSubstr("true or false"));
 }
 
 TEST_F(DaemonConfigTest, RefusesValuesThatMakeNoSense) {
