@@ -27,6 +27,7 @@ wire::Envelope HelloRequest(const ConnectionOptions& options) {
   hello.set_protocol_major(kProtocolMajor);
   hello.set_protocol_minor(kProtocolMinor);
   hello.set_client_name(options.client_name);
+  hello.set_token(options.token);
   if (options.expected_profile) hello.set_profile(ProfileToWire(*options.expected_profile));
   return request;
 }
@@ -40,7 +41,8 @@ Status CheckVersion(const wire::HelloReply& reply, const Endpoint& endpoint) {
 
 AtlasIdentity IdentityFromWire(const wire::HelloReply& reply) {
   const ByteSpan id = BytesFromWire(reply.atlas_id());
-  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision(), reply.protocol_minor()};
+  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision(),
+          reply.protocol_minor(),      reply.name(),  reply.role()};
 }
 
 wire::Envelope RegionRequest(const RegionQuery& query) {
@@ -127,7 +129,7 @@ AtlasClient::~AtlasClient() = default;
 
 Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
   Result<DaemonConnection> connection =
-      DaemonConnection::Open(options.endpoint, options.connect_timeout);
+      DaemonConnection::Open(options.endpoint, options.connect_timeout, options.tls);
   if (!connection) return Error(connection.error());
   auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
   wire::Envelope request = HelloRequest(options);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "client/connection/daemon_connection.h"
 #include "client/connection/endpoint.h"
 #include "client/connection/requests.h"
 #include "core/base/status.h"
@@ -24,6 +25,8 @@ struct ConnectionOptions {
   Endpoint endpoint;
   std::string client_name = "libatlas_client";  // for the daemon's logs
   std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
+  std::optional<ConnectionTls> tls;             // none: in the clear
+  std::string token;                            // of a person; empty: none
   std::chrono::milliseconds connect_timeout{5'000};
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
 };

@@ -5,6 +5,7 @@
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl.hpp>
 #include <boost/asio/write.hpp>
 
 #include "core/base/str_cat.h"
@@ -20,13 +21,29 @@ namespace {
 
 constexpr std::size_t kChunkBytes = std::size_t{64} << 10;
 
+Status UseFiles(const ConnectionTls& tls, asio::ssl::context& context) {
+  const auto refuse = [](const char* what, const std::filesystem::path& file,
+                         const error_code& error) {
+    return Status(StatusCode::kInvalidArgument,
+                  StrCat("TLS: ", what, ' ', file.string(), ": ", error.message()));
+  };
+  error_code error;
+  context.load_verify_file(tls.ca.string(), error);
+  if (error) return refuse("authorities", tls.ca, error);
+  if (tls.certificate.empty()) return {};
+  context.use_certificate_chain_file(tls.certificate.string(), error);
+  if (error) return refuse("certificate", tls.certificate, error);
+  context.use_private_key_file(tls.key.string(), asio::ssl::context::pem, error);
+  return error ? refuse("key", tls.key, error) : Status();
+}
+
 }  // namespace
 
 class DaemonConnection::Impl {
  public:
   explicit Impl(Endpoint endpoint) : endpoint_(std::move(endpoint)), socket_(io_) {}
 
-  Status Open(milliseconds timeout);
+  Status Open(milliseconds timeout, const std::optional<ConnectionTls>& tls);
   Status Send(ByteSpan frame, milliseconds timeout);
   Result<Bytes> Receive(milliseconds timeout);
 
@@ -43,12 +60,15 @@ class DaemonConnection::Impl {
                 Clock::time_point deadline,
                 const char* what);
   Status ReadSome(Clock::time_point deadline);
+  Status Encrypt(const ConnectionTls& tls, Clock::time_point deadline);
   Result<asio::ip::tcp::resolver::results_type> Resolve(Clock::time_point deadline);
   Status Fail(StatusCode code, const std::string& what);
 
   Endpoint endpoint_;
   asio::io_context io_;
   asio::ip::tcp::socket socket_;
+  asio::ssl::context tls_context_{asio::ssl::context::tlsv13_client};
+  std::optional<asio::ssl::stream<asio::ip::tcp::socket&>> tls_;
   FrameDecoder decoder_;
   Bytes chunk_ = Bytes(kChunkBytes);
   std::uint64_t bytes_sent_ = 0;
@@ -95,7 +115,7 @@ Result<asio::ip::tcp::resolver::results_type> DaemonConnection::Impl::Resolve(
   return found;
 }
 
-Status DaemonConnection::Impl::Open(milliseconds timeout) {
+Status DaemonConnection::Impl::Open(milliseconds timeout, const std::optional<ConnectionTls>& tls) {
   const Clock::time_point deadline = Clock::now() + timeout;
   const auto addresses = Resolve(deadline);
   if (!addresses) return addresses.error();
@@ -105,14 +125,36 @@ Status DaemonConnection::Impl::Open(milliseconds timeout) {
   ATLAS_RETURN_IF_ERROR(Finish(done, deadline, "connecting"));
   error_code error;
   socket_.set_option(asio::ip::tcp::no_delay(true), error);
-  return error ? Fail(StatusCode::kUnavailable, error.message()) : Status();
+  if (error) return Fail(StatusCode::kUnavailable, error.message());
+  return tls ? Encrypt(*tls, deadline) : Status();
+}
+
+Status DaemonConnection::Impl::Encrypt(const ConnectionTls& tls, Clock::time_point deadline) {
+  if (Status status = UseFiles(tls, tls_context_); !status.ok()) {
+    return Fail(status.code(), status.message());
+  }
+  const std::string& name = tls.daemon_name.empty() ? endpoint_.host : tls.daemon_name;
+  tls_.emplace(socket_, tls_context_);
+  tls_->set_verify_mode(asio::ssl::verify_peer);
+  tls_->set_verify_callback(asio::ssl::host_name_verification(name));
+  std::optional<error_code> done;
+  tls_->async_handshake(asio::ssl::stream_base::client,
+                        [&](const error_code& error) { done = error; });
+  return Finish(done, deadline, StrCat("a TLS handshake, expecting ", name).c_str());
 }
 
 Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
   ATLAS_RETURN_IF_ERROR(failure_);
   std::optional<error_code> done;
-  asio::async_write(socket_, asio::buffer(frame.data(), frame.size()),
-                    [&](const error_code& error, std::size_t) { done = error; });
+  const auto finish = [&](const error_code& error, std::size_t) {
+    done = error;
+  };
+  const auto bytes = asio::buffer(frame.data(), frame.size());
+  if (tls_) {
+    asio::async_write(*tls_, bytes, finish);
+  } else {
+    asio::async_write(socket_, bytes, finish);
+  }
   ATLAS_RETURN_IF_ERROR(Finish(done, Clock::now() + timeout, "sending"));
   bytes_sent_ += frame.size();
   return {};
@@ -121,10 +163,15 @@ Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
 Status DaemonConnection::Impl::ReadSome(Clock::time_point deadline) {
   std::optional<error_code> done;
   std::size_t size = 0;
-  socket_.async_read_some(asio::buffer(chunk_), [&](const error_code& error, std::size_t bytes) {
+  const auto finish = [&](const error_code& error, std::size_t bytes) {
     done = error;
     size = bytes;
-  });
+  };
+  if (tls_) {
+    tls_->async_read_some(asio::buffer(chunk_), finish);
+  } else {
+    socket_.async_read_some(asio::buffer(chunk_), finish);
+  }
   ATLAS_RETURN_IF_ERROR(Finish(done, deadline, "waiting for a reply"));
   bytes_received_ += size;
   decoder_.Push(ByteSpan(chunk_).first(size));
@@ -147,9 +194,11 @@ DaemonConnection::DaemonConnection(DaemonConnection&&) noexcept = default;
 DaemonConnection& DaemonConnection::operator=(DaemonConnection&&) noexcept = default;
 DaemonConnection::~DaemonConnection() = default;
 
-Result<DaemonConnection> DaemonConnection::Open(const Endpoint& endpoint, milliseconds timeout) {
+Result<DaemonConnection> DaemonConnection::Open(const Endpoint& endpoint,
+                                                milliseconds timeout,
+                                                const std::optional<ConnectionTls>& tls) {
   auto impl = std::make_unique<Impl>(endpoint);
-  if (Status status = impl->Open(timeout); !status.ok()) return Error(std::move(status));
+  if (Status status = impl->Open(timeout, tls); !status.ok()) return Error(std::move(status));
   return DaemonConnection(std::move(impl));
 }
 

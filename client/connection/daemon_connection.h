@@ -4,7 +4,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "client/connection/endpoint.h"
 #include "core/base/bytes.h"
@@ -12,10 +15,21 @@
 
 namespace atlas {
 
+// TLS 1.3 to the daemon: PEM files.
+struct ConnectionTls {
+  std::filesystem::path ca;           // who vouches for the daemon
+  std::filesystem::path certificate;  // that we show; empty: none
+  std::filesystem::path key;          // of it
+  std::string daemon_name;            // that its certificate must have; empty: the endpoint's host
+};
+
 class DaemonConnection {
  public:
-  // kUnavailable when nobody listens there, kTimeout after `timeout`.
-  static Result<DaemonConnection> Open(const Endpoint& endpoint, std::chrono::milliseconds timeout);
+  // kUnavailable when nobody listens there or the handshake fails, kTimeout after `timeout`.
+  // kInvalidArgument names a file that is of no use.
+  static Result<DaemonConnection> Open(const Endpoint& endpoint,
+                                       std::chrono::milliseconds timeout,
+                                       const std::optional<ConnectionTls>& tls = std::nullopt);
 
   DaemonConnection(const DaemonConnection&) = delete;
   DaemonConnection& operator=(const DaemonConnection&) = delete;

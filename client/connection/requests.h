@@ -22,6 +22,8 @@ struct AtlasIdentity {
   std::uint64_t epoch = 0;
   std::uint64_t revision = 0;
   std::uint32_t protocol_minor = 0;  // that its daemon speaks
+  std::string our_name;              // whom it takes us for; empty: nobody in particular
+  std::string our_role;  // "reader", "vehicle", "merge" or "admin"; empty: an older daemon
 };
 
 struct KeyframeUpload {

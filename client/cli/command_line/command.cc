@@ -5,10 +5,7 @@
 namespace atlas {
 
 Result<AtlasClient> CommandContext::Connect() const {
-  ConnectionOptions options;
-  options.endpoint = server;
-  options.client_name = "atlas";
-  return AtlasClient::Connect(options);
+  return AtlasClient::Connect(connection);
 }
 
 void CommandContext::PrintJson(const boost::json::object& object) const {

@@ -20,7 +20,7 @@ struct CommandContext {
   bool is_json = false;
   bool is_err_terminal = false;
   bool is_out_terminal = false;
-  Endpoint server;
+  ConnectionOptions connection;
 
   Result<AtlasClient> Connect() const;
   // One object on one line, at once, so that a reader may follow a stream.

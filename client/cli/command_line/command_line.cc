@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <fstream>
 #include <sstream>
 
 #include <CLI/CLI.hpp>
@@ -21,6 +22,8 @@ constexpr const char* kFooter =
 struct CommonFlags {
   bool is_json = false;
   std::string server;
+  ConnectionTls tls;
+  std::string token_file;
 };
 
 // CLI11 takes "-3" for a number but "-.5" for an option "-.".
@@ -42,6 +45,22 @@ void AddCommonFlags(CLI::App& app, CommonFlags& common) {
   app.add_flag("--json", common.is_json, "Print JSON")->disable_flag_override();
   app.add_option("--server", common.server, "The daemon [ATLAS_SERVER, else 127.0.0.1:7447]")
       ->type_name("HOST:PORT");
+  const auto add_file = [&app](const char* name, const char* variable, auto& target,
+                               const std::string& help) {
+    app.add_option(name, target, StrCat(help, " [", variable, "]"))
+        ->envname(variable)
+        ->type_name("FILE")
+        ->group("Security");
+  };
+  add_file("--tls-ca", "ATLAS_TLS_CA", common.tls.ca, "Speak TLS; who vouches for the daemon, PEM");
+  add_file("--tls-certificate", "ATLAS_TLS_CERTIFICATE", common.tls.certificate, "Ours, PEM");
+  add_file("--tls-key", "ATLAS_TLS_KEY", common.tls.key, "Of our certificate, PEM");
+  app.add_option("--tls-name", common.tls.daemon_name,
+                 "The daemon's name in its certificate [ATLAS_TLS_NAME, else the host]")
+      ->envname("ATLAS_TLS_NAME")
+      ->type_name("NAME")
+      ->group("Security");
+  add_file("--token-file", "ATLAS_TOKEN_FILE", common.token_file, "Holds our token");
 }
 
 void AddArgument(CLI::App& app, const Argument& argument) {
@@ -106,11 +125,49 @@ Status CheckCommandName(const std::vector<std::string>& arguments, const CLI::Ap
                        : Status();
 }
 
-Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
+// The first line of the file.
+Result<std::string> ReadToken(const std::string& file) {
+  std::ifstream in(file);
+  std::string token;
+  if (!std::getline(in, token) || token.empty()) {
+    return Error(StatusCode::kNotFound, StrCat("there is no token in ", file));
+  }
+  return token;
+}
+
+Result<ConnectionOptions> ConnectionFrom(const CommonFlags& common, const CommandLineIo& io) {
   const Result<Endpoint> server = ServerEndpoint(common, io);
-  if (!server) return server.error();
-  CommandContext context{io.out, io.err, common.is_json, io.is_err_terminal, io.is_out_terminal,
-                         *server};
+  if (!server) return Error(server.error());
+  ConnectionOptions options;
+  options.endpoint = *server;
+  options.client_name = "atlas";
+  if (!common.tls.ca.empty()) {
+    options.tls = common.tls;
+  } else if (!common.tls.certificate.empty() || !common.tls.key.empty()) {
+    return Error(StatusCode::kInvalidArgument,
+                 "a certificate is shown over TLS only: expected --tls-ca, too");
+  }
+  if (common.tls.certificate.empty() != common.tls.key.empty()) {
+    return Error(StatusCode::kInvalidArgument,
+                 "--tls-certificate and --tls-key: one without the other is of no use");
+  }
+  if (!common.token_file.empty()) {
+    Result<std::string> token = ReadToken(common.token_file);
+    if (!token) return Error(token.error());
+    options.token = *std::move(token);
+  }
+  return options;
+}
+
+Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
+  Result<ConnectionOptions> connection = ConnectionFrom(common, io);
+  if (!connection) return connection.error();
+  CommandContext context{io.out,
+                         io.err,
+                         common.is_json,
+                         io.is_err_terminal,
+                         io.is_out_terminal,
+                         *std::move(connection)};
   return command.Run(context);
 }
 

@@ -61,6 +61,8 @@ Status Configure(SSL_CTX& context, const TlsFiles& files) {
   SSL_CTX_set_mode(&context, SSL_MODE_RELEASE_BUFFERS | SSL_MODE_ENABLE_PARTIAL_WRITE |
                                  SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
   SSL_CTX_set_read_ahead(&context, 1);  // a call for many records
+  // Frames tell themselves whether they are whole: a peer that just goes is no failure.
+  SSL_CTX_set_options(&context, SSL_OP_IGNORE_UNEXPECTED_EOF);
   // Vehicles stay connected: tickets for the next handshake would only cost bytes.
   SSL_CTX_set_num_tickets(&context, 0);
   SSL_CTX_set_session_cache_mode(&context, SSL_SESS_CACHE_OFF);

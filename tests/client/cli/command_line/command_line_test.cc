@@ -45,7 +45,7 @@ class RecordingCommand : public Command {
   Status Run(CommandContext& context) override {
     ++recorded_.runs;
     recorded_.is_json = context.is_json;
-    recorded_.server = context.server;
+    recorded_.server = context.connection.endpoint;
     return status_;
   }
 
