@@ -150,7 +150,8 @@ def bench_curbs(bin_dir):
     draw_curbs(rows, pathlib.Path(__file__).parent.parent / "docs/images/curbs.png")
 
 
-CURB_THRESHOLDS = [0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.10, 0.12, 0.16, 0.20, 0.25, 0.30]
+CURB_THRESHOLDS = [0.003, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.10, 0.12, 0.16,
+                   0.20, 0.25, 0.30]
 
 
 def curb_rates(bin_dir, kind, folders, mode, rings, threshold):

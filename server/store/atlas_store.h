@@ -83,7 +83,8 @@ class AtlasStore : public TileIndex {
   virtual Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                             std::uint32_t limit) = 0;
   // One keyframe with its pose, session and footprint, of one snapshot: every checksum around it is
-  // verified, those of its earlier poses too. The footprint has none.
+  // verified, those of its earlier poses too. The footprint has none: it must be of the revision of
+  // the last change.
   virtual Result<StoredKeyframe> ReadKeyframe(std::int64_t id) = 0;
 
   // nullopt: there is no such tile.
@@ -108,6 +109,8 @@ class AtlasStore : public TileIndex {
   // Verifies every compaction's checksum, and that it left as many tombstones as it dropped
   // keyframes.
   virtual Status CheckCompactions() = 0;
+  // Counts all rows and compares, in one snapshot.
+  virtual Status CheckCounters() = 0;
 };
 
 }  // namespace atlas

@@ -39,7 +39,7 @@ AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
 
 Result<VerifyReport> AtlasVerifier::Run() {
   for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyCompactions,
-                          &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
+                          &AtlasVerifier::VerifyCounters, &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
                           &AtlasVerifier::VerifyMissingTiles}) {
     if (Status status = (this->*step)(); !status.ok()) {
       return Error(std::move(status));
@@ -81,6 +81,10 @@ Status AtlasVerifier::VerifySessions() {
 
 Status AtlasVerifier::VerifyCompactions() {
   return Note(store_.CheckCompactions());
+}
+
+Status AtlasVerifier::VerifyCounters() {
+  return Note(store_.CheckCounters());
 }
 
 // Uploads go on meanwhile: there may be more rows than the sessions knew of, never fewer.

@@ -40,6 +40,7 @@ class AtlasVerifier {
  private:
   Status VerifySessions();
   Status VerifyCompactions();
+  Status VerifyCounters();
   Status VerifyKeyframes();
   Status VerifyTiles();
   Status VerifyMissingTiles();

@@ -16,6 +16,7 @@
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/compaction_transactions.h"
+#include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/history_reads.h"
 #include "server/store/sqlite/transactions/session_transactions.h"
 #include "server/store/sqlite/transactions/transactions.h"
@@ -177,6 +178,9 @@ class SqliteStore final : public AtlasStore {
   }
   Status CheckCompactions() override {
     return ReadStatus([](Connection& connection) { return CheckCompactionRows(connection); });
+  }
+  Status CheckCounters() override {
+    return ReadStatus([](Connection& connection) { return atlas::CheckCounters(connection); });
   }
 
  private:

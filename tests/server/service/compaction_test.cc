@@ -253,7 +253,19 @@ TEST_F(CompactionTest, VerifyFindsLostTombstones) {
   EXPECT_EQ(service_->Verify(false, Long())->damaged, 0u);
   Tamper("DELETE FROM tombstones WHERE sequence = 2");
   Open();
-  EXPECT_EQ(service_->Verify(false, Long())->damaged, 2u);  // for its session and its compaction
+  // For its session, its compaction and the count of all.
+  EXPECT_EQ(service_->Verify(false, Long())->damaged, 3u);
+}
+
+TEST_F(CompactionTest, VerifyFindsALostCompaction) {
+  Open();
+  UploadPasses(0, 4);
+  ASSERT_EQ(Compact(kAll_ms)->stored.dropped, kKeyframes);
+  Tamper("DELETE FROM compactions");
+  Open();
+  const auto report = service_->Verify(false, Long());
+  EXPECT_EQ(report->damaged, 1u);
+  EXPECT_EQ(report->findings.at(0), "store: it counts 1 compactions, and the rows say 0");
 }
 
 // Uploads may keep it from finishing; nothing else goes wrong.

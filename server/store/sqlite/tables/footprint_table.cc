@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "core/base/str_cat.h"
 #include "server/store/tile_ranges.h"
 
 namespace atlas {
@@ -95,13 +96,28 @@ void TouchSessionFootprint(Connection& connection,
       .Run();
 }
 
+Status CheckFootprint(Connection& connection, std::int64_t keyframe_id, std::uint64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT tile_key, revision FROM keyframe_tiles WHERE keyframe_id = ? AND "
+      "(revision > ? OR revision < (CASE WHEN is_current THEN ? ELSE 1 END))");
+  row.Bind(keyframe_id).Bind(revision).Bind(revision);
+  if (!row.Step()) {
+    return {};
+  }
+  row.Rewind();
+  const std::uint64_t key = row.Unsigned();
+  return Status(StatusCode::kInvalidData,
+                StrCat("store: keyframe ", keyframe_id, " changed last at revision ", revision,
+                       ", in the tile with the key ", key, " it says ", row.Unsigned()));
+}
+
 std::vector<FootprintRow> FootprintsSince(Connection& connection,
                                           const TileId& tile,
                                           std::uint64_t revision) {
   Query row = connection.Prepare(
       "SELECT keyframe_id, is_current FROM keyframe_tiles WHERE tile_key = ? AND revision > ? "
       "ORDER BY keyframe_id");
-  row.Bind(tile.Key()).Bind(revision);
+  row.Bind(tile.Key()).Bind(static_cast<std::int64_t>(revision) - (revision == 0 ? 1 : 0));
   std::vector<FootprintRow> rows;
   while (row.Step()) {
     row.Rewind();

@@ -25,6 +25,10 @@ std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t se
 // The session's keyframes entered or left the map at `revision`.
 void TouchSessionFootprint(Connection& connection, std::int64_t session_id, std::uint64_t revision);
 
+// `revision`: at which the keyframe was placed last, or its session entered or left the map. Its
+// tiles of now are of that revision, the former ones of earlier ones; else kInvalidData.
+Status CheckFootprint(Connection& connection, std::int64_t keyframe_id, std::uint64_t revision);
+
 struct FootprintRow {
   std::int64_t keyframe_id = 0;
   bool is_current = false;  // else the keyframe left the tile

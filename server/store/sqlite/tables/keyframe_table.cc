@@ -5,6 +5,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
@@ -52,6 +53,16 @@ void BindPrior(Query& query, const std::optional<PositionPrior>& prior) {
   } else {
     query.BindNull().BindNull().BindNull().BindNull();
   }
+}
+
+// At which it was placed last, or its session entered or left the map.
+std::uint64_t LastChange(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT max(revision) FROM (SELECT revision FROM pose_history WHERE keyframe_id = ? "
+      "UNION ALL SELECT s.revision FROM session_states s JOIN keyframes k "
+      "ON k.session_id = s.session_id WHERE k.id = ?)");
+  row.Bind(id).Bind(id);
+  return row.Step() ? row.Unsigned() : 0;
 }
 
 }  // namespace
@@ -107,10 +118,14 @@ Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t i
 
 Result<KeyframeRecord> VerifyKeyframeRecord(Connection& connection, std::int64_t id) {
   auto record = ReadKeyframeRecord(connection, id);
-  if (record) {
-    if (Status status = CheckPoseHistory(connection, id, record->pose); !status.ok()) {
-      return Error(std::move(status));
-    }
+  if (!record) {
+    return record;
+  }
+  if (Status status = CheckPoseHistory(connection, id, record->pose); !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = CheckFootprint(connection, id, LastChange(connection, id)); !status.ok()) {
+    return Error(std::move(status));
   }
   return record;
 }
