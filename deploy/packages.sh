@@ -8,7 +8,7 @@ BUILD_PACKAGES=(
   libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev
   libssl-dev libpng-dev
 )
-TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 xz-utils)
+TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-protobuf python3-xxhash xz-utils)
 BENCH_PACKAGES=(libbenchmark-dev python3-matplotlib)
 TIDY_PACKAGES=(clang-tidy)
 

@@ -1,0 +1,74 @@
+"""What can go wrong between a client and the daemon, as types."""
+
+import enum
+
+
+class Code(enum.IntEnum):
+    """Codes of an `Error` (docs/protocol.md, Errors). Frozen."""
+
+    INVALID_ARGUMENT = 1
+    INVALID_DATA = 2
+    NOT_FOUND = 3
+    CONFLICT = 4
+    UNAVAILABLE = 5
+    TIMEOUT = 6
+    RESOURCE_EXHAUSTED = 7
+    UNSUPPORTED = 8
+    PERMISSION_DENIED = 9
+    INTERNAL = 10
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Code":
+        return cls.INTERNAL
+
+
+class RoadAtlasError(Exception):
+    """Every failure that this package reports."""
+
+
+class RequestRefused(RoadAtlasError):
+    """The daemon answered with an `Error`. `request_id` 0: it closes the connection."""
+
+    def __init__(self, request_id: int, code: int, message: str, retry: bool, retry_after_ms: int) -> None:
+        super().__init__(f"{Code(code).name.lower()}: {message}")
+        self.request_id = request_id
+        self.code = Code(code)
+        self.message = message
+        self.retry = retry
+        self.retry_after_ms = retry_after_ms
+
+
+class ConnectionLost(RoadAtlasError):
+    """The daemon is not there, closed the connection, or the network broke."""
+
+
+class DeadlinePassed(RoadAtlasError):
+    """The daemon did not answer in the time that this client allows."""
+
+
+class BrokenReply(RoadAtlasError):
+    """What the daemon sent is not what the protocol says."""
+
+
+class FrameError(BrokenReply):
+    """A broken frame; the connection is of no use any more."""
+
+
+class BadMagic(FrameError):
+    """The bytes are no frame."""
+
+
+class FrameTooLong(FrameError):
+    """A payload above the limit."""
+
+
+class BadChecksum(FrameError):
+    """A payload that is not what was sent."""
+
+
+class FrameCut(FrameError):
+    """The connection ended within a frame."""
+
+
+class BadTileBlob(BrokenReply):
+    """A tile blob that breaks docs/formats/tile.md."""

@@ -1,0 +1,107 @@
+#!/usr/bin/python3
+"""The golden files of tests/golden, read and written again from docs/formats alone."""
+
+import dataclasses
+import struct
+import unittest
+
+import xxhash
+from keyframes import Cell, Keyframe, encode_body, with_checksum
+from roadatlas.errors import BadTileBlob
+from roadatlas.profile import parse_profile
+from roadatlas.tile_blob import encode_tile_blob, merge_tile_blobs, parse_tile_blob
+from support import ROOT
+from tile_payload import canonical_payload, decompress
+
+PROFILE, KEYFRAME, TILE = ((ROOT / "tests/golden" / name).read_bytes()
+                           for name in ("profile_v3.bin", "keyframe_v1.bin", "tile_v2.bin"))
+KEYFRAME_HEADER = struct.Struct("<4sBQIH4iiII")
+
+
+class Planes:
+    """A keyframe's body, taken plane by plane."""
+
+    def __init__(self, body):
+        self._body = body
+
+    def take(self, size):
+        plane, self._body = self._body[:size], self._body[size:]
+        return plane
+
+    def nibbles(self, count):
+        packed = self.take((count + 1) // 2)
+        return [packed[i // 2] >> 4 * (i % 2) & 0xF for i in range(count)]
+
+    def bits(self, count):
+        packed = self.take((count + 7) // 8)
+        return [packed[i // 8] >> i % 8 & 1 for i in range(count)]
+
+    def differences(self, count):
+        low, high = self.take(count), self.take(count)
+        values = [a | b << 8 for a, b in zip(low, high)]
+        return [value >> 1 ^ -(value & 1) for value in values]
+
+    def is_at_end(self):
+        return not self._body
+
+
+def wrapped(value):
+    return (value + 0x8000) % 0x10000 - 0x8000
+
+
+def decode_body(body, radius):
+    side = 2 * radius
+    planes = Planes(body)
+    states = planes.nibbles(side * side)
+    seen = [i for i, state in enumerate(states) if state & 3]
+    altitudes = {}
+    first_of_row = 0
+    for i, difference in zip(seen, planes.differences(len(seen))):
+        before = [k for k in altitudes if k // side == i // side]
+        altitudes[i] = wrapped((altitudes[before[-1]] if before else first_of_row) + difference)
+        first_of_row = altitudes[i] if not before else first_of_row
+    anchors = []
+    for difference in planes.differences((-(-side // 8))**2):
+        anchors.append(wrapped((anchors[-1] if anchors else 0) + difference))
+    with_column = [i for i, bit in zip(seen, planes.bits(len(seen))) if bit]
+    nibbles = [planes.nibbles(len(with_column)) for _ in range(planes.take(1)[0])]
+    columns = dict(zip(with_column, zip(*nibbles)))
+    assert planes.is_at_end()
+    cells = [Cell(altitudes[i], state >> 2, state & 3, columns.get(i, ())) if i in altitudes else None
+             for i, state in enumerate(states)]
+    return Keyframe(radius, [cells[i:i + side] for i in range(0, side * side, side)], anchors)
+
+
+class GoldenFileTest(unittest.TestCase):
+
+    def test_profile(self):
+        profile = parse_profile(PROFILE)
+        self.assertEqual(profile.hash, xxhash.xxh64_intdigest(PROFILE))
+        self.assertEqual(profile.tile_side_m(1), 2 * profile.tile_side_m(0))
+
+    def test_keyframe(self):
+        header = KEYFRAME_HEADER.unpack_from(KEYFRAME)
+        radius, body_bytes, compressed_bytes = header[4], header[10], header[11]
+        self.assertEqual(with_checksum(KEYFRAME[:-8]), KEYFRAME)
+        self.assertEqual(len(KEYFRAME), KEYFRAME_HEADER.size + compressed_bytes + 8)
+        body = decompress(KEYFRAME[KEYFRAME_HEADER.size:-8], body_bytes)
+        keyframe = decode_body(body, radius)
+        self.assertTrue(any(cell and cell.column for row in keyframe.rows for cell in row))
+        self.assertEqual(encode_body(keyframe), body)
+
+    def test_tile(self):
+        tile = parse_tile_blob(TILE)
+        self.assertEqual([section.id for section in tile.sections], [1, 2, 3, 4])
+        self.assertEqual(encode_tile_blob(tile), TILE)
+        self.assertEqual(len(canonical_payload(TILE)), 16 + sum(6 + s.uncompressed_bytes for s in tile.sections))
+
+    def test_sections_of_two_tiles_do_not_make_one(self):
+        tile = parse_tile_blob(TILE)
+        other = dataclasses.replace(tile, head=tile.head[:5] + struct.pack("<Q", tile.key + 1) + tile.head[13:])
+        self.assertEqual(merge_tile_blobs(TILE, TILE), TILE)
+        with self.assertRaises(BadTileBlob):
+            merge_tile_blobs(TILE, encode_tile_blob(other))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,98 @@
+#!/usr/bin/python3
+"""Frames and digests as docs/protocol.md prints them, and the reader of frames on bytes cut anywhere."""
+
+import re
+import struct
+import unittest
+
+import atlas_pb2
+from roadatlas import geometry
+from roadatlas.errors import BadChecksum, BadMagic, FrameCut, FrameTooLong
+from roadatlas.framing import MAX_PAYLOAD_BYTES, FrameReader, encode_frame
+from roadatlas.tile_store import block_digest
+from support import ROOT
+
+DOCUMENT = (ROOT / "docs/protocol.md").read_text(encoding="utf-8")
+HELLO = atlas_pb2.Envelope(request_id=1, hello=atlas_pb2.Hello(protocol_major=1, client_name="demo"))
+SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
+    area=geometry.disc(1.5, -2, 100), sections=[2], budget_bytes=65536,
+    held=[atlas_pb2.Held(keys=[geometry.tile_key(0, 0, 0)], payload_hashes=[0x1122334455667788])]))
+
+
+def leading_bytes(line):
+    """The two-digit hexadecimal numbers that a line begins with."""
+    match = re.match(r"\s*((?:[0-9a-f]{2}(?:\s+|$))*)", line)
+    return bytes.fromhex(match[1])
+
+
+def golden_frames():
+    """The frames in the document's code blocks."""
+    for block in re.findall(r"```\n(.*?)```", DOCUMENT, re.S):
+        if block.startswith("52 41 46 31"):
+            yield b"".join(map(leading_bytes, block.splitlines()))
+
+
+class GoldenTest(unittest.TestCase):
+
+    def test_frames_of_the_document_are_made(self):
+        self.assertEqual([encode_frame(envelope.SerializeToString()) for envelope in (HELLO, SYNC)],
+                         list(golden_frames()))
+
+    def test_frames_of_the_document_are_read(self):
+        payloads = list(FrameReader().feed(b"".join(golden_frames())))
+        self.assertEqual([atlas_pb2.Envelope.FromString(payload) for payload in payloads], [HELLO, SYNC])
+
+    def test_header_of_the_empty_payload(self):
+        printed = re.search(r"empty payload has the header `([0-9a-f ]+)`", DOCUMENT)[1]
+        self.assertEqual(encode_frame(b""), bytes.fromhex(printed))
+
+    def test_block_digest(self):
+        printed = re.search(r"The tiles 0/0/0 \(key `(\w+)`\) with hash 1 and 0/1/0 \(`(\w+)`\) with hash 2 are block "
+                            r"`(\w+)`, mask (\d+),\s+digest `(\w+)`", DOCUMENT)
+        first, second, block, mask, digest = (int(number, 0) for number in printed.groups())
+        self.assertEqual((geometry.tile_key(0, 0, 0), geometry.tile_key(0, 1, 0)), (first, second))
+        self.assertEqual({geometry.block_of(first), geometry.block_of(second)}, {block})
+        self.assertEqual(1 << geometry.index_in_block(first) | 1 << geometry.index_in_block(second), mask)
+        self.assertEqual(block_digest([(first, 1), (second, 2)]), digest)
+
+    def test_keys_come_back(self):
+        for place in ((0, 0, 0), (7, -1, 2), (15, 2**28 - 1, -2**28)):
+            self.assertEqual(geometry.tile_place(geometry.tile_key(*place)), place)
+
+
+class FrameReaderTest(unittest.TestCase):
+
+    def test_bytes_come_one_by_one(self):
+        reader = FrameReader()
+        stream = encode_frame(b"one") + encode_frame(b"") + encode_frame(b"three")
+        self.assertEqual([payload for i in range(len(stream)) for payload in reader.feed(stream[i:i + 1])],
+                         [b"one", b"", b"three"])
+        reader.finish()
+
+    def test_refuses_at_the_first_wrong_byte(self):
+        with self.assertRaises(BadMagic):
+            list(FrameReader().feed(b"RAG"))
+
+    def test_refuses_another_checksum(self):
+        frame = bytearray(encode_frame(b"payload"))
+        frame[-1] ^= 1
+        with self.assertRaises(BadChecksum):
+            list(FrameReader().feed(bytes(frame)))
+
+    def test_refuses_a_length_before_its_payload_comes(self):
+        with self.assertRaises(FrameTooLong):
+            list(FrameReader().feed(b"RAF1" + struct.pack("<II", MAX_PAYLOAD_BYTES + 1, 0)))
+        with self.assertRaises(FrameTooLong):
+            encode_frame(b"12345", limit_bytes=4)
+
+    def test_tells_an_end_within_a_frame(self):
+        frame = encode_frame(b"payload")
+        for cut in (1, 12, len(frame) - 1):
+            reader = FrameReader()
+            self.assertEqual(list(reader.feed(frame[:cut])), [])
+            with self.assertRaises(FrameCut):
+                reader.finish()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,139 @@
+#!/usr/bin/python3
+"""Uploads, corrections and sessions against a real daemon. Keyframes are encoded from the document alone."""
+
+import unittest
+
+import atlas_pb2
+import keyframes
+from roadatlas import Code, geometry
+from support import RADIUS_CELLS, AtlasCase, key, pose_at
+
+RETRACT = atlas_pb2.ChangeSession.RETRACT
+RESTORE = atlas_pb2.ChangeSession.RESTORE
+
+
+class UploadTest(AtlasCase):
+
+    def test_first_duplicate_and_conflict(self):
+        first = self.upload(0, 0)
+        reply = self.client.upload_keyframe(first)
+        self.assertFalse(reply.duplicate)
+        self.assertEqual(reply.tiles_marked, 4)
+        again = self.client.upload_keyframe(first)
+        self.assertEqual((again.duplicate, again.tiles_marked), (True, 0))
+        self.refused(Code.CONFLICT, self.client.upload_keyframe, self.upload(0, 0, bump_mm=5))
+        later = self.upload(0, 0)
+        later.time_ms += 1
+        self.refused(Code.CONFLICT, self.client.upload_keyframe, later)
+        self.assertEqual(self.client.status().keyframes, 1)
+
+    def test_duplicate_leaves_a_corrected_pose(self):
+        self.client.upload_keyframe(self.upload(0, 0))
+        self.client.update_poses([atlas_pb2.PoseUpdate(key=key(0), pose=pose_at(3))])
+        self.fuse()
+        before = self.client.digest(60_000)
+        self.assertTrue(self.client.upload_keyframe(self.upload(0, 0)).duplicate)
+        self.assertEqual(self.client.digest(60_000), before)
+
+    def test_many_on_their_way(self):
+        replies = self.client.upload_keyframes(self.upload(i, i, radius_cells=8) for i in range(100))
+        self.assertEqual(len({reply.revision for reply in replies}), 100)
+        self.assertEqual(self.client.status().keyframes, 100)
+
+    def test_grids_of_any_size(self):
+        for radius in (1, 3, 5, 61, 200):
+            self.client.upload_keyframe(self.upload(radius, 0, radius_cells=radius))
+        self.assertEqual(self.client.status().keyframes, 5)
+
+    def test_damaged_blobs(self):
+        whole = self.upload(0, 0)
+        blob = whole.blob
+        cut = keyframes.with_checksum(blob[:-9])
+        other_profile = keyframes.encode_keyframe(keyframes.road(8), self.profile.hash ^ 1, self.profile.cell_size_um)
+        for broken in (b"", blob[:-1], blob[:-1] + bytes([blob[-1] ^ 1]), b"X" + blob[1:], cut, other_profile):
+            whole.blob = broken
+            self.refused(Code.INVALID_DATA, self.client.upload_keyframe, whole)
+        self.assertEqual(self.client.status().keyframes, 0)
+
+    def test_what_a_cell_may_not_be(self):
+        unseen_with_occupancy = keyframes.Cell(0, source=0)
+        column_of_nothing = keyframes.Cell(-1800, column=(0, 0))
+        for cell in (unseen_with_occupancy, column_of_nothing):
+            grid = keyframes.road(8)
+            grid.rows[3][3] = cell
+            upload = self.upload(0, 0)
+            upload.blob = keyframes.encode_keyframe(grid, self.profile.hash, self.profile.cell_size_um)
+            self.refused(Code.INVALID_DATA, self.client.upload_keyframe, upload)
+
+    def test_cells_that_were_not_seen(self):
+        grid = keyframes.road(RADIUS_CELLS)
+        for row in grid.rows[10:30]:
+            row[::2] = [None] * len(row[::2])
+        grid.rows[0] = [None] * len(grid.rows[0])
+        upload = self.upload(0, 0)
+        upload.blob = keyframes.encode_keyframe(grid, self.profile.hash, self.profile.cell_size_um)
+        self.client.upload_keyframe(upload)
+        self.fuse()
+        cells = self.client.status().cells
+        self.assertGreater(cells, 0)
+        self.client.upload_keyframe(self.upload(1, 0))
+        self.fuse()
+        self.assertGreater(self.client.status().cells, cells)
+
+    def test_names_times_and_poses(self):
+        for change, code in ((lambda u: setattr(u.key, "vehicle", "a b"), Code.INVALID_ARGUMENT),
+                             (lambda u: setattr(u, "time_ms", -1), Code.INVALID_DATA),
+                             (lambda u: setattr(u, "time_ms", 1 << 60), Code.INVALID_DATA),
+                             (lambda u: u.ClearField("pose"), Code.INVALID_DATA)):
+            upload = self.upload(0, 0)
+            change(upload)
+            self.refused(code, self.client.upload_keyframe, upload)
+        tilted = self.upload(0, 0)
+        tilted.pose.CopyFrom(geometry.pose((0, 0, 1.8), (1, 0.1, 0, 0)))
+        self.refused(Code.INVALID_DATA, self.client.upload_keyframe, tilted, says="upload")
+
+
+class CorrectionTest(AtlasCase):
+
+    def setUp(self):
+        super().setUp()
+        self.client.upload_keyframes(self.upload(i, 8 * i, radius_cells=20) for i in range(3))
+
+    def test_poses_change_all_or_nothing(self):
+        updates = [atlas_pb2.PoseUpdate(key=key(i), pose=pose_at(8 * i, z_m)) for i, z_m in ((0, 1.9), (1, 1.8))]
+        reply = self.client.update_poses(updates, "surveyor")
+        self.assertEqual(reply.updated, 1)
+        self.assertGreater(reply.tiles_marked, 0)
+        self.assertGreater(reply.batch, 0)
+        self.fuse()
+        again = self.client.update_poses(updates, "surveyor")
+        self.assertEqual((again.updated, again.batch, again.revision), (0, 0, self.client.status().revision))
+        before = self.client.digest(60_000)
+        moved = atlas_pb2.PoseUpdate(key=key(2), pose=pose_at(17))
+        self.refused(Code.NOT_FOUND, self.client.update_poses,
+                     [moved, atlas_pb2.PoseUpdate(key=key(99), pose=pose_at(0))], says="99")
+        self.refused(Code.INVALID_DATA, self.client.update_poses, [moved, moved])
+        self.refused(Code.INVALID_DATA, self.client.update_poses, [moved, atlas_pb2.PoseUpdate(key=key(1))])
+        self.assertEqual(self.client.digest(60_000), before)
+
+    def test_session_retracted_and_restored(self):
+        self.fuse()
+        before = self.client.digest(60_000)
+        reply = self.client.change_session("car", "near", RETRACT, "surveyor", "a test")
+        self.assertEqual((reply.changed, reply.state), (True, "retracted"))
+        self.assertFalse(self.client.change_session("car", "near", RETRACT).changed)
+        self.fuse()
+        self.assertEqual(self.client.status().tiles, 0)
+        session, = self.client.sessions()
+        self.assertEqual((session.vehicle, session.session, session.state, session.keyframes, session.last_sequence),
+                         ("car", "near", "retracted", 3, 2))
+        self.assertTrue(self.client.change_session("car", "near", RESTORE).changed)
+        self.fuse()
+        after = self.client.digest(60_000)
+        self.assertEqual((after.sha256, after.tiles), (before.sha256, before.tiles))
+        self.assertEqual(self.client.digest(60_000, at_revision=0).tiles, 0)
+        self.refused(Code.NOT_FOUND, self.client.change_session, "car", "nobody", RETRACT)
+
+
+if __name__ == "__main__":
+    unittest.main()
