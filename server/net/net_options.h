@@ -19,6 +19,7 @@ struct NetOptions {
   std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection
   std::size_t max_held_bytes = 512u << 20;     // requests and parts of them, all connections
   std::size_t tile_frame_bytes = 64u << 20;    // tiles ready to be sent, all connections
+  std::size_t max_watches = 1024;              // all connections
   std::size_t max_waits = 16;                  // waits, digests, verifications, all connections
   int service_threads = 4;                     // that may block on the disk
   int reading_threads = 2;                     // for digests and verifications, which read all

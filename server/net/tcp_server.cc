@@ -15,7 +15,9 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
@@ -30,6 +32,16 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
+
+// A vehicle that lost its link says nothing: after two minutes without an answer it is gone.
+void NoticeDeath(tcp::socket& socket) {
+  error_code ignored;  // of options that fail: then it is noticed when something is sent
+  socket.set_option(tcp::socket::keep_alive(true), ignored);
+  for (const auto& [option, value] :
+       {std::pair(TCP_KEEPIDLE, 60), std::pair(TCP_KEEPINTVL, 15), std::pair(TCP_KEEPCNT, 4)}) {
+    ::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof(value));
+  }
+}
 
 }  // namespace
 
@@ -131,6 +143,7 @@ class TcpServer::Impl {
     }
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
+    NoticeDeath(socket);
     SslSession session;
     if (security_.tls != nullptr) {
       session = security_.tls->NewSession(socket.native_handle());

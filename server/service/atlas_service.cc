@@ -1,5 +1,6 @@
 #include "server/service/atlas_service.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -40,7 +41,13 @@ AtlasService::AtlasService(AtlasStore& store,
       clock_(std::move(clock)),
       log_(std::move(log)),
       options_(options),
-      fusion_(store, changes_, clock_, log_, options.fusion),
+      fusion_(
+          store,
+          changes_,
+          clock_,
+          log_,
+          [this](const TileId& id, std::uint64_t revision) { watches_.Publish(id, revision); },
+          options.fusion),
       past_(store, options.past_cache_bytes, options.scratch_directory) {}
 
 AtlasService::~AtlasService() {
@@ -225,6 +232,18 @@ Result<std::optional<StoredTile>> AtlasService::NextTile(RegionQuery& query) {
 
 Result<std::optional<SyncPlan>> AtlasService::PlanSync(const SyncRequest& request, bool may_block) {
   return atlas::PlanSync(request, store_, store_.identity().profile, may_block);
+}
+
+Result<std::shared_ptr<TileWatch>> AtlasService::Watch(TileWatch::Scope scope,
+                                                       std::function<void()> wake) {
+  const std::uint32_t top = identity().profile.levels - 1u;
+  scope.coarsest_level = scope.coarsest_level == 0 ? top : std::min(scope.coarsest_level, top);
+  if (scope.finest_level > scope.coarsest_level) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("watch: finest level ", scope.finest_level,
+                        ", expected 0 to the coarsest, ", scope.coarsest_level));
+  }
+  return watches_.Open(std::move(scope), std::move(wake));
 }
 
 Result<std::optional<StoredTile>> AtlasService::ReadTile(const TileId& id) {

@@ -22,6 +22,7 @@
 #include "server/service/upload_check.h"
 #include "server/service/verification/atlas_digest.h"
 #include "server/service/verification/atlas_verify.h"
+#include "server/service/watch/watch_hub.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {
@@ -98,6 +99,9 @@ class AtlasService {
   // What is to be sent (sync_plan.h); nullopt: that takes the disk or long, and `may_block` is
   // false.
   Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request, bool may_block);
+  // Hears of every tile there that changes from now on. kInvalidArgument: levels that the atlas has
+  // not.
+  Result<std::shared_ptr<TileWatch>> Watch(TileWatch::Scope scope, std::function<void()> wake);
   // nullopt: there is no such tile. kInvalidData: it is damaged, and marked to be built again.
   Result<std::optional<StoredTile>> ReadTile(const TileId& id);
 
@@ -154,6 +158,7 @@ class AtlasService {
   LogSink log_;
   ServiceOptions options_;
   ChangeSignal changes_;
+  WatchHub watches_;
   FusionScheduler fusion_;
   PastAtlas past_;
 };

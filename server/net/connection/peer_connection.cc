@@ -52,6 +52,7 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       options_(surroundings.options),
       peer_(stream_.PeerName()),
       writer_(stream_, options_),
+      as_peer_(writer_),
       decoder_(options_.max_hello_bytes),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
@@ -163,7 +164,7 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
     Release(frame_bytes);
     return {};
   }
-  auto rest = handler_.Handle(*std::move(envelope), writer_);
+  auto rest = handler_.Handle(*std::move(envelope), as_peer_);
   if (!rest) {
     Release(frame_bytes);
     return {};

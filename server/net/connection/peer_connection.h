@@ -99,6 +99,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   const NetOptions& options_;
   const std::string peer_;
   ReplyWriter writer_;
+  Peer as_peer_;  // for its requests
   FrameDecoder decoder_;
   std::size_t held_bytes_ = 0;  // of `budget_`: what was received and is not answered yet
   boost::asio::cancellation_signal stop_reading_;

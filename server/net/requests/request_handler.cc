@@ -11,6 +11,7 @@
 #include "server/net/requests/region_reply.h"
 #include "server/net/requests/request_conversion.h"
 #include "server/net/requests/sync_reply.h"
+#include "server/net/requests/watch_reply.h"
 
 namespace atlas {
 namespace {
@@ -44,16 +45,44 @@ bool RequestHandler::Greet(const Envelope& request,
   return true;
 }
 
-std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, ReplyWriter& out) {
+std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Peer& peer) {
+  if (request.has_cancel_request()) {
+    Envelope reply = ReplyTo(request);
+    const bool is_cancelled = peer.Cancel(request.cancel_request().request_id());
+    reply.mutable_cancel_reply()->set_cancelled(is_cancelled);
+    peer.out.Push(reply);
+    return std::nullopt;
+  }
+  if (request.has_watch_request()) {
+    return Watch(std::move(request), peer);
+  }
   if (!request.has_sync_request()) {
-    return Await(std::move(request), out);
+    return Await(std::move(request), peer.out);
   }
   auto reply = std::make_shared<SyncReply>(service_, frames_, std::move(request));
   const bool may_begin = reply->message().wait_revision() == 0;
-  if (may_begin && SyncAtOnce(*reply, out)) {
+  if (may_begin && SyncAtOnce(*reply, peer.out)) {
     return std::nullopt;
   }
-  return Sync(std::move(reply), out);
+  return Sync(std::move(reply), peer.out);
+}
+
+asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
+  const std::uint64_t id = request.request_id();
+  const Places::Place place = watch_places_.Take();
+  Status status;
+  if (place == nullptr) {
+    status = {StatusCode::kUnavailable, StrCat(watch_places_.max_places(),
+                                               " watches are under way already; try again later")};
+  } else if (!peer.Begin(id)) {
+    status = {StatusCode::kInvalidArgument,
+              StrCat("watch ", id, ": there is one under this id, or there are ",
+                     Peer::kMaxCancellable, " on this connection")};
+  } else {
+    status = co_await SendWatch(service_, request, peer.cancelled(id), peer.out);
+    peer.End(id);
+  }
+  co_await peer.out.SendError(id, std::move(status));
 }
 
 asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) {

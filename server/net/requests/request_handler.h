@@ -10,6 +10,8 @@
 #include "proto/wire/envelope.h"
 #include "server/net/access/access_control.h"
 #include "server/net/net_options.h"
+#include "server/net/places.h"
+#include "server/net/requests/peer.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
 #include "server/net/requests/wait_places.h"
@@ -31,6 +33,7 @@ class RequestHandler {
         reading_pool_(reading_pool),
         options_(options),
         places_(options.max_waits),
+        watch_places_(options.max_watches),
         frames_(options.tile_frame_bytes) {}
 
   std::int64_t NowMs() const { return service_.NowMs(); }
@@ -39,7 +42,7 @@ class RequestHandler {
   bool Greet(const wire::Envelope& request, const Identity& identity, ReplyWriter& out) const;
   // Every later one, which gets its replies, or one error. What can be answered from memory is, at
   // once; else the rest is to be awaited.
-  std::optional<boost::asio::awaitable<void>> Handle(wire::Envelope request, ReplyWriter& out);
+  std::optional<boost::asio::awaitable<void>> Handle(wire::Envelope request, Peer& peer);
 
  private:
   using Envelope = wire::Envelope;
@@ -47,6 +50,7 @@ class RequestHandler {
   using Writing = void (AtlasService::*)(Request, AtlasStore::Done<T>);
 
   boost::asio::awaitable<void> Await(Envelope request, ReplyWriter& out);
+  boost::asio::awaitable<void> Watch(Envelope request, Peer& peer);
   boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
   template <typename Request, typename T>
@@ -73,6 +77,7 @@ class RequestHandler {
   boost::asio::thread_pool& reading_pool_;
   const NetOptions& options_;
   WaitPlaces places_;
+  Places watch_places_;
   TileFrames frames_;
 };
 

@@ -117,12 +117,16 @@ Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& messag
 
 }  // namespace
 
-Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile) {
-  Result<SyncArea::Shape> shape = ShapeFromWire(message.area());
+Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profile) {
+  Result<SyncArea::Shape> shape = ShapeFromWire(message);
   if (!shape) {
     return Error(shape.error());
   }
-  Result<SyncArea> area = SyncArea::Create(*std::move(shape), profile);
+  return SyncArea::Create(*std::move(shape), profile);
+}
+
+Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile) {
+  Result<SyncArea> area = AreaFromWire(message.area(), profile);
   if (!area) {
     return Error(area.error());
   }

@@ -7,6 +7,9 @@
 
 namespace atlas {
 
+// kInvalidArgument: an area that is none.
+Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profile);
+
 // kInvalidArgument: an area that is none, a section number above 63, held tiles without hashes, a
 // cursor of another request.
 Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile);

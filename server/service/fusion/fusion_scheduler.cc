@@ -17,6 +17,7 @@ constexpr std::chrono::seconds kLookAgain{1};
 
 struct Unfinished {
   TileClaim claim;
+  bool is_removal = false;
   std::future<Result<FinishResult>> result;
 };
 
@@ -26,11 +27,13 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
                                  ChangeSignal& changes,
                                  WallClock clock,
                                  LogSink log,
+                                 TileChanged changed,
                                  const FusionOptions& options)
     : store_(store),
       changes_(changes),
       clock_(std::move(clock)),
       log_(std::move(log)),
+      changed_(std::move(changed)),
       options_(options),
       refresher_(store, options.building, log_) {
   for (unsigned i = 0; i < options_.workers; ++i) {
@@ -142,7 +145,8 @@ void FusionScheduler::BuildClaims(Worker& worker,
     damage_.Remove(id);
     ++tiles_built_;
     FinishedTile tile{claim, built->revision, std::move(built->content)};
-    unfinished.push_back({claim, Begin<FinishResult>([&](auto done) {
+    const bool is_removal = !tile.content;
+    unfinished.push_back({claim, is_removal, Begin<FinishResult>([&](auto done) {
                             store_.FinishTile(std::move(tile), std::move(done));
                           })});
   });
@@ -152,6 +156,8 @@ void FusionScheduler::BuildClaims(Worker& worker,
       log_(LogLevel::kWarning, "fusion: " + result.error().message());
     } else if (!result) {
       PostponeFailed(worker, tile.claim, result.error());
+    } else if (result->is_changed) {
+      changed_(tile.claim.id, tile.is_removal ? 0 : result->revision);
     }
   }
   GiveBack(worker);

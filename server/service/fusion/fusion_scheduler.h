@@ -25,6 +25,8 @@
 namespace atlas {
 
 using WallClock = std::function<std::int64_t()>;  // ms since 1970
+// A tile has other content than before, on disk; revision 0: it is no more. From any worker.
+using TileChanged = std::function<void(const TileId& id, std::uint64_t revision)>;
 
 struct FusionOptions {
   unsigned workers = 1;
@@ -41,6 +43,7 @@ class FusionScheduler {
                   ChangeSignal& changes,
                   WallClock clock,
                   LogSink log,
+                  TileChanged changed,
                   const FusionOptions& options);
   FusionScheduler(const FusionScheduler&) = delete;
   FusionScheduler& operator=(const FusionScheduler&) = delete;
@@ -81,6 +84,7 @@ class FusionScheduler {
   ChangeSignal& changes_;
   WallClock clock_;
   LogSink log_;
+  TileChanged changed_;
   FusionOptions options_;
   TileRefresher refresher_;
   DamageList damage_;

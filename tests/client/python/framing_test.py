@@ -17,6 +17,8 @@ HELLO = atlas_pb2.Envelope(request_id=1, hello=atlas_pb2.Hello(protocol_major=1,
 SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
     area=geometry.disc(1.5, -2, 100), sections=[2], budget_bytes=65536,
     held=[atlas_pb2.Held(keys=[geometry.tile_key(0, 0, 0)], payload_hashes=[0x1122334455667788])]))
+WATCH = atlas_pb2.Envelope(request_id=3, watch_request=atlas_pb2.WatchRequest(
+    area=geometry.disc(1.5, -2, 100), interval_ms=1000))
 
 
 def leading_bytes(line):
@@ -35,12 +37,13 @@ def golden_frames():
 class GoldenTest(unittest.TestCase):
 
     def test_frames_of_the_document_are_made(self):
-        self.assertEqual([encode_frame(envelope.SerializeToString()) for envelope in (HELLO, SYNC)],
+        self.assertEqual([encode_frame(envelope.SerializeToString()) for envelope in (HELLO, SYNC, WATCH)],
                          list(golden_frames()))
 
     def test_frames_of_the_document_are_read(self):
         payloads = list(FrameReader().feed(b"".join(golden_frames())))
-        self.assertEqual([atlas_pb2.Envelope.FromString(payload) for payload in payloads], [HELLO, SYNC])
+        self.assertEqual([atlas_pb2.Envelope.FromString(payload) for payload in payloads],
+                         [HELLO, SYNC, WATCH])
 
     def test_header_of_the_empty_payload(self):
         printed = re.search(r"empty payload has the header `([0-9a-f ]+)`", DOCUMENT)[1]

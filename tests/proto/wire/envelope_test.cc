@@ -68,6 +68,22 @@ TEST(EnvelopeTest, GoldenSyncFrame) {
   EXPECT_EQ(EncodeEnvelopeFrame(envelope).value(), golden);
 }
 
+TEST(EnvelopeTest, GoldenWatchFrame) {
+  wire::Envelope envelope;
+  envelope.set_request_id(3);
+  wire::WatchRequest& watch = *envelope.mutable_watch_request();
+  wire::Area::Disc& disc = *watch.mutable_area()->mutable_disc();
+  disc.mutable_center()->set_x_um(1'500'000);
+  disc.mutable_center()->set_y_um(-2'000'000);
+  disc.set_radius_um(100'000'000);
+  watch.set_interval_ms(1'000);
+  const Bytes golden = {0x52, 0x41, 0x46, 0x31, 0x1d, 0x00, 0x00, 0x00, 0xe6, 0x01, 0xaf,
+                        0x18, 0x08, 0x03, 0xea, 0x01, 0x18, 0x0a, 0x13, 0x0a, 0x11, 0x0a,
+                        0x0a, 0x08, 0xc0, 0x8d, 0xb7, 0x01, 0x10, 0xff, 0x91, 0xf4, 0x01,
+                        0x10, 0x80, 0xc2, 0xd7, 0x2f, 0x20, 0xe8, 0x07};
+  EXPECT_EQ(EncodeEnvelopeFrame(envelope).value(), golden);
+}
+
 TEST(EnvelopeTest, RefusesTruncation) {
   wire::Envelope envelope;
   envelope.mutable_hello()->set_client_name("a name");

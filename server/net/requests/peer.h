@@ -1,0 +1,41 @@
+// One peer as its requests see it. For the thread of its connection.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <stop_token>
+
+#include "server/net/stream/reply_writer.h"
+
+namespace atlas {
+
+class Peer {
+ public:
+  // `writer` outlives this.
+  explicit Peer(ReplyWriter& writer) : out(writer) {}
+
+  // Fewer than a connection may have requests in flight: a peer can always say "cancel".
+  static constexpr std::size_t kMaxCancellable = 16;
+
+  // A request that goes on until it is cancelled. False: there are too many, or one under that id.
+  bool Begin(std::uint64_t request_id) {
+    return cancellable_.size() < kMaxCancellable && cancellable_.try_emplace(request_id).second;
+  }
+  std::stop_token cancelled(std::uint64_t request_id) {
+    return cancellable_.at(request_id).get_token();
+  }
+  void End(std::uint64_t request_id) { cancellable_.erase(request_id); }
+  // False: there is none under that id.
+  bool Cancel(std::uint64_t request_id) {
+    const auto found = cancellable_.find(request_id);
+    return found != cancellable_.end() && found->second.request_stop();
+  }
+
+  ReplyWriter& out;
+
+ private:
+  std::map<std::uint64_t, std::stop_source> cancellable_;
+};
+
+}  // namespace atlas

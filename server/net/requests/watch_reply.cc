@@ -1,0 +1,91 @@
+#include "server/net/requests/watch_reply.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include <boost/asio/this_coro.hpp>
+
+#include "server/net/requests/request_conversion.h"
+#include "server/net/requests/sync_conversion.h"
+#include "server/net/requests/wake_up.h"
+
+namespace atlas {
+namespace {
+
+namespace asio = boost::asio;
+using std::chrono::milliseconds;
+
+// A keyframe changes a dozen tiles one after the other.
+constexpr milliseconds kMinInterval{50};
+constexpr milliseconds kMaxInterval{60'000};
+
+milliseconds IntervalOf(const wire::WatchRequest& watch) {
+  return std::clamp(milliseconds(watch.interval_ms()), kMinInterval, kMaxInterval);
+}
+
+void EventToWire(const TileChanges& changes, wire::WatchEvent& event) {
+  for (const TileChanges::Tile& tile : changes.tiles) {
+    event.add_keys(tile.id.Key());
+    event.add_revisions(tile.revision);
+  }
+  for (const TileId& id : changes.below) {
+    event.add_below(id.Key());
+  }
+  event.set_anything(changes.is_anything);
+}
+
+asio::awaitable<void> Pause(milliseconds time) {
+  const auto executor = co_await asio::this_coro::executor;
+  asio::steady_timer timer(executor, time);
+  co_await timer.async_wait(asio::use_awaitable);
+}
+
+}  // namespace
+
+asio::awaitable<Status> SendWatch(AtlasService& service,
+                                  const wire::Envelope& request,
+                                  std::stop_token cancelled,
+                                  ReplyWriter& out) {
+  const wire::WatchRequest& message = request.watch_request();
+  Result<SyncArea> area = AreaFromWire(message.area(), service.identity().profile);
+  if (!area) {
+    co_return area.error();
+  }
+  const auto executor = co_await asio::this_coro::executor;
+  const auto wake_up = std::make_shared<WakeUp>(executor);
+  const auto ring = [wake_up] {
+    wake_up->Ring();
+  };
+  TileWatch::Scope scope{*std::move(area), message.finest_level(), message.coarsest_level()};
+  const auto watch = service.Watch(std::move(scope), ring);
+  if (!watch) {
+    co_return watch.error();
+  }
+  const std::stop_token peer_left = out.peer_left();
+  const std::stop_callback on_cancelled(cancelled, ring);
+  const std::stop_callback on_left(peer_left, ring);
+  TileChanges changes;  // nothing at first: from here on everything is told
+  while (!cancelled.stop_requested() && !peer_left.stop_requested()) {
+    const std::uint64_t revision = service.revision();
+    wire::Envelope event = ReplyTo(request);
+    event.mutable_watch_event()->set_revision(revision);
+    EventToWire(changes, *event.mutable_watch_event());
+    const bool is_open = co_await out.Send(std::move(event));
+    if (!is_open) {
+      break;
+    }
+    co_await Pause(IntervalOf(message));
+    changes = (*watch)->Take();
+    while (changes.empty() && !cancelled.stop_requested() && !peer_left.stop_requested()) {
+      co_await wake_up->Wait();
+      changes = (*watch)->Take();
+    }
+  }
+  co_return Status(StatusCode::kUnavailable, cancelled.stop_requested()
+                                                 ? "the watch was cancelled"
+                                                 : "the connection ends, and with it the watch");
+}
+
+}  // namespace atlas

@@ -1,0 +1,25 @@
+// Who watches: every change of a tile goes to all watches. Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "server/service/watch/tile_watch.h"
+
+namespace atlas {
+
+class WatchHub {
+ public:
+  // It hears of what changes from now on, until it is destroyed.
+  std::shared_ptr<TileWatch> Open(TileWatch::Scope scope, std::function<void()> wake);
+  void Publish(const TileId& id, std::uint64_t revision);
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::weak_ptr<TileWatch>> watches_;
+};
+
+}  // namespace atlas
