@@ -58,11 +58,13 @@ class TcpServer::Impl {
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
         budget_(options.max_held_bytes),
+        limits_(options_),
         places_(options.max_connections),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
         signals_(io_, SIGTERM, SIGINT) {
+    std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to peers that are gone, too
     for (int i = 0; i < options.threads; ++i) {
-      threads_.push_back(std::make_unique<NetThread>(handler_, budget_, options_));
+      threads_.push_back(std::make_unique<NetThread>(handler_, budget_, limits_, options_));
     }
   }
   Impl(const Impl&) = delete;
@@ -218,6 +220,7 @@ class TcpServer::Impl {
   asio::thread_pool reading_pool_;
   RequestHandler handler_;
   ByteBudget budget_;
+  IdentityLimits limits_;
   Places places_;  // of connections
   std::vector<std::unique_ptr<NetThread>> threads_;
   asio::io_context io_{1};  // what accepts; after what its coroutines refer to

@@ -13,6 +13,7 @@ namespace atlas {
 class TcpServer {
  public:
   // SIGTERM and SIGINT are its own from here on: whoever learns the address may stop the daemon.
+  // SIGPIPE is ignored from here on.
   TcpServer(AtlasService& service,
             const NetOptions& options,
             ListenSocket socket,

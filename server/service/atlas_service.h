@@ -77,7 +77,11 @@ class AtlasService {
   const AtlasIdentity& identity() const { return store_.identity(); }
   std::int64_t NowMs() const { return clock_(); }  // since 1970
 
-  // Checked on the calling thread; `done` is called once it is on disk, or refused.
+  // In two steps: the check takes its time, the other never blocks. `done` is called once it is on
+  // disk, or refused.
+  Result<NewKeyframe> CheckUpload(UploadRequest request) const;
+  void PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done);
+  // Both. Checked on the calling thread.
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
   void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
@@ -107,6 +111,10 @@ class AtlasService {
 
   Result<ServiceStatus> ReadStatus();
   Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
+  // nullopt: unknown.
+  Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) {
+    return store_.FindSession(key);
+  }
   // Of the last change on disk; never blocks.
   std::uint64_t revision() const { return store_.revision(); }
 

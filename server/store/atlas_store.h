@@ -104,6 +104,8 @@ class AtlasStore : public TileIndex {
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
   virtual Result<std::vector<SessionRecord>> ListSessions() = 0;
+  // nullopt: unknown.
+  virtual Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) = 0;
   // Verifies every checksum of a session's history and of what is left of its dropped keyframes.
   virtual Status CheckSession(const SessionKey& key) = 0;
   // Verifies every compaction's checksum, and that it left as many tombstones as it dropped

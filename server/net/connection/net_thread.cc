@@ -29,9 +29,13 @@ milliseconds LookEvery(const NetOptions& options) {
 
 }  // namespace
 
-NetThread::NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptions& options)
+NetThread::NetThread(RequestHandler& handler,
+                     ByteBudget& budget,
+                     IdentityLimits& limits,
+                     const NetOptions& options)
     : handler_(handler),
       budget_(budget),
+      limits_(limits),
       options_(options),
       buffer_(kReadBytes),
       connection_places_(options.max_connections),
@@ -44,7 +48,8 @@ void NetThread::Serve(PeerConnection::Arrival arrival) {
   arrival.place = std::make_shared<Pair>(std::move(arrival.place), connection_places_.Take());
   auto begin = [this, arrival = std::move(arrival)]() mutable {
     const auto connection = std::make_shared<PeerConnection>(
-        std::move(arrival), PeerConnection::Surroundings{handler_, budget_, buffer_, options_});
+        std::move(arrival),
+        PeerConnection::Surroundings{handler_, budget_, limits_, buffer_, options_});
     connections_.push_back(connection);
     connection->Start();
   };

@@ -25,7 +25,10 @@ namespace atlas {
 class NetThread {
  public:
   // All outlive this. Runs from the start.
-  NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptions& options);
+  NetThread(RequestHandler& handler,
+            ByteBudget& budget,
+            IdentityLimits& limits,
+            const NetOptions& options);
   NetThread(const NetThread&) = delete;
   NetThread& operator=(const NetThread&) = delete;
   ~NetThread() { Stop(); }
@@ -51,6 +54,7 @@ class NetThread {
 
   RequestHandler& handler_;
   ByteBudget& budget_;
+  IdentityLimits& limits_;
   const NetOptions& options_;
   std::vector<std::uint8_t> buffer_;
   Places connection_places_;

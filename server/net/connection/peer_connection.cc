@@ -18,6 +18,12 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
+Status HoldsTooMuch(std::size_t bytes, const std::string& whose) {
+  return {StatusCode::kResourceExhausted,
+          StrCat("the daemon holds ", bytes, " bytes of requests of ", whose,
+                 " already; try again later")};
+}
+
 // The one place where what escapes a coroutine is caught. It keeps the connection alive until then.
 class Completion {
  public:
@@ -48,15 +54,17 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       place_(std::move(arrival.place)),
       handler_(surroundings.handler),
       budget_(surroundings.budget),
+      limits_(surroundings.limits),
       buffer_(surroundings.buffer),
       options_(surroundings.options),
       peer_(stream_.PeerName()),
       writer_(stream_, options_),
-      as_peer_(writer_),
+      as_peer_(writer_, stream_.executor()),
       decoder_(options_.max_hello_bytes),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
-      access_(std::move(arrival.access)) {}
+      access_(std::move(arrival.access)),
+      rate_pause_(stream_.executor()) {}
 
 void PeerConnection::Start() {
   const auto self = shared_from_this();
@@ -67,13 +75,16 @@ void PeerConnection::Start() {
 void PeerConnection::Drain() {
   is_draining_ = true;
   stop_reading_.emit(asio::cancellation_type::terminal);
+  rate_pause_.cancel();
 }
 
 void PeerConnection::CloseNow() {
   phase_ = Phase::kClosed;
   place_.reset();  // before the peer can see it
+  own_place_.reset();
   writer_.CloseNow();
   changed_.cancel();
+  rate_pause_.cancel();
 }
 
 asio::awaitable<void> PeerConnection::Read() {
@@ -114,6 +125,9 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
         co_return status;
       }
       writer_.Flush();
+      if (allowance_ != nullptr) {
+        co_await KeepToRate(came.bytes);
+      }
     }
     if (came.is_blocked && !is_draining_ && !is_refused_) {
       co_await stream_.WaitUntilReadable(stop_reading_.slot());
@@ -152,19 +166,7 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
   if (!envelope) {
     return envelope.error();
   }
-  if (!is_greeted_) {
-    is_greeted_ = Greet(*envelope);
-    is_refused_ = !is_greeted_;
-    decoder_.set_max_payload_bytes(options_.max_frame_bytes);
-    Release(frame_bytes);
-    return {};
-  }
-  if (const Status denied = CheckMayAsk(identity_, *envelope); !denied.ok()) {
-    writer_.PushError(envelope->request_id(), denied);
-    Release(frame_bytes);
-    return {};
-  }
-  auto rest = handler_.Handle(*std::move(envelope), as_peer_);
+  auto rest = is_greeted_ ? Answer(*std::move(envelope)) : Greet(*std::move(envelope));
   if (!rest) {
     Release(frame_bytes);
     return {};
@@ -176,16 +178,63 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
   return {};
 }
 
-bool PeerConnection::Greet(const wire::Envelope& hello) {
+PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
+  const Status status = ComeIn(hello);
+  is_greeted_ = status.ok();
+  is_refused_ = !is_greeted_;
+  decoder_.set_max_payload_bytes(options_.max_frame_bytes);
+  if (!status.ok()) {
+    spdlog::warn("{}: {}", peer_, status.message());
+    writer_.PushError(hello.request_id(), status);
+    return std::nullopt;
+  }
+  return handler_.Greet(std::move(hello), identity_, writer_);
+}
+
+Status PeerConnection::ComeIn(const wire::Envelope& hello) {
   credentials_ = Credentials::Of(stream_.certificate(), hello.hello().token());
   const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
   if (!identity) {
-    spdlog::warn("{}: {}", peer_, identity.error().message());
-    writer_.PushError(hello.request_id(), identity.error());
-    return false;
+    return identity.error();
   }
+  ATLAS_RETURN_IF_ERROR(handler_.CheckGreeting(hello));
   identity_ = *identity;
-  return handler_.Greet(hello, identity_, writer_);
+  if (identity_.name.empty()) {
+    return {};
+  }
+  const auto allowance = limits_.Of(identity_.name);
+  own_place_ = allowance->TakeConnection();
+  if (own_place_ == nullptr) {
+    return {StatusCode::kUnavailable, StrCat(options_.identity_connections, " connections of ",
+                                             identity_.name, " are open already; try again later")};
+  }
+  if (!allowance->held().Take(held_bytes_)) {
+    return HoldsTooMuch(options_.identity_held_bytes, identity_.name);
+  }
+  allowance_ = allowance;
+  return {};
+}
+
+asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
+  const auto pause = allowance_->Charge(std::exchange(unpaid_requests_, 0), bytes, Clock::now());
+  if (pause == Clock::duration::zero() || is_draining_ || writer_.is_closed()) {
+    co_return;
+  }
+  is_held_up_ = true;
+  rate_pause_.expires_after(pause);
+  error_code ignored;  // the time is over, or so is the connection
+  co_await rate_pause_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+  is_held_up_ = false;
+  frame_clock_.Restart(Clock::now(), decoder_.pending_bytes());
+}
+
+PeerConnection::MaybeAwaited PeerConnection::Answer(wire::Envelope request) {
+  ++unpaid_requests_;
+  if (const Status denied = CheckMayAsk(identity_, request); !denied.ok()) {
+    writer_.PushError(request.request_id(), denied);
+    return std::nullopt;
+  }
+  return handler_.Handle(std::move(request), as_peer_);
 }
 
 void PeerConnection::ChangeAccess(std::shared_ptr<const AccessControl> access) {
@@ -278,9 +327,11 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
 
 Status PeerConnection::Hold(std::size_t bytes) {
   if (!budget_.Take(bytes)) {
-    return Status(StatusCode::kResourceExhausted,
-                  StrCat("the daemon holds ", options_.max_held_bytes,
-                         " bytes of requests already; try again later"));
+    return HoldsTooMuch(options_.max_held_bytes, "all");
+  }
+  if (allowance_ != nullptr && !allowance_->held().Take(bytes)) {
+    budget_.GiveBack(bytes);
+    return HoldsTooMuch(options_.identity_held_bytes, identity_.name);
   }
   held_bytes_ += bytes;
   return {};
@@ -288,6 +339,9 @@ Status PeerConnection::Hold(std::size_t bytes) {
 
 void PeerConnection::Release(std::size_t bytes) {
   budget_.GiveBack(bytes);
+  if (allowance_ != nullptr) {
+    allowance_->held().GiveBack(bytes);
+  }
   held_bytes_ -= bytes;
 }
 

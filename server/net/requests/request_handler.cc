@@ -22,14 +22,10 @@ constexpr std::size_t kBytesAtOnce = 1u << 20;  // of a reply, then it is the ot
 
 }  // namespace
 
-bool RequestHandler::Greet(const Envelope& request,
-                           const Identity& identity,
-                           ReplyWriter& out) const {
+std::optional<asio::awaitable<void>> RequestHandler::Greet(Envelope request,
+                                                           const Identity& identity,
+                                                           ReplyWriter& out) {
   const AtlasIdentity& atlas = service_.identity();
-  if (const Status status = CheckHello(request, atlas.profile); !status.ok()) {
-    out.PushError(request.request_id(), status);
-    return false;
-  }
   Envelope reply = ReplyTo(request);
   wire::HelloReply& hello = *reply.mutable_hello_reply();
   hello.set_protocol_major(kProtocolMajor);
@@ -41,8 +37,27 @@ bool RequestHandler::Greet(const Envelope& request,
   hello.set_max_frame_bytes(options_.max_frame_bytes);
   hello.set_name(identity.name);
   hello.set_role(std::string(RoleName(identity.role)));
-  out.Push(reply);
-  return true;
+  if (!request.hello().has_resume()) {
+    out.Push(reply);
+    return std::nullopt;
+  }
+  const wire::Hello::Session& session = request.hello().resume();
+  return Resume({session.vehicle(), session.session()}, std::move(reply), out);
+}
+
+asio::awaitable<void> RequestHandler::Resume(SessionKey session, Envelope reply, ReplyWriter& out) {
+  const Blocking<std::optional<SessionRecord>> find = [this, session] {
+    return service_.FindSession(session);
+  };
+  const Result<std::optional<SessionRecord>> found = co_await OnPool(pool_, find);
+  if (!found) {
+    co_await out.SendError(reply.request_id(), found.error());
+    co_return;
+  }
+  if (*found) {
+    reply.mutable_hello_reply()->set_last_sequence((*found)->last_sequence);
+  }
+  co_await out.Send(std::move(reply));
 }
 
 std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Peer& peer) {
@@ -55,6 +70,9 @@ std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Pe
   }
   if (request.has_watch_request()) {
     return Watch(std::move(request), peer);
+  }
+  if (request.has_upload_keyframe()) {
+    return Upload(std::move(request), peer);
   }
   if (!request.has_sync_request()) {
     return Await(std::move(request), peer.out);
@@ -94,8 +112,6 @@ asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) 
 
 asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyWriter& out) {
   switch (request.body_case()) {
-    case Envelope::kUploadKeyframe:
-      return Upload(request, out);
     case Envelope::kUpdatePoses:
       return UpdatePoses(request, out);
     case Envelope::kChangeSession:
@@ -142,18 +158,42 @@ asio::awaitable<Result<T>> RequestHandler::Write(Request request, Writing<Reques
   co_return co_await StartOnPool(pool_, std::move(start));
 }
 
-asio::awaitable<Status> RequestHandler::Upload(const Envelope& request, ReplyWriter& out) {
+asio::awaitable<void> RequestHandler::Upload(Envelope request, Peer& peer) {
+  Status status = co_await PutInOrder(request, peer);
+  if (!status.ok()) {
+    co_await peer.out.SendError(request.request_id(), std::move(status));
+  }
+}
+
+asio::awaitable<Status> RequestHandler::PutInOrder(const Envelope& request, Peer& peer) {
+  UploadOrder::Turn turn(peer.uploads);
   Result<UploadRequest> upload = UploadFromWire(request.upload_keyframe());
   if (!upload) {
     co_return upload.error();
   }
-  const auto result = co_await Write(*std::move(upload), &AtlasService::Upload);
+  const auto unchecked = std::make_shared<UploadRequest>(*std::move(upload));
+  const Blocking<NewKeyframe> check = [this, unchecked] {
+    return service_.CheckUpload(std::move(*unchecked));
+  };
+  Result<NewKeyframe> keyframe = co_await OnPool(pool_, check);
+  if (!keyframe) {
+    co_return keyframe.error();
+  }
+  co_await turn.Come();
+  const auto executor = co_await asio::this_coro::executor;
+  const auto put = std::make_shared<OneShot<PutKeyframeResult>>(executor);
+  const auto done = [put](Result<PutKeyframeResult> result) {
+    put->Set(std::move(result));
+  };
+  service_.PutKeyframe(*std::move(keyframe), done);
+  turn.Leave();
+  const Result<PutKeyframeResult> result = co_await put->Take();
   if (!result) {
     co_return result.error();
   }
   Envelope reply = ReplyTo(request);
   UploadToWire(*result, *reply.mutable_upload_reply());
-  co_await out.Send(std::move(reply));
+  co_await peer.out.Send(std::move(reply));
   co_return Status();
 }
 

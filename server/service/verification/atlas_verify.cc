@@ -39,8 +39,8 @@ AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
 
 Result<VerifyReport> AtlasVerifier::Run() {
   for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyCompactions,
-                          &AtlasVerifier::VerifyCounters, &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
-                          &AtlasVerifier::VerifyMissingTiles}) {
+                          &AtlasVerifier::VerifyCounters, &AtlasVerifier::VerifyKeyframes,
+                          &AtlasVerifier::VerifyTiles, &AtlasVerifier::VerifyMissingTiles}) {
     if (Status status = (this->*step)(); !status.ok()) {
       return Error(std::move(status));
     }

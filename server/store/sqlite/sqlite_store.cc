@@ -172,6 +172,16 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<std::vector<SessionRecord>>(
         [](Connection& connection) { return ReadSessions(connection); });
   }
+  Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) override {
+    using Found = std::optional<SessionRecord>;
+    return readers_.Run<Found>([&key](Connection& connection) -> Result<Found> {
+      const auto row = atlas::FindSession(connection, key);
+      if (!row) {
+        return Error(row.error());
+      }
+      return *row ? Found((*row)->record) : Found();
+    });
+  }
   Status CheckSession(const SessionKey& key) override {
     return ReadStatus(
         [&key](Connection& connection) { return CheckSessionHistory(connection, key); });

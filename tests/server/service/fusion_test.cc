@@ -131,7 +131,7 @@ TEST_F(AtlasTest, VerifyNoticesKeyframesThatVanished) {
   ASSERT_TRUE(report.has_value());
   EXPECT_THAT(report->findings,
               ::testing::ElementsAre("store: it counts 4 keyframes, and the rows say 3",
-                                   "the sessions count 4 keyframes, and 3 are there"));
+                                     "the sessions count 4 keyframes, and 3 are there"));
   EXPECT_EQ(report->damaged, 2u);
 }
 
