@@ -29,6 +29,8 @@ struct NetOptions {
   std::chrono::milliseconds write_stall{30'000};  // without a byte taken by the peer
   std::chrono::milliseconds linger{1'000};        // for a refused peer that still sends to read why
   std::chrono::milliseconds drain{10'000};        // for requests in flight at shutdown
+  std::chrono::milliseconds slow_request{1'000};  // from here on the log has it, unless it waits
+  std::uint64_t max_log_lines_per_s = 20;         // about requests, a thread; others are counted
 };
 
 }  // namespace atlas

@@ -1,9 +1,12 @@
 // Accepts connections and runs the network thread.
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <memory>
 
 #include "server/net/listen_socket.h"
+#include "server/net/net_counters.h"
 #include "server/net/net_options.h"
 #include "server/service/atlas_service.h"
 
@@ -23,6 +26,12 @@ class TcpServer {
   void Run();
   // From any thread.
   void Stop();
+
+  // From any thread, as are the next two.
+  NetFigures ReadFigures() const;
+  std::size_t threads() const;
+  // Calls `answer` on the network thread with this number, as soon as it gets to it.
+  void Probe(std::size_t thread, std::function<void()> answer);
 
  private:
   class Impl;

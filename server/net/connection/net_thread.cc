@@ -34,6 +34,7 @@ NetThread::NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptio
       budget_(budget),
       options_(options),
       buffer_(kReadBytes),
+      request_lines_(options.max_log_lines_per_s),
       connection_places_(options.max_connections),
       work_(asio::make_work_guard(io_)),
       thread_([this] { Run(); }) {}
@@ -46,7 +47,8 @@ void NetThread::Serve(asio::ip::tcp::socket socket, Places::Place place) {
         std::make_shared<std::pair<Places::Place, Places::Place>>(std::move(place), std::move(own));
     const auto connection = std::make_shared<PeerConnection>(
         std::move(socket), both,
-        PeerConnection::Surroundings{handler_, budget_, buffer_, options_});
+        PeerConnection::Surroundings{handler_, budget_, buffer_, options_, counters_,
+                                     request_lines_});
     connections_.push_back(connection);
     connection->Start();
   };
@@ -61,6 +63,10 @@ void NetThread::Drain() {
       }
     }
   });
+}
+
+void NetThread::Probe(std::function<void()> answer) {
+  asio::post(io_, std::move(answer));
 }
 
 void NetThread::Stop() {

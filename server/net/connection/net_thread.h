@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -16,6 +17,7 @@
 
 #include "server/net/connection/byte_budget.h"
 #include "server/net/connection/peer_connection.h"
+#include "server/net/net_counters.h"
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
@@ -33,11 +35,14 @@ class NetThread {
   // For the sockets of its connections.
   boost::asio::io_context& io() { return io_; }
   std::size_t connections() const { return connection_places_.taken(); }
+  const NetCounters& counters() const { return counters_; }
 
   // From any thread: begins a connection, which keeps the place until it ends.
   void Serve(boost::asio::ip::tcp::socket socket, Places::Place place);
   // From any thread: connections end when they have answered what they have read.
   void Drain();
+  // From any thread: calls `answer` on this one.
+  void Probe(std::function<void()> answer);
   // Connections that are left are cut.
   void Stop();
 
@@ -49,6 +54,8 @@ class NetThread {
   ByteBudget& budget_;
   const NetOptions& options_;
   std::vector<std::uint8_t> buffer_;
+  NetCounters counters_;
+  LineBudget request_lines_;  // of the log
   Places connection_places_;
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;

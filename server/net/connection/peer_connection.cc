@@ -17,6 +17,8 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
+constexpr std::size_t kMaxClientBytes = 100;  // of its name that are kept for the log
+
 // The one place where what escapes a coroutine is caught. It keeps the connection alive until then.
 class Completion {
  public:
@@ -30,7 +32,8 @@ class Completion {
     try {
       std::rethrow_exception(failure);
     } catch (const std::exception& error) {
-      spdlog::error("{}: {} failed: {}", connection_->peer(), what_, error.what());
+      const std::string message = StrCat(what_, " failed: ", error.what());
+      spdlog::error("{}", connection_->peer().Line(message).text());
     }
     connection_->CloseNow();
   }
@@ -51,8 +54,9 @@ PeerConnection::PeerConnection(asio::ip::tcp::socket socket,
       budget_(surroundings.budget),
       buffer_(surroundings.buffer),
       options_(surroundings.options),
-      peer_(stream_.PeerName()),
-      writer_(stream_, options_),
+      peer_{stream_.PeerName(), "", surroundings.counters, surroundings.lines,
+            options_.slow_request},
+      writer_(stream_, peer_, options_),
       decoder_(options_.max_hello_bytes),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       deadline_(Clock::now() + options_.handshake) {}
@@ -79,7 +83,7 @@ asio::awaitable<void> PeerConnection::Read() {
   const Status broken = co_await ReadRequests();
   DropUnread();
   if (!broken.ok()) {
-    spdlog::warn("{}: {}", peer_, broken.message());
+    spdlog::warn("{}", peer_.Line(broken.message()).text());
     is_refused_ = true;
     writer_.PushError(0, broken);
   }
@@ -101,6 +105,7 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
       co_return Status();
     }
     if (came.bytes > 0) {
+      peer_.counters.received_bytes.Add(came.bytes);
       if (Status status = Hold(came.bytes); !status.ok()) {
         co_return status;
       }
@@ -147,6 +152,7 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
     return envelope.error();
   }
   if (!is_greeted_) {
+    peer_.client = envelope->hello().client_name().substr(0, kMaxClientBytes);
     is_greeted_ = handler_.Greet(*envelope, writer_);
     is_refused_ = !is_greeted_;
     decoder_.set_max_payload_bytes(options_.max_frame_bytes);
@@ -236,9 +242,9 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
   if (phase_ == Phase::kLingering) {
     CloseNow();
   } else if (is_reading_ && !is_held_up_ && (requests_ == 0 || is_mid_frame_)) {
-    spdlog::warn(
-        "{}: {}", peer_,
-        is_mid_frame_ ? "the rest of a frame did not come in time" : "nothing came in time");
+    const char* const what =
+        is_mid_frame_ ? "the rest of a frame did not come in time" : "nothing came in time";
+    spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
   }
 }

@@ -17,6 +17,7 @@
 #include "proto/wire/frame.h"
 #include "server/net/connection/byte_budget.h"
 #include "server/net/net_options.h"
+#include "server/net/peer_record.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
 #include "server/net/stream/peer_stream.h"
@@ -35,6 +36,8 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
     ByteBudget& budget;
     std::span<std::uint8_t> buffer;
     const NetOptions& options;
+    NetCounters& counters;  // of its thread, as is the next
+    LineBudget& lines;
   };
 
   PeerConnection(boost::asio::ip::tcp::socket socket,
@@ -52,7 +55,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // To be called now and then: closes when the peer owes something for too long.
   void CheckDeadlines(Clock::time_point now);
 
-  const std::string& peer() const { return peer_; }
+  const PeerRecord& peer() const { return peer_; }
 
  private:
   enum class Phase {
@@ -86,7 +89,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   ByteBudget& budget_;
   const std::span<std::uint8_t> buffer_;
   const NetOptions& options_;
-  const std::string peer_;
+  PeerRecord peer_;
   ReplyWriter writer_;
   FrameDecoder decoder_;
   std::size_t held_bytes_ = 0;  // of `budget_`: what was received and is not answered yet

@@ -23,7 +23,9 @@ constexpr std::size_t kBytesAtOnce = 1u << 20;  // of a reply, then it is the ot
 
 bool RequestHandler::Greet(const Envelope& request, ReplyWriter& out) const {
   const AtlasIdentity& identity = service_.identity();
+  RequestRecord record(out.peer(), request);
   if (const Status status = CheckHello(request, identity.profile); !status.ok()) {
+    record.End(status);
     out.PushError(request.request_id(), status);
     return false;
   }
@@ -37,6 +39,7 @@ bool RequestHandler::Greet(const Envelope& request, ReplyWriter& out) const {
   hello.set_revision(service_.revision());
   hello.set_max_frame_bytes(options_.max_frame_bytes);
   out.Push(reply);
+  record.End({});
   return true;
 }
 
@@ -44,16 +47,19 @@ std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Re
   if (!request.has_sync_request()) {
     return Await(std::move(request), out);
   }
+  RequestRecord record(out.peer(), request);
   auto reply = std::make_shared<SyncReply>(service_, frames_, std::move(request));
   const bool may_begin = reply->message().wait_revision() == 0;
-  if (may_begin && SyncAtOnce(*reply, out)) {
+  if (may_begin && SyncAtOnce(*reply, record, out)) {
     return std::nullopt;
   }
-  return Sync(std::move(reply), out);
+  return Sync(std::move(reply), std::move(record), out);
 }
 
 asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) {
+  RequestRecord record(out.peer(), request);
   Status status = co_await Dispatch(request, out);
+  record.End(status);
   if (!status.ok()) {
     co_await out.SendError(request.request_id(), std::move(status));
   }
@@ -187,12 +193,13 @@ asio::awaitable<Status> RequestHandler::QueryThePast(const Envelope& request, Re
   co_return co_await SendRegion(service_, reading_pool_, request, *region, out);
 }
 
-bool RequestHandler::SyncAtOnce(SyncReply& reply, ReplyWriter& out) {
+bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out) {
   std::vector<ReplyFrame> frames;
   for (std::size_t bytes = 0; out.has_room() && bytes < kBytesAtOnce;) {
     const Result<SyncReply::Step> step = reply.Next(false, frames);
     if (!step) {
       out.PushError(reply.request_id(), step.error());
+      record.End(step.error());
       return true;
     }
     for (const ReplyFrame& frame : frames) {
@@ -200,15 +207,22 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, ReplyWriter& out) {
       bytes += frame.size();
     }
     frames.clear();
-    if (*step != SyncReply::Step::kMore) {
-      return *step == SyncReply::Step::kDone;
+    if (*step == SyncReply::Step::kDone) {
+      record.End({});
+      return true;
+    }
+    if (*step == SyncReply::Step::kBlocked) {
+      return false;
     }
   }
   return false;
 }
 
-asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out) {
+asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
+                                           RequestRecord record,
+                                           ReplyWriter& out) {
   Status status = co_await WaitAndSync(reply, out);
+  record.End(status);
   if (!status.ok()) {
     co_await out.SendError(reply->request_id(), std::move(status));
   }

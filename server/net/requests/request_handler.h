@@ -9,6 +9,7 @@
 
 #include "proto/wire/envelope.h"
 #include "server/net/net_options.h"
+#include "server/net/requests/request_record.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
 #include "server/net/requests/wait_places.h"
@@ -54,8 +55,10 @@ class RequestHandler {
   boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
   // False: what is left takes long, or the disk, or the peer does not take it.
-  static bool SyncAtOnce(SyncReply& reply, ReplyWriter& out);
-  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
+  static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);
+  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
+                                    RequestRecord record,
+                                    ReplyWriter& out);
   boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
   boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
