@@ -19,7 +19,10 @@
 namespace atlas {
 namespace {
 
-using Settings = std::map<std::string, GivenSetting>;
+using Settings = GivenSettings;
+
+// Who adds one here gives it to a part of LiveConfig.
+constexpr std::string_view kLiveSettings[] = {"log_format", "log_level"};
 
 Status BadValue(const std::string& key, const std::string& text, const char* expected) {
   return Status(StatusCode::kInvalidArgument, StrCat(key, " is '", text, "', expected ", expected));
@@ -42,21 +45,47 @@ Status ApplyData(const std::string& /*key*/, const std::string& text, DaemonConf
   return {};
 }
 
-Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig& config) {
+Result<HostPort> ParseHostPort(const std::string& key, const std::string& text) {
   const std::size_t colon = text.rfind(':');
   const auto port = colon == std::string::npos ? std::nullopt
                                                : ParseNumber<std::uint16_t>(text.substr(colon + 1));
   if (!port) {
-    return BadValue(key, text, "HOST:PORT, the port from 0 to 65535");
+    return Error(BadValue(key, text, "HOST:PORT, the port from 0 to 65535"));
   }
-  config.port = *port;
-  config.host = text.substr(0, colon);
-  if (config.host == "localhost") {
-    config.host = "127.0.0.1";
+  HostPort address{text.substr(0, colon), *port};
+  std::string& host = address.host;
+  if (host == "localhost") {
+    host = "127.0.0.1";
   }
-  if (config.host.size() > 2 && config.host.front() == '[' && config.host.back() == ']') {
-    config.host = config.host.substr(1, config.host.size() - 2);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
   }
+  return address;
+}
+
+Status ApplyHttp(const std::string& key, const std::string& text, DaemonConfig& config) {
+  config.http.reset();
+  if (text.empty()) {
+    return {};
+  }
+  const Result<HostPort> address = ParseHostPort(key, text);
+  if (!address) {
+    return address.error();
+  }
+  if (!IsLoopback(address->host)) {
+    return BadValue(key, text, "a loopback address: whoever reaches it sees how the daemon fares");
+  }
+  config.http = *address;
+  return {};
+}
+
+Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig& config) {
+  const Result<HostPort> address = ParseHostPort(key, text);
+  if (!address) {
+    return address.error();
+  }
+  config.host = address->host;
+  config.port = address->port;
   if (!IsLoopback(config.host)) {
     return BadValue(
         key, text,
@@ -85,6 +114,14 @@ Status ApplyLogLevel(const std::string& key, const std::string& text, DaemonConf
     return BadValue(key, text, "debug, info, warning or error");
   }
   config.log_level = text;
+  return {};
+}
+
+Status ApplyLogFormat(const std::string& key, const std::string& text, DaemonConfig& config) {
+  if (text != "text" && text != "json") {
+    return BadValue(key, text, "text or json");
+  }
+  config.log_format = text;
   return {};
 }
 
@@ -138,6 +175,10 @@ constexpr Setting kSettings[] = {
      SettingType::kNumber, &ApplyCountTo<&DaemonConfig::reply_mib, 0, 65'536>},
     {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error",
      SettingType::kText, &ApplyLogLevel},
+    {"log_format", "--log-format", "ATLASD_LOG_FORMAT", "NAME", "text, or json: an object a line",
+     SettingType::kText, &ApplyLogFormat},
+    {"http", "--http", "ATLASD_HTTP", "HOST:PORT",
+     "health and metrics, loopback only; port 0 takes a free one", SettingType::kText, &ApplyHttp},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell",
      SettingType::kNumber, &ApplyNumberTo<double, &DaemonConfig::cell_size_m>},
     {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
@@ -163,6 +204,8 @@ std::map<std::string, std::string> Defaults() {
           {"survey_disk_mib", StrCat(config.survey_disk_mib)},
           {"reply_mib", StrCat(config.reply_mib)},
           {"log_level", config.log_level},
+          {"log_format", config.log_format},
+          {"http", "off"},
           {"map.cell_size", StrCat(map.cell_size_m())},
           {"map.segments", StrCat(int{map.column_segments})},
           {"map.segment_height", StrCat(map.segment_height_m())},
@@ -203,6 +246,21 @@ Result<Settings> Collect(const Settings& flags, const std::string& file) {
 }
 
 }  // namespace
+
+Result<DaemonConfig> ConfigFrom(const GivenSettings& given) {
+  DaemonConfig config;
+  for (const auto& [key, setting] : given) {
+    if (Status status = Apply(key, setting.text, config); !status.ok()) {
+      return Error(status.WithContext(setting.origin));
+    }
+  }
+  return config;
+}
+
+bool IsLiveSetting(const std::string& key) {
+  return std::find(std::begin(kLiveSettings), std::end(kLiveSettings), key) !=
+         std::end(kLiveSettings);
+}
 
 Result<MapProfile> DaemonConfig::NewProfile() const {
   MapProfile profile;
@@ -284,15 +342,16 @@ Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     return Error(StatusCode::kInvalidArgument, error.what());
   }
-  const Result<Settings> settings = Collect(flags, file);
+  Result<Settings> settings = Collect(flags, file);
   if (!settings) {
     return Error(settings.error());
   }
-  for (const auto& [key, given] : *settings) {
-    if (Status status = Apply(key, given.text, command.config); !status.ok()) {
-      return Error(status.WithContext(given.origin));
-    }
+  Result<DaemonConfig> config = ConfigFrom(*settings);
+  if (!config) {
+    return Error(config.error());
   }
+  command.config = *std::move(config);
+  command.given = *std::move(settings);
   if (command.config.data.empty()) {
     return Error(StatusCode::kInvalidArgument, "--data DIR is required");
   }
