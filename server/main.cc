@@ -6,16 +6,23 @@
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
+#include "server/base/log_format.h"
 #include "server/config/daemon_config.h"
+#include "server/config/live_config.h"
+#include "server/hangup_watch.h"
 #include "server/net/tcp_server.h"
+#include "server/operations_port.h"
 #include "server/service/atlas_service.h"
 #include "server/service/process_memory.h"
 #include "server/store/sqlite/sqlite_store.h"
@@ -119,10 +126,60 @@ void Log(LogLevel level, const std::string& message) {
   }
 }
 
+void SetLog(const DaemonConfig& config) {
+  spdlog::set_level(spdlog::level::from_str(config.log_level));
+  const auto format = LogFormatByName(config.log_format).value_or(LogFormat::kText);
+  spdlog::set_formatter(MakeLogFormatter(format));
+}
+
+Result<LiveConfig::Commit> PrepareLog(const DaemonConfig& config) {
+  return [config] {
+    SetLog(config);
+  };
+}
+
+std::string Joined(const std::vector<std::string>& keys) {
+  std::string text;
+  for (const std::string& key : keys) {
+    text += (text.empty() ? "" : ", ") + key;
+  }
+  return text;
+}
+
+void ReloadConfig(LiveConfig& config) {
+  const Result<LiveConfig::Outcome> outcome = config.Reload();
+  if (!outcome) {
+    spdlog::error("signal 1: the new configuration is refused, the old one stays: {}: {}",
+                  StatusCodeName(outcome.error().code()), outcome.error().message());
+    return;
+  }
+  spdlog::info("signal 1: configuration read again, {} changed",
+               outcome->changed.empty() ? "nothing" : Joined(outcome->changed));
+  if (!outcome->waiting.empty()) {
+    spdlog::warn("signal 1: changes that need a restart: {}", Joined(outcome->waiting));
+  }
+}
+
+// nullopt: it is off.
+Result<std::optional<ListenSocket>> OpenHttpSocket(const DaemonConfig& config) {
+  if (!config.http) {
+    return std::nullopt;
+  }
+  Result<ListenSocket> socket = ListenSocket::Open(config.http->host, config.http->port);
+  if (!socket) {
+    return Error(socket.error());
+  }
+  return std::optional<ListenSocket>(*std::move(socket));
+}
+
 int Serve(const DaemonConfig& config) {
   Result<ListenSocket> socket = ListenSocket::Open(config.host, config.port);
   if (!socket) {
     return Fail(socket.error());
+  }
+  Result<std::optional<ListenSocket>> http_socket = OpenHttpSocket(config);
+  if (!http_socket) {
+    return Fail(http_socket.error().WithContext("http"));
   }
   Result<std::unique_ptr<AtlasStore>> store = OpenStore(config);
   if (!store) {
@@ -132,6 +189,11 @@ int Serve(const DaemonConfig& config) {
   const std::string address = socket->address();
   TcpServer server(service, NetFrom(config), *std::move(socket));
   std::printf("listening %s\n", address.c_str());
+  std::optional<OperationsPort> operations;
+  if (*http_socket) {
+    std::printf("http %s\n", (*http_socket)->address().c_str());
+    operations.emplace(service, **store, server, **std::move(http_socket));
+  }
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());
   server.Run();
@@ -142,7 +204,10 @@ int Serve(const DaemonConfig& config) {
 
 int Main(int argc, const char* const* argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("atlasd"));
-  const Result<DaemonCommand> command = ParseDaemonCommand(argc, argv);
+  const LiveConfig::Read read = [argc, argv] {
+    return ParseDaemonCommand(argc, argv);
+  };
+  const Result<DaemonCommand> command = read();
   if (!command) {
     return Fail(command.error());
   }
@@ -150,7 +215,10 @@ int Main(int argc, const char* const* argv) {
     std::fputs(command->text->c_str(), stdout);
     return 0;
   }
-  spdlog::set_level(spdlog::level::from_str(command->config.log_level));
+  SetLog(command->config);
+  LiveConfig config(*command, read);
+  config.AddPart(&PrepareLog);
+  const HangupWatch hangups([&config] { ReloadConfig(config); });
   return Serve(command->config);
 }
 
