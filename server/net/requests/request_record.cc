@@ -112,13 +112,13 @@ void RequestRecord::Log(const Status& status, Clock::time_point now) const {
   message += status.ok()
                  ? StrCat("took ", ms, " ms")
                  : StrCat("failed: ", StatusCodeName(status.code()), ": ", status.message());
+  if (*left_out > 0) {
+    message += StrCat("; ", *left_out, " more such lines were left out");
+  }
   LogLine line = peer_->Line(message);
   line.Add("request_id", id_).Add("kind", RequestKindName(kind_));
   line.Add("code", StatusCodeName(status.code()));
   line.Add("duration_ms", static_cast<std::uint64_t>(ms));
-  if (*left_out > 0) {
-    line.Add("left_out", *left_out);
-  }
   spdlog::info("{}", line.text());
 }
 
