@@ -280,6 +280,7 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
   return ServiceStatus{*counts,
                        fusion_.damage().size(),
                        fusion_.tiles_built(),
+                       fusion_.building_s(),
                        fusion_.kept_bytes(),
                        fusion_.kept_disk_bytes(),
                        ResidentBytes()};

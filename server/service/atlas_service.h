@@ -49,6 +49,7 @@ struct ServiceStatus {
   StoreCounts counts;
   std::uint64_t damaged_tiles = 0;  // dirty, and damage keeps them from being fused
   std::uint64_t tiles_built = 0;    // of any level, since the service began
+  double building_s = 0.0;          // that it took, all workers together
   std::uint64_t kept_bytes = 0;     // surveys kept for the next time, those that are compressed too
   std::uint64_t kept_disk_bytes = 0;  // and those on disk
   std::uint64_t rss_bytes = 0;
@@ -136,6 +137,7 @@ class AtlasService {
   // Ends every wait, verification and digest, now and from now on, with kUnavailable. The workers
   // go on, and uploads are still taken.
   void EndWaits() { changes_.Close(); }
+  bool is_ending() const { return changes_.is_closed(); }
   // Returns when every upload and pose batch handed over before was reported to its `done`.
   void Flush() { store_.Flush(); }
   // EndWaits(), and the workers finish the tiles at hand and end.

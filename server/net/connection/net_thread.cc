@@ -38,6 +38,7 @@ NetThread::NetThread(RequestHandler& handler,
       limits_(limits),
       options_(options),
       buffer_(kReadBytes),
+      request_lines_(options.max_log_lines_per_s),
       connection_places_(options.max_connections),
       work_(asio::make_work_guard(io_)),
       thread_([this] { Run(); }) {}
@@ -48,8 +49,8 @@ void NetThread::Serve(PeerConnection::Arrival arrival) {
   arrival.place = std::make_shared<Pair>(std::move(arrival.place), connection_places_.Take());
   auto begin = [this, arrival = std::move(arrival)]() mutable {
     const auto connection = std::make_shared<PeerConnection>(
-        std::move(arrival),
-        PeerConnection::Surroundings{handler_, budget_, limits_, buffer_, options_});
+        std::move(arrival), PeerConnection::Surroundings{handler_, budget_, limits_, buffer_,
+                                                         options_, counters_, request_lines_});
     connections_.push_back(connection);
     connection->Start();
   };
@@ -76,6 +77,10 @@ void NetThread::ChangeAccess(std::shared_ptr<const AccessControl> access) {
 
 void NetThread::Drain() {
   ForEach([](PeerConnection& connection) { connection.Drain(); });
+}
+
+void NetThread::Probe(std::function<void()> answer) {
+  asio::post(io_, std::move(answer));
 }
 
 void NetThread::Stop() {

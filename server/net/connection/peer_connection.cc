@@ -18,6 +18,8 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
+constexpr std::size_t kMaxClientBytes = 100;  // of its name that are kept for the log
+
 Status HoldsTooMuch(std::size_t bytes, const std::string& whose) {
   return {StatusCode::kResourceExhausted,
           StrCat("the daemon holds ", bytes, " bytes of requests of ", whose,
@@ -37,7 +39,8 @@ class Completion {
     try {
       std::rethrow_exception(failure);
     } catch (const std::exception& error) {
-      spdlog::error("{}: {} failed: {}", connection_->peer(), what_, error.what());
+      const std::string message = StrCat(what_, " failed: ", error.what());
+      spdlog::error("{}", connection_->peer().Line(message).text());
     }
     connection_->CloseNow();
   }
@@ -57,8 +60,9 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       limits_(surroundings.limits),
       buffer_(surroundings.buffer),
       options_(surroundings.options),
-      peer_(stream_.PeerName()),
-      writer_(stream_, options_),
+      peer_{stream_.PeerName(), "", surroundings.counters, surroundings.lines,
+            options_.slow_request},
+      writer_(stream_, peer_, options_),
       as_peer_(writer_, stream_.executor()),
       decoder_(options_.max_hello_bytes),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
@@ -91,7 +95,7 @@ asio::awaitable<void> PeerConnection::Read() {
   const Status broken = co_await ReadRequests();
   DropUnread();
   if (!broken.ok()) {
-    spdlog::warn("{}: {}", peer_, broken.message());
+    spdlog::warn("{}", peer_.Line(broken.message()).text());
     is_refused_ = true;
     writer_.PushError(0, broken);
   }
@@ -111,11 +115,12 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
       if (!stream_.failure().empty()) {
-        spdlog::warn("{}: TLS: {}", peer_, stream_.failure());
+        spdlog::warn("{}", peer_.Line(StrCat("TLS: ", stream_.failure())).text());
       }
       co_return Status();
     }
     if (came.bytes > 0) {
+      peer_.counters.received_bytes.Add(came.bytes);
       if (Status status = Hold(came.bytes); !status.ok()) {
         co_return status;
       }
@@ -179,12 +184,13 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
 }
 
 PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
+  peer_.client = hello.hello().client_name().substr(0, kMaxClientBytes);
   const Status status = ComeIn(hello);
   is_greeted_ = status.ok();
   is_refused_ = !is_greeted_;
   decoder_.set_max_payload_bytes(options_.max_frame_bytes);
   if (!status.ok()) {
-    spdlog::warn("{}: {}", peer_, status.message());
+    RequestRecord(peer_, hello).End(status);
     writer_.PushError(hello.request_id(), status);
     return std::nullopt;
   }
@@ -231,6 +237,7 @@ asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
 PeerConnection::MaybeAwaited PeerConnection::Answer(wire::Envelope request) {
   ++unpaid_requests_;
   if (const Status denied = CheckMayAsk(identity_, request); !denied.ok()) {
+    RequestRecord(peer_, request).End(denied);
     writer_.PushError(request.request_id(), denied);
     return std::nullopt;
   }
@@ -244,7 +251,8 @@ void PeerConnection::ChangeAccess(std::shared_ptr<const AccessControl> access) {
   }
   const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
   if (!identity) {
-    spdlog::warn("{}: {}, no longer: {}", peer_, identity_.name, identity.error().message());
+    const std::string what = StrCat(identity_.name, ", no longer: ", identity.error().message());
+    spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
     return;
   }
@@ -318,9 +326,10 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
   const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
                            (requests_ == 0 || frame_clock_.is_mid_frame());
   if (is_expected && now >= frame_clock_.deadline()) {
-    spdlog::warn("{}: {}", peer_,
-                 frame_clock_.is_mid_frame() ? "the rest of a frame did not come in time"
-                                             : "nothing came in time");
+    const char* const what = frame_clock_.is_mid_frame()
+                                 ? "the rest of a frame did not come in time"
+                                 : "nothing came in time";
+    spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
   }
 }

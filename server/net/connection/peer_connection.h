@@ -21,6 +21,7 @@
 #include "server/net/connection/frame_clock.h"
 #include "server/net/connection/identity_limits.h"
 #include "server/net/net_options.h"
+#include "server/net/peer_record.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
 #include "server/net/stream/peer_stream.h"
@@ -40,6 +41,8 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
     IdentityLimits& limits;
     std::span<std::uint8_t> buffer;
     const NetOptions& options;
+    NetCounters& counters;  // of its thread, as is the next
+    LineBudget& lines;
   };
 
   // A socket that was accepted, and what it may do.
@@ -65,7 +68,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // From now on these rules hold: closes when the peer may not come in any more.
   void ChangeAccess(std::shared_ptr<const AccessControl> access);
 
-  const std::string& peer() const { return peer_; }
+  const PeerRecord& peer() const { return peer_; }
 
  private:
   enum class Phase {
@@ -107,7 +110,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   IdentityLimits& limits_;
   const std::span<std::uint8_t> buffer_;
   const NetOptions& options_;
-  const std::string peer_;
+  PeerRecord peer_;
   ReplyWriter writer_;
   Peer as_peer_;  // for its requests
   FrameDecoder decoder_;

@@ -13,6 +13,7 @@
 #include "server/net/places.h"
 #include "server/net/requests/peer.h"
 #include "server/net/requests/request_conversion.h"
+#include "server/net/requests/request_record.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
 #include "server/net/requests/wait_places.h"
@@ -57,7 +58,11 @@ class RequestHandler {
 
   boost::asio::awaitable<void> Await(Envelope request, ReplyWriter& out);
   boost::asio::awaitable<void> Watch(Envelope request, Peer& peer);
-  boost::asio::awaitable<void> Resume(SessionKey session, Envelope reply, ReplyWriter& out);
+  boost::asio::awaitable<void> Resume(SessionKey session,
+                                      Envelope reply,
+                                      RequestRecord record,
+                                      ReplyWriter& out);
+  static void Cancel(const Envelope& request, Peer& peer);
   boost::asio::awaitable<void> Upload(Envelope request, Peer& peer);
   boost::asio::awaitable<Status> PutInOrder(const Envelope& request, Peer& peer);
   boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
@@ -69,8 +74,10 @@ class RequestHandler {
   boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
   // False: what is left takes long, or the disk, or the peer does not take it.
-  static bool SyncAtOnce(SyncReply& reply, ReplyWriter& out);
-  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
+  static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);
+  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
+                                    RequestRecord record,
+                                    ReplyWriter& out);
   boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
   boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
