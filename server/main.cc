@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -11,13 +12,18 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
+#include "server/base/log_format.h"
 #include "server/config/daemon_config.h"
+#include "server/config/live_config.h"
+#include "server/hangup_watch.h"
 #include "server/net/tcp_server.h"
+#include "server/operations_port.h"
 #include "server/service/atlas_service.h"
 #include "server/service/process_memory.h"
 #include "server/store/sqlite/sqlite_store.h"
@@ -148,7 +154,70 @@ void Log(LogLevel level, const std::string& message) {
   }
 }
 
-int Serve(const DaemonConfig& config) {
+void SetLog(const DaemonConfig& config) {
+  spdlog::set_level(spdlog::level::from_str(config.log_level));
+  const auto format = LogFormatByName(config.log_format).value_or(LogFormat::kText);
+  spdlog::set_formatter(MakeLogFormatter(format));
+}
+
+Result<LiveConfig::Commit> PrepareLog(const DaemonConfig& config) {
+  return [config] {
+    SetLog(config);
+  };
+}
+
+std::string Joined(const std::vector<std::string>& keys) {
+  std::string text;
+  for (const std::string& key : keys) {
+    text += (text.empty() ? "" : ", ") + key;
+  }
+  return text;
+}
+
+void ReloadConfig(LiveConfig& config) {
+  const Result<LiveConfig::Outcome> outcome = config.Reload();
+  if (!outcome) {
+    spdlog::error("signal 1: the new configuration is refused, the old one stays: {}: {}",
+                  StatusCodeName(outcome.error().code()), outcome.error().message());
+    return;
+  }
+  spdlog::info("signal 1: configuration read again, {} changed",
+               outcome->changed.empty() ? "nothing" : Joined(outcome->changed));
+  if (!outcome->waiting.empty()) {
+    spdlog::warn("signal 1: changes that need a restart: {}", Joined(outcome->waiting));
+  }
+}
+
+// nullopt: it is off.
+Result<std::optional<ListenSocket>> OpenHttpSocket(const DaemonConfig& config) {
+  if (!config.http) {
+    return std::nullopt;
+  }
+  Result<ListenSocket> socket = ListenSocket::Open(config.http->host, config.http->port);
+  if (!socket) {
+    return Error(socket.error());
+  }
+  return std::optional<ListenSocket>(*std::move(socket));
+}
+
+// TLS stays with or without, as it was at the start.
+LiveConfig::Prepare PrepareSecurity(TcpServer& server, bool has_tls) {
+  return [&server, has_tls](const DaemonConfig& config) -> Result<LiveConfig::Commit> {
+    Result<ServerSecurity> security = SecurityFrom(config);
+    if (!security) {
+      return Error(security.error());
+    }
+    if ((security->tls != nullptr) != has_tls) {
+      return Error(StatusCode::kInvalidArgument, "TLS, with it or without, takes a restart");
+    }
+    return [&server, next = *std::move(security)] {
+      server.ChangeSecurity(next);
+    };
+  };
+}
+
+int Serve(LiveConfig& live) {
+  const DaemonConfig config = live.config();
   Result<ServerSecurity> security = SecurityFrom(config);
   if (!security) {
     return Fail(security.error());
@@ -156,6 +225,10 @@ int Serve(const DaemonConfig& config) {
   Result<ListenSocket> socket = ListenSocket::Open(config.host, config.port);
   if (!socket) {
     return Fail(socket.error());
+  }
+  Result<std::optional<ListenSocket>> http_socket = OpenHttpSocket(config);
+  if (!http_socket) {
+    return Fail(http_socket.error().WithContext("http"));
   }
   Result<std::unique_ptr<AtlasStore>> store = OpenStore(config);
   if (!store) {
@@ -165,6 +238,13 @@ int Serve(const DaemonConfig& config) {
   const std::string address = socket->address();
   TcpServer server(service, NetFrom(config), *std::move(socket), *std::move(security));
   std::printf("listening %s\n", address.c_str());
+  std::optional<OperationsPort> operations;
+  if (*http_socket) {
+    std::printf("http %s\n", (*http_socket)->address().c_str());
+    operations.emplace(service, **store, server, **std::move(http_socket));
+  }
+  live.AddPart(PrepareSecurity(server, !config.tls_certificate.empty()));
+  const HangupWatch hangups([&live] { ReloadConfig(live); });
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());
   server.Run();
@@ -175,7 +255,11 @@ int Serve(const DaemonConfig& config) {
 
 int Main(int argc, const char* const* argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("atlasd"));
-  const Result<DaemonCommand> command = ParseDaemonCommand(argc, argv);
+  std::signal(SIGHUP, SIG_IGN);  // until there is something that takes new settings
+  const LiveConfig::Read read = [argc, argv] {
+    return ParseDaemonCommand(argc, argv);
+  };
+  const Result<DaemonCommand> command = read();
   if (!command) {
     return Fail(command.error());
   }
@@ -183,8 +267,10 @@ int Main(int argc, const char* const* argv) {
     std::fputs(command->text->c_str(), stdout);
     return 0;
   }
-  spdlog::set_level(spdlog::level::from_str(command->config.log_level));
-  return Serve(command->config);
+  SetLog(command->config);
+  LiveConfig config(*command, read);
+  config.AddPart(&PrepareLog);
+  return Serve(config);
 }
 
 }  // namespace

@@ -19,7 +19,12 @@
 namespace atlas {
 namespace {
 
-using Settings = std::map<std::string, GivenSetting>;
+using Settings = GivenSettings;
+
+// Who adds one here gives it to a part of LiveConfig.
+constexpr std::string_view kLiveSettings[] = {
+    "access.anonymous", "access.tokens", "log_format", "log_level",
+    "tls.certificate",  "tls.client_ca", "tls.key"};
 
 Status BadValue(const std::string& key, const std::string& text, const char* expected) {
   return Status(StatusCode::kInvalidArgument, StrCat(key, " is '", text, "', expected ", expected));
@@ -38,21 +43,51 @@ Status ApplyData(const std::string& /*key*/, const std::string& text, DaemonConf
   return {};
 }
 
-Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig& config) {
+bool IsLoopback(const std::string& host) {
+  return host == "::1" || host.starts_with("127.");
+}
+
+Result<HostPort> ParseHostPort(const std::string& key, const std::string& text) {
   const std::size_t colon = text.rfind(':');
   const auto port = colon == std::string::npos ? std::nullopt
                                                : ParseNumber<std::uint16_t>(text.substr(colon + 1));
   if (!port) {
-    return BadValue(key, text, "HOST:PORT, the port from 0 to 65535");
+    return Error(BadValue(key, text, "HOST:PORT, the port from 0 to 65535"));
   }
-  config.port = *port;
-  config.host = text.substr(0, colon);
-  if (config.host == "localhost") {
-    config.host = "127.0.0.1";
+  HostPort address{text.substr(0, colon), *port};
+  std::string& host = address.host;
+  if (host == "localhost") {
+    host = "127.0.0.1";
   }
-  if (config.host.size() > 2 && config.host.front() == '[' && config.host.back() == ']') {
-    config.host = config.host.substr(1, config.host.size() - 2);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
   }
+  return address;
+}
+
+Status ApplyHttp(const std::string& key, const std::string& text, DaemonConfig& config) {
+  config.http.reset();
+  if (text.empty()) {
+    return {};
+  }
+  const Result<HostPort> address = ParseHostPort(key, text);
+  if (!address) {
+    return address.error();
+  }
+  if (!IsLoopback(address->host)) {
+    return BadValue(key, text, "a loopback address: whoever reaches it sees how the daemon fares");
+  }
+  config.http = *address;
+  return {};
+}
+
+Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig& config) {
+  const Result<HostPort> address = ParseHostPort(key, text);
+  if (!address) {
+    return address.error();
+  }
+  config.host = address->host;
+  config.port = address->port;
   return {};
 }
 
@@ -126,6 +161,14 @@ Status CheckSecurity(const DaemonConfig& config) {
   return {};
 }
 
+Status ApplyLogFormat(const std::string& key, const std::string& text, DaemonConfig& config) {
+  if (text != "text" && text != "json") {
+    return BadValue(key, text, "text or json");
+  }
+  config.log_format = text;
+  return {};
+}
+
 Status ApplyPreset(const std::string& /*key*/, const std::string& text, DaemonConfig& config) {
   if (!FusionPresetByName(text)) {
     return BadValue("preset", text, "strict, bounded or paper");
@@ -176,6 +219,10 @@ constexpr Setting kSettings[] = {
      SettingType::kNumber, &ApplyCountTo<&DaemonConfig::reply_mib, 0, 65'536>},
     {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error",
      SettingType::kText, &ApplyLogLevel},
+    {"log_format", "--log-format", "ATLASD_LOG_FORMAT", "NAME", "text, or json: an object a line",
+     SettingType::kText, &ApplyLogFormat},
+    {"http", "--http", "ATLASD_HTTP", "HOST:PORT",
+     "health and metrics, loopback only; port 0 takes a free one", SettingType::kText, &ApplyHttp},
     {"tls.certificate", "--tls-certificate", "ATLASD_TLS_CERTIFICATE", "FILE",
      "PEM: the daemon's certificate and those above it; speak TLS 1.3 alone", SettingType::kText,
      &ApplyFile<&DaemonConfig::tls_certificate>},
@@ -215,6 +262,8 @@ std::map<std::string, std::string> Defaults() {
           {"survey_disk_mib", StrCat(config.survey_disk_mib)},
           {"reply_mib", StrCat(config.reply_mib)},
           {"log_level", config.log_level},
+          {"log_format", config.log_format},
+          {"http", "off"},
           {"tls.certificate", "none"},
           {"tls.key", "none"},
           {"tls.client_ca", "none"},
@@ -263,12 +312,35 @@ Result<Settings> Collect(const Settings& flags, const std::string& file) {
 }  // namespace
 
 bool DaemonConfig::is_loopback() const {
-  return host == "::1" || host.starts_with("127.");
+  return IsLoopback(host);
 }
 
 std::string DaemonConfig::AnonymousRole() const {
   const bool is_private = is_loopback() && tls_client_ca.empty() && tokens.empty();
   return anonymous.value_or(is_private ? "admin" : "none");
+}
+
+Result<DaemonConfig> ConfigFrom(const GivenSettings& given) {
+  DaemonConfig config;
+  for (const auto& [key, setting] : given) {
+    if (Status status = Apply(key, setting.text, config); !status.ok()) {
+      return Error(status.WithContext(setting.origin));
+    }
+  }
+  if (const auto listen = given.find("listen"); listen != given.end()) {
+    if (Status status = CheckListen(config, listen->second); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  if (Status status = CheckSecurity(config); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return config;
+}
+
+bool IsLiveSetting(const std::string& key) {
+  return std::find(std::begin(kLiveSettings), std::end(kLiveSettings), key) !=
+         std::end(kLiveSettings);
 }
 
 Result<MapProfile> DaemonConfig::NewProfile() const {
@@ -351,25 +423,18 @@ Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     return Error(StatusCode::kInvalidArgument, error.what());
   }
-  const Result<Settings> settings = Collect(flags, file);
+  Result<Settings> settings = Collect(flags, file);
   if (!settings) {
     return Error(settings.error());
   }
-  for (const auto& [key, given] : *settings) {
-    if (Status status = Apply(key, given.text, command.config); !status.ok()) {
-      return Error(status.WithContext(given.origin));
-    }
+  Result<DaemonConfig> config = ConfigFrom(*settings);
+  if (!config) {
+    return Error(config.error());
   }
+  command.config = *std::move(config);
+  command.given = *std::move(settings);
   if (command.config.data.empty()) {
     return Error(StatusCode::kInvalidArgument, "--data DIR is required");
-  }
-  if (const auto listen = settings->find("listen"); listen != settings->end()) {
-    if (Status status = CheckListen(command.config, listen->second); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  if (Status status = CheckSecurity(command.config); !status.ok()) {
-    return Error(std::move(status));
   }
   return command;
 }

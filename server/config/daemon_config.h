@@ -3,14 +3,23 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
 
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
+#include "server/config/config_file.h"
 
 namespace atlas {
+
+struct HostPort {
+  std::string host;
+  std::uint16_t port = 0;
+
+  friend bool operator==(const HostPort&, const HostPort&) = default;
+};
 
 struct DaemonConfig {
   std::filesystem::path data;  // required
@@ -23,6 +32,8 @@ struct DaemonConfig {
   int survey_disk_mib = 4096;  // the same on disk; 0: nothing
   int reply_mib = 64;          // tiles ready to be sent
   std::string log_level = "info";
+  std::string log_format = "text";
+  std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.
   std::filesystem::path tls_certificate;
@@ -47,11 +58,21 @@ struct DaemonConfig {
   Result<MapProfile> NewProfile() const;
   // kInvalidData naming the first map option given that differs from `existing`.
   Status CheckAgainst(const MapProfile& existing) const;
+
+  friend bool operator==(const DaemonConfig&, const DaemonConfig&) = default;
 };
+
+using GivenSettings = std::map<std::string, GivenSetting>;  // by key in the file
+
+// kInvalidArgument names where the value was given. What is not given has its default.
+Result<DaemonConfig> ConfigFrom(const GivenSettings& given);
+// It takes effect while the daemon runs; others need a restart.
+bool IsLiveSetting(const std::string& key);
 
 // What the command line asks for: to run with a configuration, or to print a text and end.
 struct DaemonCommand {
   DaemonConfig config;
+  GivenSettings given;              // that it is made of
   std::optional<std::string> text;  // of --help or --version
 };
 

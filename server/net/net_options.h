@@ -19,10 +19,15 @@ struct NetOptions {
   std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection
   std::size_t max_held_bytes = 512u << 20;     // requests and parts of them, all connections
   std::size_t tile_frame_bytes = 64u << 20;    // tiles ready to be sent, all connections
-  std::size_t max_watches = 1024;              // all connections
-  std::size_t max_waits = 16;                  // waits, digests, verifications, all connections
-  int service_threads = 4;                     // that may block on the disk
-  int reading_threads = 2;                     // for digests and verifications, which read all
+  // Of one name, on all its connections; 0: no limit to a rate.
+  std::size_t identity_connections = 64;
+  std::size_t identity_held_bytes = 128u << 20;
+  double identity_requests_per_s = 1'000;
+  double identity_bytes_per_s = 64u << 20;
+  std::size_t max_watches = 1024;  // all connections
+  std::size_t max_waits = 16;      // waits, digests, verifications, all connections
+  int service_threads = 4;         // that may block on the disk
+  int reading_threads = 2;         // for digests and verifications, which read all
   std::chrono::milliseconds handshake{5'000};
   std::chrono::milliseconds idle{3'600'000};  // between two frames
   std::chrono::milliseconds frame{30'000};    // from a frame's first byte to its last, and besides
@@ -30,6 +35,8 @@ struct NetOptions {
   std::chrono::milliseconds write_stall{30'000};  // without a byte taken by the peer
   std::chrono::milliseconds linger{1'000};        // for a refused peer that still sends to read why
   std::chrono::milliseconds drain{10'000};        // for requests in flight at shutdown
+  std::chrono::milliseconds slow_request{1'000};  // from here on the log has it, unless it waits
+  std::uint64_t max_log_lines_per_s = 20;         // about requests, a thread; others are counted
 };
 
 }  // namespace atlas

@@ -58,11 +58,13 @@ class TcpServer::Impl {
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
         budget_(options.max_held_bytes),
+        limits_(options_),
         places_(options.max_connections),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
         signals_(io_, SIGTERM, SIGINT) {
+    std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to peers that are gone, too
     for (int i = 0; i < options.threads; ++i) {
-      threads_.push_back(std::make_unique<NetThread>(handler_, budget_, options_));
+      threads_.push_back(std::make_unique<NetThread>(handler_, budget_, limits_, options_));
     }
   }
   Impl(const Impl&) = delete;
@@ -104,6 +106,21 @@ class TcpServer::Impl {
         thread->ChangeAccess(security_.access);
       }
     });
+  }
+
+  NetFigures ReadFigures() const {
+    NetFigures figures;
+    figures.connections = places_.taken();
+    figures.refused = refused_.value();
+    figures.held_bytes = budget_.taken_bytes();
+    for (const auto& thread : threads_) {
+      thread->counters().AddTo(figures);
+    }
+    return figures;
+  }
+  std::size_t threads() const { return threads_.size(); }
+  void Probe(std::size_t thread, std::function<void()> answer) {
+    threads_.at(thread)->Probe(std::move(answer));
   }
 
  private:
@@ -157,12 +174,12 @@ class TcpServer::Impl {
 
   // One line a second, however many come.
   void NoteRefusal() {
-    ++refused_;
+    refused_.Add();
     const auto now = std::chrono::steady_clock::now();
     if (now - refusal_noted_at_ < std::chrono::seconds(1)) {
       return;
     }
-    spdlog::warn("connections refused: {} by now, {} are open", refused_, places_.taken());
+    spdlog::warn("connections refused: {} by now, {} are open", refused_.value(), places_.taken());
     refusal_noted_at_ = now;
   }
 
@@ -218,12 +235,13 @@ class TcpServer::Impl {
   asio::thread_pool reading_pool_;
   RequestHandler handler_;
   ByteBudget budget_;
+  IdentityLimits limits_;
   Places places_;  // of connections
   std::vector<std::unique_ptr<NetThread>> threads_;
   asio::io_context io_{1};  // what accepts; after what its coroutines refer to
   tcp::acceptor acceptor_;
   asio::signal_set signals_;
-  std::uint64_t refused_ = 0;  // connections
+  ThreadCounter refused_;  // connections
   std::chrono::steady_clock::time_point refusal_noted_at_;
   std::unique_ptr<asio::steady_timer> drain_limit_;
 };
@@ -243,6 +261,15 @@ void TcpServer::Stop() {
 }
 void TcpServer::ChangeSecurity(ServerSecurity security) {
   impl_->ChangeSecurity(std::move(security));
+}
+NetFigures TcpServer::ReadFigures() const {
+  return impl_->ReadFigures();
+}
+std::size_t TcpServer::threads() const {
+  return impl_->threads();
+}
+void TcpServer::Probe(std::size_t thread, std::function<void()> answer) {
+  impl_->Probe(thread, std::move(answer));
 }
 
 }  // namespace atlas

@@ -60,13 +60,21 @@ void AtlasService::Stop() {
   fusion_.Stop();
 }
 
+Result<NewKeyframe> AtlasService::CheckUpload(UploadRequest request) const {
+  return atlas::CheckUpload(std::move(request), identity().profile, clock_());
+}
+
+void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done) {
+  store_.PutKeyframe(std::move(keyframe), Notifying(changes_, std::move(done)));
+}
+
 void AtlasService::Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done) {
-  auto keyframe = CheckUpload(std::move(request), identity().profile, clock_());
+  auto keyframe = CheckUpload(std::move(request));
   if (!keyframe) {
     done(Error(keyframe.error()));
     return;
   }
-  store_.PutKeyframe(std::move(*keyframe), Notifying(changes_, std::move(done)));
+  PutKeyframe(*std::move(keyframe), std::move(done));
 }
 
 void AtlasService::UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done) {
@@ -272,6 +280,7 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
   return ServiceStatus{*counts,
                        fusion_.damage().size(),
                        fusion_.tiles_built(),
+                       fusion_.building_s(),
                        fusion_.kept_bytes(),
                        fusion_.kept_disk_bytes(),
                        ResidentBytes()};

@@ -49,6 +49,7 @@ struct ServiceStatus {
   StoreCounts counts;
   std::uint64_t damaged_tiles = 0;  // dirty, and damage keeps them from being fused
   std::uint64_t tiles_built = 0;    // of any level, since the service began
+  double building_s = 0.0;          // that it took, all workers together
   std::uint64_t kept_bytes = 0;     // surveys kept for the next time, those that are compressed too
   std::uint64_t kept_disk_bytes = 0;  // and those on disk
   std::uint64_t rss_bytes = 0;
@@ -77,7 +78,11 @@ class AtlasService {
   const AtlasIdentity& identity() const { return store_.identity(); }
   std::int64_t NowMs() const { return clock_(); }  // since 1970
 
-  // Checked on the calling thread; `done` is called once it is on disk, or refused.
+  // In two steps: the check takes its time, the other never blocks. `done` is called once it is on
+  // disk, or refused.
+  Result<NewKeyframe> CheckUpload(UploadRequest request) const;
+  void PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done);
+  // Both. Checked on the calling thread.
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
   void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
@@ -107,6 +112,10 @@ class AtlasService {
 
   Result<ServiceStatus> ReadStatus();
   Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
+  // nullopt: unknown.
+  Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) {
+    return store_.FindSession(key);
+  }
   // Of the last change on disk; never blocks.
   std::uint64_t revision() const { return store_.revision(); }
 
@@ -128,6 +137,7 @@ class AtlasService {
   // Ends every wait, verification and digest, now and from now on, with kUnavailable. The workers
   // go on, and uploads are still taken.
   void EndWaits() { changes_.Close(); }
+  bool is_ending() const { return changes_.is_closed(); }
   // Returns when every upload and pose batch handed over before was reported to its `done`.
   void Flush() { store_.Flush(); }
   // EndWaits(), and the workers finish the tiles at hand and end.

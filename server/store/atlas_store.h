@@ -16,6 +16,7 @@
 #include "server/store/compaction_types.h"
 #include "server/store/store_types.h"
 #include "server/store/tile_index.h"
+#include "server/store/write_figures.h"
 
 namespace atlas {
 
@@ -64,6 +65,13 @@ class AtlasStore : public TileIndex {
   virtual void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) = 0;
   // Marks tiles to be built again, e.g. one that was found damaged. The value: marks set.
   virtual void MarkDirty(std::vector<TileId> ids, Done<std::uint32_t> done) = 0;
+
+  enum class ProbeDepth { kQueue, kDisk };
+  // Goes the way of a write and changes nothing: `done` tells that the queue moves and, with kDisk,
+  // that the disk takes what is written.
+  virtual void Probe(ProbeDepth depth, Done<bool> done) = 0;
+  // Since the store was opened; never blocks for long.
+  virtual WriteFigures ReadWriteFigures() const = 0;
   // Returns when every write queued before it is done and has been reported.
   virtual void Flush() = 0;
 
@@ -104,6 +112,8 @@ class AtlasStore : public TileIndex {
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
   virtual Result<std::vector<SessionRecord>> ListSessions() = 0;
+  // nullopt: unknown.
+  virtual Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) = 0;
   // Verifies every checksum of a session's history and of what is left of its dropped keyframes.
   virtual Status CheckSession(const SessionKey& key) = 0;
   // Verifies every compaction's checksum, and that it left as many tombstones as it dropped

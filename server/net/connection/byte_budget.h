@@ -26,6 +26,7 @@ class ByteBudget {
     [[maybe_unused]] const std::size_t taken_bytes = taken_bytes_.fetch_sub(bytes);
     assert(bytes <= taken_bytes);
   }
+  std::size_t taken_bytes() const { return taken_bytes_.load(); }
 
  private:
   const std::size_t max_bytes_;

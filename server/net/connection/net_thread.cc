@@ -29,11 +29,16 @@ milliseconds LookEvery(const NetOptions& options) {
 
 }  // namespace
 
-NetThread::NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptions& options)
+NetThread::NetThread(RequestHandler& handler,
+                     ByteBudget& budget,
+                     IdentityLimits& limits,
+                     const NetOptions& options)
     : handler_(handler),
       budget_(budget),
+      limits_(limits),
       options_(options),
       buffer_(kReadBytes),
+      request_lines_(options.max_log_lines_per_s),
       connection_places_(options.max_connections),
       work_(asio::make_work_guard(io_)),
       thread_([this] { Run(); }) {}
@@ -44,7 +49,8 @@ void NetThread::Serve(PeerConnection::Arrival arrival) {
   arrival.place = std::make_shared<Pair>(std::move(arrival.place), connection_places_.Take());
   auto begin = [this, arrival = std::move(arrival)]() mutable {
     const auto connection = std::make_shared<PeerConnection>(
-        std::move(arrival), PeerConnection::Surroundings{handler_, budget_, buffer_, options_});
+        std::move(arrival), PeerConnection::Surroundings{handler_, budget_, limits_, buffer_,
+                                                         options_, counters_, request_lines_});
     connections_.push_back(connection);
     connection->Start();
   };
@@ -71,6 +77,10 @@ void NetThread::ChangeAccess(std::shared_ptr<const AccessControl> access) {
 
 void NetThread::Drain() {
   ForEach([](PeerConnection& connection) { connection.Drain(); });
+}
+
+void NetThread::Probe(std::function<void()> answer) {
+  asio::post(io_, std::move(answer));
 }
 
 void NetThread::Stop() {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -16,6 +17,7 @@
 
 #include "server/net/connection/byte_budget.h"
 #include "server/net/connection/peer_connection.h"
+#include "server/net/net_counters.h"
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
@@ -25,7 +27,10 @@ namespace atlas {
 class NetThread {
  public:
   // All outlive this. Runs from the start.
-  NetThread(RequestHandler& handler, ByteBudget& budget, const NetOptions& options);
+  NetThread(RequestHandler& handler,
+            ByteBudget& budget,
+            IdentityLimits& limits,
+            const NetOptions& options);
   NetThread(const NetThread&) = delete;
   NetThread& operator=(const NetThread&) = delete;
   ~NetThread() { Stop(); }
@@ -33,6 +38,7 @@ class NetThread {
   // For the sockets of its connections.
   boost::asio::io_context& io() { return io_; }
   std::size_t connections() const { return connection_places_.taken(); }
+  const NetCounters& counters() const { return counters_; }
 
   // From any thread: begins a connection.
   void Serve(PeerConnection::Arrival arrival);
@@ -40,6 +46,8 @@ class NetThread {
   void ChangeAccess(std::shared_ptr<const AccessControl> access);
   // From any thread: connections end when they have answered what they have read.
   void Drain();
+  // From any thread: calls `answer` on this one.
+  void Probe(std::function<void()> answer);
   // Connections that are left are cut.
   void Stop();
 
@@ -51,8 +59,11 @@ class NetThread {
 
   RequestHandler& handler_;
   ByteBudget& budget_;
+  IdentityLimits& limits_;
   const NetOptions& options_;
   std::vector<std::uint8_t> buffer_;
+  NetCounters counters_;
+  LineBudget request_lines_;  // of the log
   Places connection_places_;
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;

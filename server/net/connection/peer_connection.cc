@@ -18,6 +18,14 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
+constexpr std::size_t kMaxClientBytes = 100;  // of its name that are kept for the log
+
+Status HoldsTooMuch(std::size_t bytes, const std::string& whose) {
+  return {StatusCode::kResourceExhausted,
+          StrCat("the daemon holds ", bytes, " bytes of requests of ", whose,
+                 " already; try again later")};
+}
+
 // The one place where what escapes a coroutine is caught. It keeps the connection alive until then.
 class Completion {
  public:
@@ -31,7 +39,8 @@ class Completion {
     try {
       std::rethrow_exception(failure);
     } catch (const std::exception& error) {
-      spdlog::error("{}: {} failed: {}", connection_->peer(), what_, error.what());
+      const std::string message = StrCat(what_, " failed: ", error.what());
+      spdlog::error("{}", connection_->peer().Line(message).text());
     }
     connection_->CloseNow();
   }
@@ -48,15 +57,18 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       place_(std::move(arrival.place)),
       handler_(surroundings.handler),
       budget_(surroundings.budget),
+      limits_(surroundings.limits),
       buffer_(surroundings.buffer),
       options_(surroundings.options),
-      peer_(stream_.PeerName()),
-      writer_(stream_, options_),
-      as_peer_(writer_),
+      peer_{stream_.PeerName(), "", surroundings.counters, surroundings.lines,
+            options_.slow_request},
+      writer_(stream_, peer_, options_),
+      as_peer_(writer_, stream_.executor()),
       decoder_(options_.max_hello_bytes),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
-      access_(std::move(arrival.access)) {}
+      access_(std::move(arrival.access)),
+      rate_pause_(stream_.executor()) {}
 
 void PeerConnection::Start() {
   const auto self = shared_from_this();
@@ -67,20 +79,23 @@ void PeerConnection::Start() {
 void PeerConnection::Drain() {
   is_draining_ = true;
   stop_reading_.emit(asio::cancellation_type::terminal);
+  rate_pause_.cancel();
 }
 
 void PeerConnection::CloseNow() {
   phase_ = Phase::kClosed;
   place_.reset();  // before the peer can see it
+  own_place_.reset();
   writer_.CloseNow();
   changed_.cancel();
+  rate_pause_.cancel();
 }
 
 asio::awaitable<void> PeerConnection::Read() {
   const Status broken = co_await ReadRequests();
   DropUnread();
   if (!broken.ok()) {
-    spdlog::warn("{}: {}", peer_, broken.message());
+    spdlog::warn("{}", peer_.Line(broken.message()).text());
     is_refused_ = true;
     writer_.PushError(0, broken);
   }
@@ -100,11 +115,12 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
       if (!stream_.failure().empty()) {
-        spdlog::warn("{}: TLS: {}", peer_, stream_.failure());
+        spdlog::warn("{}", peer_.Line(StrCat("TLS: ", stream_.failure())).text());
       }
       co_return Status();
     }
     if (came.bytes > 0) {
+      peer_.counters.received_bytes.Add(came.bytes);
       if (Status status = Hold(came.bytes); !status.ok()) {
         co_return status;
       }
@@ -114,6 +130,9 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
         co_return status;
       }
       writer_.Flush();
+      if (allowance_ != nullptr) {
+        co_await KeepToRate(came.bytes);
+      }
     }
     if (came.is_blocked && !is_draining_ && !is_refused_) {
       co_await stream_.WaitUntilReadable(stop_reading_.slot());
@@ -152,19 +171,7 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
   if (!envelope) {
     return envelope.error();
   }
-  if (!is_greeted_) {
-    is_greeted_ = Greet(*envelope);
-    is_refused_ = !is_greeted_;
-    decoder_.set_max_payload_bytes(options_.max_frame_bytes);
-    Release(frame_bytes);
-    return {};
-  }
-  if (const Status denied = CheckMayAsk(identity_, *envelope); !denied.ok()) {
-    writer_.PushError(envelope->request_id(), denied);
-    Release(frame_bytes);
-    return {};
-  }
-  auto rest = handler_.Handle(*std::move(envelope), as_peer_);
+  auto rest = is_greeted_ ? Answer(*std::move(envelope)) : Greet(*std::move(envelope));
   if (!rest) {
     Release(frame_bytes);
     return {};
@@ -176,16 +183,65 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
   return {};
 }
 
-bool PeerConnection::Greet(const wire::Envelope& hello) {
+PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
+  peer_.client = hello.hello().client_name().substr(0, kMaxClientBytes);
+  const Status status = ComeIn(hello);
+  is_greeted_ = status.ok();
+  is_refused_ = !is_greeted_;
+  decoder_.set_max_payload_bytes(options_.max_frame_bytes);
+  if (!status.ok()) {
+    RequestRecord(peer_, hello).End(status);
+    writer_.PushError(hello.request_id(), status);
+    return std::nullopt;
+  }
+  return handler_.Greet(std::move(hello), identity_, writer_);
+}
+
+Status PeerConnection::ComeIn(const wire::Envelope& hello) {
   credentials_ = Credentials::Of(stream_.certificate(), hello.hello().token());
   const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
   if (!identity) {
-    spdlog::warn("{}: {}", peer_, identity.error().message());
-    writer_.PushError(hello.request_id(), identity.error());
-    return false;
+    return identity.error();
   }
+  ATLAS_RETURN_IF_ERROR(handler_.CheckGreeting(hello));
   identity_ = *identity;
-  return handler_.Greet(hello, identity_, writer_);
+  if (identity_.name.empty()) {
+    return {};
+  }
+  const auto allowance = limits_.Of(identity_.name);
+  own_place_ = allowance->TakeConnection();
+  if (own_place_ == nullptr) {
+    return {StatusCode::kUnavailable, StrCat(options_.identity_connections, " connections of ",
+                                             identity_.name, " are open already; try again later")};
+  }
+  if (!allowance->held().Take(held_bytes_)) {
+    return HoldsTooMuch(options_.identity_held_bytes, identity_.name);
+  }
+  allowance_ = allowance;
+  return {};
+}
+
+asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
+  const auto pause = allowance_->Charge(std::exchange(unpaid_requests_, 0), bytes, Clock::now());
+  if (pause == Clock::duration::zero() || is_draining_ || writer_.is_closed()) {
+    co_return;
+  }
+  is_held_up_ = true;
+  rate_pause_.expires_after(pause);
+  error_code ignored;  // the time is over, or so is the connection
+  co_await rate_pause_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+  is_held_up_ = false;
+  frame_clock_.Restart(Clock::now(), decoder_.pending_bytes());
+}
+
+PeerConnection::MaybeAwaited PeerConnection::Answer(wire::Envelope request) {
+  ++unpaid_requests_;
+  if (const Status denied = CheckMayAsk(identity_, request); !denied.ok()) {
+    RequestRecord(peer_, request).End(denied);
+    writer_.PushError(request.request_id(), denied);
+    return std::nullopt;
+  }
+  return handler_.Handle(std::move(request), as_peer_);
 }
 
 void PeerConnection::ChangeAccess(std::shared_ptr<const AccessControl> access) {
@@ -195,7 +251,8 @@ void PeerConnection::ChangeAccess(std::shared_ptr<const AccessControl> access) {
   }
   const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
   if (!identity) {
-    spdlog::warn("{}: {}, no longer: {}", peer_, identity_.name, identity.error().message());
+    const std::string what = StrCat(identity_.name, ", no longer: ", identity.error().message());
+    spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
     return;
   }
@@ -269,18 +326,21 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
   const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
                            (requests_ == 0 || frame_clock_.is_mid_frame());
   if (is_expected && now >= frame_clock_.deadline()) {
-    spdlog::warn("{}: {}", peer_,
-                 frame_clock_.is_mid_frame() ? "the rest of a frame did not come in time"
-                                             : "nothing came in time");
+    const char* const what = frame_clock_.is_mid_frame()
+                                 ? "the rest of a frame did not come in time"
+                                 : "nothing came in time";
+    spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
   }
 }
 
 Status PeerConnection::Hold(std::size_t bytes) {
   if (!budget_.Take(bytes)) {
-    return Status(StatusCode::kResourceExhausted,
-                  StrCat("the daemon holds ", options_.max_held_bytes,
-                         " bytes of requests already; try again later"));
+    return HoldsTooMuch(options_.max_held_bytes, "all");
+  }
+  if (allowance_ != nullptr && !allowance_->held().Take(bytes)) {
+    budget_.GiveBack(bytes);
+    return HoldsTooMuch(options_.identity_held_bytes, identity_.name);
   }
   held_bytes_ += bytes;
   return {};
@@ -288,6 +348,9 @@ Status PeerConnection::Hold(std::size_t bytes) {
 
 void PeerConnection::Release(std::size_t bytes) {
   budget_.GiveBack(bytes);
+  if (allowance_ != nullptr) {
+    allowance_->held().GiveBack(bytes);
+  }
   held_bytes_ -= bytes;
 }
 

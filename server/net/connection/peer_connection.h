@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -18,7 +19,9 @@
 #include "server/net/access/access_control.h"
 #include "server/net/connection/byte_budget.h"
 #include "server/net/connection/frame_clock.h"
+#include "server/net/connection/identity_limits.h"
 #include "server/net/net_options.h"
+#include "server/net/peer_record.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
 #include "server/net/stream/peer_stream.h"
@@ -35,8 +38,11 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   struct Surroundings {
     RequestHandler& handler;
     ByteBudget& budget;
+    IdentityLimits& limits;
     std::span<std::uint8_t> buffer;
     const NetOptions& options;
+    NetCounters& counters;  // of its thread, as is the next
+    LineBudget& lines;
   };
 
   // A socket that was accepted, and what it may do.
@@ -50,7 +56,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   PeerConnection(Arrival arrival, const Surroundings& surroundings);
   PeerConnection(const PeerConnection&) = delete;
   PeerConnection& operator=(const PeerConnection&) = delete;
-  ~PeerConnection() { budget_.GiveBack(held_bytes_); }
+  ~PeerConnection() { Release(held_bytes_); }
 
   // Spawns the coroutines; they keep the connection alive until the peer or Drain() ends it.
   void Start();
@@ -62,7 +68,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // From now on these rules hold: closes when the peer may not come in any more.
   void ChangeAccess(std::shared_ptr<const AccessControl> access);
 
-  const std::string& peer() const { return peer_; }
+  const PeerRecord& peer() const { return peer_; }
 
  private:
   enum class Phase {
@@ -79,13 +85,19 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // The requests of which all bytes have come.
   boost::asio::awaitable<Status> TakeRequests();
   Status TakeRequest(ByteSpan payload);
-  // False: it may not come in.
-  bool Greet(const wire::Envelope& hello);
+  // What is left to be awaited of the reply.
+  using MaybeAwaited = std::optional<boost::asio::awaitable<void>>;
+  MaybeAwaited Greet(wire::Envelope hello);
+  MaybeAwaited Answer(wire::Envelope request);
   bool HasRoom() const;
   boost::asio::awaitable<void> WaitForRoom();
   // Reads on and drops what comes: closing a socket with unread bytes resets it, and the peer would
   // lose the replies that are still under way.
   boost::asio::awaitable<void> Linger();
+  // Whom it is, within what one may have.
+  Status ComeIn(const wire::Envelope& hello);
+  // As long as its name has sent too much.
+  boost::asio::awaitable<void> KeepToRate(std::size_t bytes);
   Status Hold(std::size_t bytes);
   void Release(std::size_t bytes);
   void DropUnread();
@@ -95,9 +107,10 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   Places::Place place_;
   RequestHandler& handler_;
   ByteBudget& budget_;
+  IdentityLimits& limits_;
   const std::span<std::uint8_t> buffer_;
   const NetOptions& options_;
-  const std::string peer_;
+  PeerRecord peer_;
   ReplyWriter writer_;
   Peer as_peer_;  // for its requests
   FrameDecoder decoder_;
@@ -107,8 +120,12 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   FrameClock frame_clock_;             // of what the peer owes next
   Clock::time_point linger_until_;
   std::shared_ptr<const AccessControl> access_;
-  Credentials credentials_;  // that it showed
-  Identity identity_;        // from the greeting on
+  Credentials credentials_;                       // that it showed
+  Identity identity_;                             // from the greeting on
+  std::shared_ptr<IdentityAllowance> allowance_;  // of its name, if it has one
+  Places::Place own_place_;                       // of these connections
+  boost::asio::steady_timer rate_pause_;
+  std::size_t unpaid_requests_ = 0;  // that came since the last pause
   std::size_t requests_ = 0;
   std::size_t request_bytes_ = 0;
   Phase phase_ = Phase::kOpen;

@@ -5,15 +5,18 @@
 #include <cstdint>
 #include <map>
 #include <stop_token>
+#include <utility>
 
+#include "server/net/requests/upload_order.h"
 #include "server/net/stream/reply_writer.h"
 
 namespace atlas {
 
 class Peer {
  public:
-  // `writer` outlives this.
-  explicit Peer(ReplyWriter& writer) : out(writer) {}
+  // `writer` outlives this; all on `executor`.
+  Peer(ReplyWriter& writer, boost::asio::any_io_executor executor)
+      : out(writer), uploads(std::move(executor)) {}
 
   // Fewer than a connection may have requests in flight: a peer can always say "cancel".
   static constexpr std::size_t kMaxCancellable = 16;
@@ -33,6 +36,7 @@ class Peer {
   }
 
   ReplyWriter& out;
+  UploadOrder uploads;
 
  private:
   std::map<std::uint64_t, std::stop_source> cancellable_;

@@ -22,14 +22,11 @@ constexpr std::size_t kBytesAtOnce = 1u << 20;  // of a reply, then it is the ot
 
 }  // namespace
 
-bool RequestHandler::Greet(const Envelope& request,
-                           const Identity& identity,
-                           ReplyWriter& out) const {
+std::optional<asio::awaitable<void>> RequestHandler::Greet(Envelope request,
+                                                           const Identity& identity,
+                                                           ReplyWriter& out) {
+  RequestRecord record(out.peer(), request);
   const AtlasIdentity& atlas = service_.identity();
-  if (const Status status = CheckHello(request, atlas.profile); !status.ok()) {
-    out.PushError(request.request_id(), status);
-    return false;
-  }
   Envelope reply = ReplyTo(request);
   wire::HelloReply& hello = *reply.mutable_hello_reply();
   hello.set_protocol_major(kProtocolMajor);
@@ -41,33 +38,68 @@ bool RequestHandler::Greet(const Envelope& request,
   hello.set_max_frame_bytes(options_.max_frame_bytes);
   hello.set_name(identity.name);
   hello.set_role(std::string(RoleName(identity.role)));
-  out.Push(reply);
-  return true;
+  if (!request.hello().has_resume()) {
+    out.Push(reply);
+    record.End({});
+    return std::nullopt;
+  }
+  const wire::Hello::Session& session = request.hello().resume();
+  return Resume({session.vehicle(), session.session()}, std::move(reply), std::move(record), out);
+}
+
+asio::awaitable<void> RequestHandler::Resume(SessionKey session,
+                                             Envelope reply,
+                                             RequestRecord record,
+                                             ReplyWriter& out) {
+  const Blocking<std::optional<SessionRecord>> find = [this, session] {
+    return service_.FindSession(session);
+  };
+  const Result<std::optional<SessionRecord>> found = co_await OnPool(pool_, find);
+  record.End(found ? Status() : found.error());
+  if (!found) {
+    co_await out.SendError(reply.request_id(), found.error());
+    co_return;
+  }
+  if (*found) {
+    reply.mutable_hello_reply()->set_last_sequence((*found)->last_sequence);
+  }
+  co_await out.Send(std::move(reply));
 }
 
 std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Peer& peer) {
   if (request.has_cancel_request()) {
-    Envelope reply = ReplyTo(request);
-    const bool is_cancelled = peer.Cancel(request.cancel_request().request_id());
-    reply.mutable_cancel_reply()->set_cancelled(is_cancelled);
-    peer.out.Push(reply);
+    Cancel(request, peer);
     return std::nullopt;
   }
   if (request.has_watch_request()) {
     return Watch(std::move(request), peer);
   }
+  if (request.has_upload_keyframe()) {
+    return Upload(std::move(request), peer);
+  }
   if (!request.has_sync_request()) {
     return Await(std::move(request), peer.out);
   }
+  RequestRecord record(peer.out.peer(), request);
   auto reply = std::make_shared<SyncReply>(service_, frames_, std::move(request));
   const bool may_begin = reply->message().wait_revision() == 0;
-  if (may_begin && SyncAtOnce(*reply, peer.out)) {
+  if (may_begin && SyncAtOnce(*reply, record, peer.out)) {
     return std::nullopt;
   }
-  return Sync(std::move(reply), peer.out);
+  return Sync(std::move(reply), std::move(record), peer.out);
+}
+
+void RequestHandler::Cancel(const Envelope& request, Peer& peer) {
+  RequestRecord record(peer.out.peer(), request);
+  Envelope reply = ReplyTo(request);
+  const bool is_cancelled = peer.Cancel(request.cancel_request().request_id());
+  reply.mutable_cancel_reply()->set_cancelled(is_cancelled);
+  peer.out.Push(reply);
+  record.End({});
 }
 
 asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
+  RequestRecord record(peer.out.peer(), request);
   const std::uint64_t id = request.request_id();
   const Places::Place place = watch_places_.Take();
   Status status;
@@ -81,12 +113,17 @@ asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
   } else {
     status = co_await SendWatch(service_, request, peer.cancelled(id), peer.out);
     peer.End(id);
+    const bool is_over = status.code() == StatusCode::kUnavailable;  // as every watch once is
+    record.End(is_over ? Status() : status);
   }
+  record.End(status);
   co_await peer.out.SendError(id, std::move(status));
 }
 
 asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) {
+  RequestRecord record(out.peer(), request);
   Status status = co_await Dispatch(request, out);
+  record.End(status);
   if (!status.ok()) {
     co_await out.SendError(request.request_id(), std::move(status));
   }
@@ -94,8 +131,6 @@ asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) 
 
 asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyWriter& out) {
   switch (request.body_case()) {
-    case Envelope::kUploadKeyframe:
-      return Upload(request, out);
     case Envelope::kUpdatePoses:
       return UpdatePoses(request, out);
     case Envelope::kChangeSession:
@@ -142,18 +177,44 @@ asio::awaitable<Result<T>> RequestHandler::Write(Request request, Writing<Reques
   co_return co_await StartOnPool(pool_, std::move(start));
 }
 
-asio::awaitable<Status> RequestHandler::Upload(const Envelope& request, ReplyWriter& out) {
+asio::awaitable<void> RequestHandler::Upload(Envelope request, Peer& peer) {
+  RequestRecord record(peer.out.peer(), request);
+  Status status = co_await PutInOrder(request, peer);
+  record.End(status);
+  if (!status.ok()) {
+    co_await peer.out.SendError(request.request_id(), std::move(status));
+  }
+}
+
+asio::awaitable<Status> RequestHandler::PutInOrder(const Envelope& request, Peer& peer) {
+  UploadOrder::Turn turn(peer.uploads);
   Result<UploadRequest> upload = UploadFromWire(request.upload_keyframe());
   if (!upload) {
     co_return upload.error();
   }
-  const auto result = co_await Write(*std::move(upload), &AtlasService::Upload);
+  const auto unchecked = std::make_shared<UploadRequest>(*std::move(upload));
+  const Blocking<NewKeyframe> check = [this, unchecked] {
+    return service_.CheckUpload(std::move(*unchecked));
+  };
+  Result<NewKeyframe> keyframe = co_await OnPool(pool_, check);
+  if (!keyframe) {
+    co_return keyframe.error();
+  }
+  co_await turn.Come();
+  const auto executor = co_await asio::this_coro::executor;
+  const auto put = std::make_shared<OneShot<PutKeyframeResult>>(executor);
+  const auto done = [put](Result<PutKeyframeResult> result) {
+    put->Set(std::move(result));
+  };
+  service_.PutKeyframe(*std::move(keyframe), done);
+  turn.Leave();
+  const Result<PutKeyframeResult> result = co_await put->Take();
   if (!result) {
     co_return result.error();
   }
   Envelope reply = ReplyTo(request);
   UploadToWire(*result, *reply.mutable_upload_reply());
-  co_await out.Send(std::move(reply));
+  co_await peer.out.Send(std::move(reply));
   co_return Status();
 }
 
@@ -220,12 +281,13 @@ asio::awaitable<Status> RequestHandler::QueryThePast(const Envelope& request, Re
   co_return co_await SendRegion(service_, reading_pool_, request, *region, out);
 }
 
-bool RequestHandler::SyncAtOnce(SyncReply& reply, ReplyWriter& out) {
+bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out) {
   std::vector<ReplyFrame> frames;
   for (std::size_t bytes = 0; out.has_room() && bytes < kBytesAtOnce;) {
     const Result<SyncReply::Step> step = reply.Next(false, frames);
     if (!step) {
       out.PushError(reply.request_id(), step.error());
+      record.End(step.error());
       return true;
     }
     for (const ReplyFrame& frame : frames) {
@@ -233,15 +295,22 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, ReplyWriter& out) {
       bytes += frame.size();
     }
     frames.clear();
-    if (*step != SyncReply::Step::kMore) {
-      return *step == SyncReply::Step::kDone;
+    if (*step == SyncReply::Step::kDone) {
+      record.End({});
+      return true;
+    }
+    if (*step == SyncReply::Step::kBlocked) {
+      return false;
     }
   }
   return false;
 }
 
-asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out) {
+asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
+                                           RequestRecord record,
+                                           ReplyWriter& out) {
   Status status = co_await WaitAndSync(reply, out);
+  record.End(status);
   if (!status.ok()) {
     co_await out.SendError(reply->request_id(), std::move(status));
   }

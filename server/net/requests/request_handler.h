@@ -12,6 +12,8 @@
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/requests/peer.h"
+#include "server/net/requests/request_conversion.h"
+#include "server/net/requests/request_record.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
 #include "server/net/requests/wait_places.h"
@@ -37,9 +39,14 @@ class RequestHandler {
         frames_(options.tile_frame_bytes) {}
 
   std::int64_t NowMs() const { return service_.NowMs(); }
-  // The first frame of a connection, of a peer that may come in. False when it ends the connection;
-  // the error is then queued.
-  bool Greet(const wire::Envelope& request, const Identity& identity, ReplyWriter& out) const;
+  // Whether the first frame of a connection is a Hello for this atlas.
+  Status CheckGreeting(const wire::Envelope& request) const {
+    return CheckHello(request, service_.identity().profile);
+  }
+  // Its reply, of a peer that may come in; with a session to be resumed it is to be awaited.
+  std::optional<boost::asio::awaitable<void>> Greet(wire::Envelope request,
+                                                    const Identity& identity,
+                                                    ReplyWriter& out);
   // Every later one, which gets its replies, or one error. What can be answered from memory is, at
   // once; else the rest is to be awaited.
   std::optional<boost::asio::awaitable<void>> Handle(wire::Envelope request, Peer& peer);
@@ -51,18 +58,26 @@ class RequestHandler {
 
   boost::asio::awaitable<void> Await(Envelope request, ReplyWriter& out);
   boost::asio::awaitable<void> Watch(Envelope request, Peer& peer);
+  boost::asio::awaitable<void> Resume(SessionKey session,
+                                      Envelope reply,
+                                      RequestRecord record,
+                                      ReplyWriter& out);
+  static void Cancel(const Envelope& request, Peer& peer);
+  boost::asio::awaitable<void> Upload(Envelope request, Peer& peer);
+  boost::asio::awaitable<Status> PutInOrder(const Envelope& request, Peer& peer);
   boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
   template <typename Request, typename T>
   boost::asio::awaitable<Result<T>> Write(Request request, Writing<Request, T> write);
-  boost::asio::awaitable<Status> Upload(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> UpdatePoses(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> ChangeSession(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
   // False: what is left takes long, or the disk, or the peer does not take it.
-  static bool SyncAtOnce(SyncReply& reply, ReplyWriter& out);
-  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
+  static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);
+  boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
+                                    RequestRecord record,
+                                    ReplyWriter& out);
   boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
   boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
   boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);

@@ -19,8 +19,9 @@ constexpr std::size_t kGatheredBytes = 4u << 10;  // small pieces become one up 
 
 }  // namespace
 
-ReplyWriter::ReplyWriter(PeerStream& stream, const NetOptions& options)
+ReplyWriter::ReplyWriter(PeerStream& stream, const PeerRecord& peer, const NetOptions& options)
     : stream_(stream),
+      peer_(peer),
       options_(options),
       changed_(stream.executor(), asio::steady_timer::time_point::max()) {}
 
@@ -72,6 +73,7 @@ void ReplyWriter::Flush() {
     pieces[0] = pieces[0].subspan(sent_bytes_);
     const PeerStream::Moved moved = stream_.Write(std::span(pieces).first(count));
     TakeAway(moved.bytes);
+    peer_.counters.sent_bytes.Add(moved.bytes);
     if (moved.is_closed) {
       CloseNow();
     } else if (moved.is_blocked) {

@@ -15,6 +15,7 @@
 #include "core/base/status.h"
 #include "proto/wire/envelope.h"
 #include "server/net/net_options.h"
+#include "server/net/peer_record.h"
 #include "server/net/stream/peer_stream.h"
 #include "server/net/stream/reply_frame.h"
 
@@ -24,8 +25,11 @@ class ReplyWriter {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // `stream` and `options` outlive this.
-  ReplyWriter(PeerStream& stream, const NetOptions& options);
+  // All outlive this.
+  ReplyWriter(PeerStream& stream, const PeerRecord& peer, const NetOptions& options);
+
+  // To whom it sends.
+  const PeerRecord& peer() const { return peer_; }
 
   // Queues, whether there is room or not, until the next Flush(). Once closed nothing is queued.
   void Push(const ReplyFrame& frame);
@@ -68,6 +72,7 @@ class ReplyWriter {
   void Wake() { changed_.cancel(); }
 
   PeerStream& stream_;
+  const PeerRecord& peer_;
   const NetOptions& options_;
   boost::asio::steady_timer changed_;  // cancelled when what Run() or a waiting reply waits for is
   std::deque<Piece> queue_;

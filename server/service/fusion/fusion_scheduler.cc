@@ -135,6 +135,7 @@ void FusionScheduler::BuildClaims(Worker& worker,
     }
   }
   std::vector<Unfinished> unfinished;
+  const auto begin = std::chrono::steady_clock::now();
   Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
     const TileClaim& claim =
         *std::find_if(claims.begin(), claims.end(), [&](const TileClaim& c) { return c.id == id; });
@@ -150,6 +151,7 @@ void FusionScheduler::BuildClaims(Worker& worker,
                             store_.FinishTile(std::move(tile), std::move(done));
                           })});
   });
+  building_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begin).count();
   for (Unfinished& tile : unfinished) {
     const auto result = tile.result.get();
     if (!result && result.error().code() == StatusCode::kConflict) {

@@ -53,6 +53,8 @@ class FusionScheduler {
   // kept to disk.
   void Stop();
   std::uint64_t tiles_built() const { return tiles_built_; }
+  // That all workers together spent on building, those that failed included.
+  double building_s() const { return 1e-9 * static_cast<double>(building_ns_.load()); }
   std::size_t kept_bytes() const { return refresher_.kept_bytes(); }
   std::size_t kept_disk_bytes() const { return refresher_.kept_disk_bytes(); }
   // Tiles that damage keeps from being fused.
@@ -90,6 +92,7 @@ class FusionScheduler {
   DamageList damage_;
   std::atomic<std::uint64_t> wave_ = 0;
   std::atomic<std::uint64_t> tiles_built_ = 0;
+  std::atomic<std::int64_t> building_ns_ = 0;
   std::vector<std::jthread> threads_;
 };
 

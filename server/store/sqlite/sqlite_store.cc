@@ -109,6 +109,15 @@ class SqliteStore final : public AtlasStore {
     });
   }
 
+  void Probe(ProbeDepth depth, Done<bool> done) override {
+    writes_.SubmitProbe(MakeWrite<bool>(std::move(done), [depth](Connection& connection) {
+      if (depth == ProbeDepth::kDisk) {
+        AddToCounter(connection, Counter::kRevision, 0);
+      }
+      return Result<bool>(true);
+    }));
+  }
+  WriteFigures ReadWriteFigures() const override { return writes_.ReadFigures(); }
   void Flush() override { writes_.Flush(); }
 
   Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override;
@@ -172,6 +181,16 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<std::vector<SessionRecord>>(
         [](Connection& connection) { return ReadSessions(connection); });
   }
+  Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) override {
+    using Found = std::optional<SessionRecord>;
+    return readers_.Run<Found>([&key](Connection& connection) -> Result<Found> {
+      const auto row = atlas::FindSession(connection, key);
+      if (!row) {
+        return Error(row.error());
+      }
+      return *row ? Found((*row)->record) : Found();
+    });
+  }
   Status CheckSession(const SessionKey& key) override {
     return ReadStatus(
         [&key](Connection& connection) { return CheckSessionHistory(connection, key); });
@@ -197,6 +216,10 @@ class SqliteStore final : public AtlasStore {
   // Queues `work`, which returns a Result<T>; `done` gets it once it is on disk.
   template <typename T, typename Work>
   void Write(Done<T> done, Work work) {
+    writes_.Submit(MakeWrite<T>(std::move(done), std::move(work)));
+  }
+  template <typename T, typename Work>
+  static WriteQueue::Operation MakeWrite(Done<T> done, Work work) {
     auto result = std::make_shared<Result<T>>(Error(StatusCode::kInternal, "store: not run"));
     WriteQueue::Operation operation;
     operation.run = [result, work = std::move(work)](Connection& connection) {
@@ -210,7 +233,7 @@ class SqliteStore final : public AtlasStore {
         done(Error(status));
       }
     };
-    writes_.Submit(std::move(operation));
+    return operation;
   }
 
   DataDirectory directory_;  // first in, last out: the lock outlives every connection

@@ -7,6 +7,7 @@ import re
 import shutil
 import sqlite3
 import subprocess
+import time
 
 from harness import NEAR, SMALL, Daemon, Drives
 
@@ -140,19 +141,31 @@ def fill(file):
             pass
 
 
+def ready_again(daemon):
+    """Whether it is, within half a minute."""
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline:
+        if daemon.is_ready()[0]:
+            return True
+    return False
+
+
 def full_disk_case(cases, drives, work):
     with small_disk(work + "/full", "size=8m") as disk:
         if disk is None:
             cases.report.skip("a full disk", "a small file system cannot be mounted here")
             return
-        with Daemon(cases.bin_dir, disk + "/atlas", *SMALL) as daemon:
+        with Daemon(cases.bin_dir, disk + "/atlas", *SMALL, "--http", "127.0.0.1:0") as daemon:
             client = type(cases)(cases.report, cases.bin_dir, daemon.server)
+            cases.report.equal("a disk with room: ready", daemon.is_ready(), (True, "ok\n"))
             client.run("ingest", drives.good, *NEAR, "--range", "0:2")
             before = client.state()
             ballast = pathlib.Path(disk) / "ballast"
             fill(ballast)
             far = ["ingest", drives.good, "--every", "0", "--max-range", "40", "--session", "far"]
             client.refused("ingest on a full disk", far, "resource_exhausted", "vehicle/far/")
+            is_ready, why = daemon.is_ready()
+            cases.report.check("a full disk: not ready", not is_ready and "full" in why, why)
             refuses_to_start(cases, "an atlas on a full disk", disk + "/second", SMALL, 1, "resource_exhausted: ")
             cases.report.check("an atlas on a full disk: nothing half-made",
                                not list(pathlib.Path(disk, "second").glob("atlas.db*")))
@@ -165,6 +178,7 @@ def full_disk_case(cases, drives, work):
             done = client.accepted("a disk with room again", ["ingest", drives.good, *NEAR])
             cases.report.equal("a disk with room again: acked", done.get("acked"), 5)
             client.run("wait")
+            cases.report.check("a disk with room again: ready again", ready_again(daemon))
             cases.report.equal("a disk with room again: verify", client.run("verify", "--rebuild")["damaged"], 0)
 
 

@@ -5,9 +5,11 @@ Usage: security_test.py BIN_DIR DRIVE DAEMON_MD."""
 
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
 from harness import NEAR, SMALL, Daemon, Report  # noqa: E402
@@ -55,6 +57,36 @@ def check_peers(report, shell, documented, drive):
         report.check(name, done.returncode == code and says in done.stderr, (done.returncode, done.stderr))
 
 
+def eventually(is_so):
+    """Within ten seconds: a signal is not a call."""
+    until = time.monotonic() + 10
+    while not is_so():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def check_changes(report, shell, daemon, documented):
+    """Tokens and certificates are read again on SIGHUP; what is of no use changes nothing."""
+    as_car, as_alice = documented[0].split()[4:], documented[1].split()[4:]
+
+    def code(*args):
+        return shell.run("status", *args).returncode
+    tokens = shell.folder / "tokens"
+    before = tokens.read_text(encoding="utf-8")
+    tokens.write_text("alice boss never 00\n", encoding="utf-8")
+    daemon.process.send_signal(signal.SIGHUP)
+    report.check("tokens of no use change nothing", code(*as_alice) == 0)
+    tokens.write_text("# nobody\n", encoding="utf-8")
+    daemon.process.send_signal(signal.SIGHUP)
+    report.check("a token that was taken back opens nothing", eventually(lambda: code(*as_alice) == 1))
+    report.equal("certificates count as before", code(*as_car), 0)
+    tokens.write_text(before, encoding="utf-8")
+    daemon.process.send_signal(signal.SIGHUP)
+    report.check("a token that was given back opens", eventually(lambda: code(*as_alice) == 0))
+
+
 def main():
     bin_dir, drive, daemon_md = (pathlib.Path(arg).resolve() for arg in sys.argv[1:4])
     report = Report()
@@ -71,7 +103,9 @@ def main():
         tls = [folder / word if word.endswith((".pem", ".key")) else word
                for word in flags[flags.index("--tls-certificate"):]]
         with Daemon(bin_dir, folder / "data", *SMALL, *tls, "--tokens", folder / "tokens") as daemon:
-            check_peers(report, Shell(bin_dir, folder, daemon.server), ours[1:], drive)
+            shell = Shell(bin_dir, folder, daemon.server)
+            check_peers(report, shell, ours[1:], drive)
+            check_changes(report, shell, daemon, ours[1:])
     print(f"{report.checks} checks, {report.failed} failed")
     return 1 if report.failed else 0
 

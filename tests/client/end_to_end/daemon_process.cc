@@ -1,10 +1,12 @@
 #include "tests/client/end_to_end/daemon_process.h"
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <stdexcept>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -12,7 +14,20 @@
 namespace atlas {
 namespace {
 
-// The first line that the daemon prints.
+constexpr int kPatience_ms = 30'000;
+
+struct Pipe {
+  int read_fd = -1;
+  int write_fd = -1;
+};
+
+Pipe MakePipe() {
+  std::array<int, 2> fds{};
+  if (pipe2(fds.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+  return {fds[0], fds[1]};
+}
+
+// The next line that the daemon prints; what there is of it when it ends.
 std::string ReadLine(int fd) {
   std::string line;
   char c = 0;
@@ -22,7 +37,13 @@ std::string ReadLine(int fd) {
   return line;
 }
 
-pid_t Spawn(std::vector<std::string> arguments, int stdout_fd) {
+// What comes behind `prefix`; empty: the line is another.
+std::string Rest(const std::string& line, const std::string& prefix) {
+  return line.rfind(prefix, 0) == 0 ? line.substr(prefix.size()) : "";
+}
+
+// A `log_fd` of -1 leaves the test's.
+pid_t Spawn(std::vector<std::string> arguments, int stdout_fd, int log_fd) {
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) {
@@ -32,6 +53,7 @@ pid_t Spawn(std::vector<std::string> arguments, int stdout_fd) {
   posix_spawn_file_actions_t actions{};
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, stdout_fd, STDOUT_FILENO);
+  if (log_fd >= 0) posix_spawn_file_actions_adddup2(&actions, log_fd, STDERR_FILENO);
   pid_t pid = -1;
   const int error = posix_spawn(&pid, argv[0], &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -42,26 +64,49 @@ pid_t Spawn(std::vector<std::string> arguments, int stdout_fd) {
 }  // namespace
 
 DaemonProcess::DaemonProcess(const std::filesystem::path& data,
-                             const std::vector<std::string>& more_flags) {
-  std::array<int, 2> pipe_fds{};
-  if (pipe2(pipe_fds.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+                             const std::vector<std::string>& more_flags,
+                             Log log) {
+  const Pipe out = MakePipe();
+  const Pipe err = log == Log::kKept ? MakePipe() : Pipe();
   std::vector<std::string> arguments = {ATLASD_PATH, "--data", data.string(), "--listen",
                                         "127.0.0.1:0"};
   arguments.insert(arguments.end(), more_flags.begin(), more_flags.end());
-  pid_ = Spawn(std::move(arguments), pipe_fds[1]);
-  close(pipe_fds[1]);
-  const std::string line = ReadLine(pipe_fds[0]);
-  close(pipe_fds[0]);
-  const std::string prefix = "listening ";
-  if (line.rfind(prefix, 0) != 0) {
+  pid_ = Spawn(std::move(arguments), out.write_fd, err.write_fd);
+  close(out.write_fd);
+  if (err.write_fd >= 0) close(err.write_fd);
+  log_fd_ = err.read_fd;
+  const std::string line = ReadLine(out.read_fd);
+  address_ = Rest(line, "listening ");
+  if (std::find(more_flags.begin(), more_flags.end(), "--http") != more_flags.end()) {
+    http_address_ = Rest(ReadLine(out.read_fd), "http ");
+  }
+  close(out.read_fd);
+  if (address_.empty()) {
     Stop(SIGKILL);
     throw std::runtime_error("the daemon printed '" + line + "'");
   }
-  address_ = line.substr(prefix.size());
 }
 
 DaemonProcess::~DaemonProcess() {
   if (pid_ > 0) Stop(SIGKILL);
+  if (log_fd_ >= 0) close(log_fd_);
+}
+
+std::uint16_t DaemonProcess::PortOf(const std::string& address) {
+  return static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
+}
+
+void DaemonProcess::Signal(int signal) const {
+  kill(pid_, signal);
+}
+
+std::string DaemonProcess::ReadLogUntil(const std::string& words) {
+  pollfd waiting{log_fd_, POLLIN, 0};
+  while (poll(&waiting, 1, kPatience_ms) == 1) {
+    std::string line = ReadLine(log_fd_);
+    if (line.empty() || line.find(words) != std::string::npos) return line;
+  }
+  return "";
 }
 
 int DaemonProcess::Stop(int signal) {

@@ -1,6 +1,7 @@
 // A real daemon in a process of its own, on a port of its choice.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -11,8 +12,12 @@ namespace atlas {
 
 class DaemonProcess {
  public:
+  enum class Log { kOfTheTest, kKept };
+
   // Starts it on `data` and waits until it listens. Throws when it does not.
-  DaemonProcess(const std::filesystem::path& data, const std::vector<std::string>& more_flags);
+  DaemonProcess(const std::filesystem::path& data,
+                const std::vector<std::string>& more_flags,
+                Log log = Log::kOfTheTest);
   ~DaemonProcess();
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;
@@ -20,12 +25,23 @@ class DaemonProcess {
   DaemonProcess& operator=(DaemonProcess&&) = delete;
 
   const std::string& address() const { return address_; }
+  std::uint16_t port() const { return PortOf(address_); }
+  // Of the operations port; for a daemon with `--http`.
+  std::uint16_t http_port() const { return PortOf(http_address_); }
+  void Signal(int signal) const;
+  // Reads what a daemon with a kept log says, up to a line that has this in it: that line. Empty
+  // when it says no such thing for half a minute.
+  std::string ReadLogUntil(const std::string& words);
   // Sends SIGTERM (or another signal) and waits; the exit code, or minus the signal that ended it.
   int Stop(int signal);
 
  private:
+  static std::uint16_t PortOf(const std::string& address);
+
   pid_t pid_ = -1;
-  std::string address_;  // HOST:PORT
+  std::string address_;  // HOST:PORT, as is the next
+  std::string http_address_;
+  int log_fd_ = -1;
 };
 
 }  // namespace atlas

@@ -1,5 +1,6 @@
 """What the cases share: a daemon, the command line, a small drive, and checks that are counted."""
 
+import http.client
 import json
 import os
 import pathlib
@@ -56,6 +57,7 @@ class Daemon:
              *flags], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **popen)
         line = self.process.stdout.readline().split()
         self.server = line[1] if line[:1] == ["listening"] else None
+        self.http = self.process.stdout.readline().split()[1] if self.server and "--http" in flags else None
 
     def __enter__(self):
         assert self.server, f"the daemon did not start: {self.process.communicate()[1]}"
@@ -63,6 +65,13 @@ class Daemon:
 
     def __exit__(self, *_):
         self.stop()
+
+    def is_ready(self):
+        """Whether it says so, and what else it says; a daemon with `--http`."""
+        connection = http.client.HTTPConnection(self.http, timeout=30)
+        connection.request("GET", "/readyz")
+        reply = connection.getresponse()
+        return reply.status == 200, reply.read().decode()
 
     def stop(self, how=signal.SIGTERM):
         """Its exit code; what it printed is in `err`."""

@@ -209,6 +209,32 @@ TEST_F(DaemonConfigTest, TablesOfTheFileAreRead) {
               HasSubstr("true or false"));
 }
 
+TEST_F(DaemonConfigTest, TheOperationsPortIsOffUnlessItIsOfLoopback) {
+  EXPECT_EQ(Parse({"--data", "/x"})->config.http, std::nullopt);
+  EXPECT_EQ(Parse({"--data", "/x", "--http", ""})->config.http, std::nullopt);
+  EXPECT_EQ(Parse({"--data", "/x", "--http", "localhost:0"})->config.http,
+            (HostPort{"127.0.0.1", 0}));
+  EXPECT_EQ(Parse({"--data", "/x", "--http", "[::1]:9"})->config.http, (HostPort{"::1", 9}));
+  for (const char* address : {"0.0.0.0:80", "10.0.0.1:80", "[::]:80", "example:80"}) {
+    const auto command = Parse({"--data", "/x", "--http", address});
+    ASSERT_FALSE(command.has_value()) << address;
+    EXPECT_EQ(command.error().code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(command.error().message(),
+                AllOf(HasSubstr("--http"), HasSubstr(address), HasSubstr("loopback")));
+  }
+  EXPECT_THAT(RefusedFile("data = '/x'\nhttp = '10.0.0.1:80'\n"),
+              AllOf(HasSubstr("line 2"), HasSubstr("loopback")));
+  SetVariable("ATLASD_HTTP", "127.0.0.1:70000");
+  EXPECT_THAT(Refusal({"--data", "/x"}), HasSubstr("ATLASD_HTTP: http is '127.0.0.1:70000'"));
+}
+
+TEST_F(DaemonConfigTest, TheLogIsTextOrJson) {
+  EXPECT_EQ(Parse({"--data", "/x"})->config.log_format, "text");
+  EXPECT_EQ(Parse({"--data", "/x", "--log-format", "json"})->config.log_format, "json");
+  EXPECT_THAT(Refusal({"--data", "/x", "--log-format", "xml"}),
+              HasSubstr("--log-format: log_format is 'xml', expected text or json"));
+}
+
 TEST_F(DaemonConfigTest, RefusesValuesThatMakeNoSense) {
   const std::vector<std::vector<std::string>> mistakes = {{"--cell-size", "0.1x"},
                                                           {"--segments", "3.5"},

@@ -1,4 +1,5 @@
 // Every request over a real socket.
+#include <map>
 #include <set>
 
 #include "tests/server/net/net_fixture.h"
@@ -183,6 +184,59 @@ TEST_F(RequestTest, ASecondHelloIsToldSo) {
   EXPECT_NE(reply->error().message().find("greeted already"), std::string::npos);
   peer->Send(StatusOf(8));
   EXPECT_TRUE(peer->Receive()->has_status_reply());
+}
+
+TEST_F(RequestTest, PipelinedUploadsReachTheDiskInTheirOrder) {
+  net_.max_requests_in_flight = 200;
+  Serve();
+  const auto peer = Connect();
+  constexpr std::uint32_t kUploads = 60;
+  Bytes all;
+  for (std::uint32_t i = 0; i < kUploads; ++i) {
+    wire::Envelope upload = UploadOf(i, 100 + i);
+    if (i % 10 == 7) {  // refused: nobody waits for it
+      upload.mutable_upload_keyframe()->mutable_blob()->resize(5);
+    }
+    const Bytes frame = EncodeEnvelopeFrame(upload).value();
+    all.insert(all.end(), frame.begin(), frame.end());
+  }
+  peer->SendBytes(all);
+  std::map<std::uint64_t, std::uint64_t> revisions;  // by request
+  std::uint32_t refused = 0;
+  for (std::uint32_t i = 0; i < kUploads; ++i) {
+    const auto reply = peer->Receive();
+    ASSERT_TRUE(reply.has_value());
+    refused += reply->has_error() ? 1u : 0u;
+    if (reply->has_upload_reply()) {
+      revisions[reply->request_id()] = reply->upload_reply().revision();
+    }
+  }
+  EXPECT_EQ(refused, kUploads / 10);
+  std::uint64_t last = 0;
+  for (const auto& [request, revision] : revisions) {
+    EXPECT_GT(revision, last) << request;
+    last = revision;
+  }
+}
+
+TEST_F(RequestTest, AHelloThatResumesIsToldTheLastSequence) {
+  Serve();
+  const auto greet = [this](const std::string& session) {
+    BlockingPeer peer(port_);
+    wire::Envelope hello;
+    hello.set_request_id(1);
+    hello.mutable_hello()->set_protocol_major(kProtocolMajor);
+    hello.mutable_hello()->mutable_resume()->set_vehicle("bus");
+    hello.mutable_hello()->mutable_resume()->set_session(session);
+    peer.Send(hello);
+    auto reply = peer.Receive();
+    EXPECT_TRUE(reply && reply->has_hello_reply());
+    return reply->hello_reply();
+  };
+  EXPECT_FALSE(greet("day").has_last_sequence());
+  UploadDrive(5);
+  EXPECT_EQ(greet("day").last_sequence(), 4u);
+  EXPECT_FALSE(greet("night").has_last_sequence());
 }
 
 TEST_F(RequestTest, AWaitThatRunsOutSaysSo) {

@@ -213,6 +213,53 @@ TEST_F(TlsTest, ARoleThatChangedHoldsAtOnce) {
   EXPECT_EQ(Ask(alice, Verification()), StatusCode::kOk);
 }
 
+TEST_F(TlsTest, ANameHasSoManyConnectionsAndOthersHaveTheirOwn) {
+  net_.identity_connections = 2;
+  ServeTls();
+  BlockingPeer first(port_, As("car.7"));
+  first.Greet();
+  {
+    BlockingPeer second(port_, As("car.7"));
+    EXPECT_TRUE(second.Greet().has_hello_reply());
+    BlockingPeer third(port_, As("car.7"));
+    const wire::Envelope refused = third.Greet();
+    EXPECT_EQ(CodeOf(refused), StatusCode::kUnavailable);
+    EXPECT_TRUE(refused.error().retry());
+    EXPECT_TRUE(third.IsClosed());
+    BlockingPeer other(port_, As("car.8"));
+    EXPECT_TRUE(other.Greet().has_hello_reply());
+    second.CloseSending();
+    EXPECT_TRUE(second.IsClosed());
+  }
+  BlockingPeer again(port_, As("car.7"));
+  EXPECT_TRUE(again.Greet().has_hello_reply()) << "the place is free again";
+}
+
+TEST_F(TlsTest, WhoeverAsksTooOftenWaitsAndTheOthersDoNot) {
+  net_.identity_requests_per_s = 20;
+  net_.frame = std::chrono::milliseconds(100);  // waiting is no fault of the peer
+  ServeTls();
+  BlockingPeer eager(port_, As("car.7"));
+  eager.Greet();
+  const auto begin = std::chrono::steady_clock::now();
+  Bytes all;
+  constexpr std::uint64_t kRequests = 40;
+  for (std::uint64_t id = 1; id <= kRequests; ++id) {
+    const Bytes frame = EncodeEnvelopeFrame(StatusOf(id)).value();
+    all.insert(all.end(), frame.begin(), frame.end());
+  }
+  eager.SendBytes(all);
+  for (std::uint64_t id = 1; id <= kRequests; ++id) {
+    ASSERT_TRUE(eager.Receive().has_value());
+  }
+  BlockingPeer calm(port_, As("car.8"));
+  calm.Greet();
+  EXPECT_EQ(Ask(calm, StatusOf(1)), StatusCode::kOk);
+  // 40 at once are 20 too many: a second in which nothing more is read.
+  EXPECT_EQ(Ask(eager, StatusOf(99)), StatusCode::kOk);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(900));
+}
+
 TEST_F(TlsTest, FilesThatAreOfNoUseAreNamed) {
   ca_ = std::make_unique<TestAuthority>(directory_, "fleet");
   const CertificateFiles one = ca_->Issue("one");

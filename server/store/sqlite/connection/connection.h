@@ -77,6 +77,8 @@ class Connection {
   std::int64_t Ask(const char* sql);
   // Random, of this connection.
   ByteSpan id() const { return id_; }
+  // Rows changed since it was opened.
+  int total_changes() const { return database_.getTotalChanges(); }
   // False after SQLite rolled the transaction back by itself (full disk, I/O error).
   bool is_in_transaction() const;
 

@@ -1,6 +1,7 @@
 #include "server/store/sqlite/connection/write_queue.h"
 
 #include <algorithm>
+#include <chrono>
 #include <future>
 #include <limits>
 #include <utility>
@@ -26,10 +27,20 @@ WriteQueue::~WriteQueue() {
 }
 
 void WriteQueue::Submit(Operation operation) {
-  if (!Enqueue(operation, options_.max_queued)) {
-    operation.finish(Status(StatusCode::kUnavailable,
-                            StrCat("store: ", options_.max_queued,
-                                   " writes are waiting or it is closing; try again later")));
+  Submit(std::move(operation), options_.max_queued);
+}
+
+void WriteQueue::SubmitProbe(Operation operation) {
+  Submit(std::move(operation), std::numeric_limits<std::size_t>::max());
+}
+
+void WriteQueue::Submit(Operation operation, std::size_t max_queued) {
+  if (!Enqueue(operation, max_queued)) {
+    const Status full(StatusCode::kUnavailable,
+                      StrCat("store: ", options_.max_queued,
+                             " writes are waiting or it is closing; try again later"));
+    NoteRefusal(full);
+    operation.finish(full);
   }
 }
 
@@ -81,13 +92,35 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
     std::fill(results.begin(), results.end(), transaction);
   }
   for (std::size_t i = 0; i < group.size(); ++i) {
+    NoteRefusal(results[i]);
     group[i].finish(results[i]);
   }
+}
+
+// Of what is wrong with one write alone there is nothing to note.
+void WriteQueue::NoteRefusal(const Status& status) {
+  const StatusCode code = status.code();
+  if (code == StatusCode::kResourceExhausted || code == StatusCode::kPermissionDenied ||
+      code == StatusCode::kUnavailable) {
+    const std::lock_guard lock(mutex_);
+    last_refusal_ = {status, std::chrono::steady_clock::now()};
+  }
+}
+
+WriteFigures WriteQueue::ReadFigures() const {
+  WriteFigures figures;
+  commits_.AddTo(figures.commits);
+  const std::lock_guard lock(mutex_);
+  figures.queued = queue_.size();
+  figures.last_refusal = last_refusal_;
+  return figures;
 }
 
 // Not ok: nothing of the group was written.
 Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results) {
   try {
+    const auto begin = std::chrono::steady_clock::now();
+    const int changes_before = connection_->total_changes();
     if (connection_->is_in_transaction()) {
       connection_->Execute("ROLLBACK");  // the one before could not
     }
@@ -100,6 +133,9 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     }
     const std::uint64_t revision = options_.read_revision(*connection_);
     connection_->Execute("COMMIT");
+    if (connection_->total_changes() != changes_before) {
+      commits_.Add(std::chrono::steady_clock::now() - begin);
+    }
     revision_.store(revision);
     return {};
   } catch (const std::exception& error) {

@@ -11,11 +11,14 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
 #include "core/base/status.h"
+#include "server/base/duration_histogram.h"
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/write_figures.h"
 
 namespace atlas {
 
@@ -41,27 +44,35 @@ class WriteQueue {
 
   // Never blocks. With a full queue, `finish` is called at once with kUnavailable.
   void Submit(Operation operation);
+  // The same, with a full queue too: the one who asks whether it moves must not be refused for it.
+  void SubmitProbe(Operation operation);
   // Waits until everything queued so far is finished.
   void Flush();
   // Of what is committed, before those who committed it are told. From any thread.
   std::uint64_t revision() const { return revision_.load(); }
+  // From any thread.
+  WriteFigures ReadFigures() const;
 
  private:
+  void Submit(Operation operation, std::size_t max_queued);
   bool Enqueue(Operation& operation, std::size_t max_queued);
   void Loop();
   std::vector<Operation> TakeGroup();
   void RunGroup(std::vector<Operation>& group);
   Status RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results);
+  void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
   Status RunOne(Operation& operation);
 
   std::unique_ptr<Connection> connection_;
   Options options_;
   std::atomic<std::uint64_t> revision_;
-  std::mutex mutex_;
+  DurationHistogram commits_;
+  mutable std::mutex mutex_;
   std::condition_variable has_work_;
   std::deque<Operation> queue_;
   bool is_stopping_ = false;
+  std::optional<WriteRefusal> last_refusal_;
   std::thread thread_;
 };
 

@@ -1,0 +1,137 @@
+#include "server/http/metrics_text.h"
+
+#include <cstddef>
+#include <limits>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
+
+namespace atlas {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+using Families = std::vector<MetricFamily>;
+using Labels = std::vector<ClientMetric::Label>;
+
+MetricFamily& Begin(Families& families, const char* name, const char* help, MetricType type) {
+  families.push_back({std::string("roadatlas_") + name, help, type, {}});
+  return families.back();
+}
+
+void AddCount(MetricFamily& family, Labels labels, double value) {
+  ClientMetric metric;
+  metric.label = std::move(labels);
+  metric.counter.value = value;
+  family.metric.push_back(std::move(metric));
+}
+
+template <typename Number>
+void AddGauge(Families& families, const char* name, const char* help, Number value) {
+  ClientMetric metric;
+  metric.gauge.value = static_cast<double>(value);
+  Begin(families, name, help, MetricType::Gauge).metric.push_back(metric);
+}
+
+template <typename Number>
+void AddCounter(Families& families, const char* name, const char* help, Number value) {
+  AddCount(Begin(families, name, help, MetricType::Counter), {}, static_cast<double>(value));
+}
+
+void AddDurations(MetricFamily& family, Labels labels, const DurationFigures& figures) {
+  ClientMetric metric;
+  metric.label = std::move(labels);
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i < figures.counts.size(); ++i) {
+    count += figures.counts[i];
+    const double bound_s = i < kDurationBounds_s.size() ? kDurationBounds_s[i]
+                                                        : std::numeric_limits<double>::infinity();
+    metric.histogram.bucket.push_back({count, bound_s});
+  }
+  metric.histogram.sample_count = count;
+  metric.histogram.sample_sum = figures.sum_s;
+  family.metric.push_back(std::move(metric));
+}
+
+void AddAtlas(const ServiceStatus& status, Families& out) {
+  const StoreCounts& counts = status.counts;
+  AddGauge(out, "revision", "Revision of the atlas.", counts.revision);
+  AddGauge(out, "keyframes", "Keyframes stored.", counts.keyframes);
+  AddGauge(out, "keyframe_bytes", "Bytes of their blobs.", counts.keyframe_bytes);
+  AddGauge(out, "tiles", "Tiles of all levels.", counts.tiles);
+  AddGauge(out, "tile_bytes", "Bytes of their blobs.", counts.tile_bytes);
+  AddGauge(out, "dirty_tiles", "Tiles to be fused again.", counts.dirty_tiles);
+  AddGauge(out, "damaged_tiles", "Dirty tiles that damage keeps from being fused.",
+           status.damaged_tiles);
+  AddGauge(out, "store_bytes", "Bytes of the atlas on disk.", counts.store_bytes);
+  AddCounter(out, "fusion_tiles_total", "Tiles built.", status.tiles_built);
+  AddCounter(out, "fusion_seconds_total", "Time that all workers together spent on building.",
+             status.building_s);
+}
+
+void AddRequests(const NetFigures& net, Families& out) {
+  MetricFamily& family = Begin(out, "requests_total", "Requests that ended.", MetricType::Counter);
+  for (std::size_t kind = 0; kind < kRequestKinds; ++kind) {
+    for (std::size_t code = 0; code < kStatusCodes; ++code) {
+      const std::uint64_t count = net.kinds[kind].requests[code];
+      if (count > 0 || code == 0) {  // a rate needs a beginning; most errors never come
+        const std::string_view outcome = StatusCodeName(static_cast<StatusCode>(code));
+        AddCount(family,
+                 {{"kind", std::string(kRequestKindNames[kind])}, {"code", std::string(outcome)}},
+                 static_cast<double>(count));
+      }
+    }
+  }
+}
+
+void AddRequestDurations(const NetFigures& net, Families& out) {
+  MetricFamily& family =
+      Begin(out, "request_seconds", "From the last byte of a request to its last reply.",
+            MetricType::Histogram);
+  for (std::size_t kind = 0; kind < kRequestKinds; ++kind) {
+    AddDurations(family, {{"kind", std::string(kRequestKindNames[kind])}},
+                 net.kinds[kind].durations);
+  }
+}
+
+void AddNet(const NetFigures& net, Families& out) {
+  AddGauge(out, "connections", "Connections open.", net.connections);
+  AddCounter(out, "connections_refused_total", "Connections refused: too many were open.",
+             net.refused);
+  AddRequests(net, out);
+  AddRequestDurations(net, out);
+  AddGauge(out, "requests_in_flight", "Requests that were read and are not answered yet.",
+           net.in_flight);
+  AddGauge(out, "held_bytes", "Bytes of requests and parts of them that are held.", net.held_bytes);
+  AddCounter(out, "received_bytes_total", "Bytes from peers.", net.received_bytes);
+  AddCounter(out, "sent_bytes_total", "Bytes to peers.", net.sent_bytes);
+}
+
+void AddWrites(const WriteFigures& writes, Families& out) {
+  AddGauge(out, "store_writes_queued", "Writes that wait for the writer.", writes.queued);
+  AddCounter(out, "store_commits_total", "Transactions written.", writes.commits.count());
+  AddDurations(Begin(out, "store_commit_seconds", "Of a transaction, until it is on disk.",
+                     MetricType::Histogram),
+               {}, writes.commits);
+}
+
+}  // namespace
+
+std::string MetricsText(const DaemonFigures& figures) {
+  Families families;
+  AddGauge(families, "atlas_readable", "1 when the atlas could be read, else 0.",
+           figures.atlas ? 1 : 0);
+  if (figures.atlas) {
+    AddAtlas(*figures.atlas, families);
+  }
+  AddGauge(families, "resident_bytes", "Memory of the process.", figures.rss_bytes);
+  AddNet(figures.net, families);
+  AddWrites(figures.writes, families);
+  return prometheus::TextSerializer().Serialize(families);
+}
+
+}  // namespace atlas

@@ -1,0 +1,85 @@
+// What one network thread did, counted by it alone: connections, requests and bytes cost it no lock
+// and no look-up. Whoever asks adds up the threads.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "core/base/status.h"
+#include "server/base/duration_histogram.h"
+#include "server/base/thread_counter.h"
+
+namespace atlas {
+
+enum class RequestKind : std::uint8_t {
+  kHello,
+  kUploadKeyframe,
+  kUpdatePoses,
+  kChangeSession,
+  kQueryRegion,
+  kSync,
+  kStatus,
+  kSessions,
+  kWait,
+  kDigest,
+  kVerify,
+  kCompact,
+  kWatch,
+  kCancel,
+  kUnknown,
+};
+// As metrics and logs call them, in the order of the enumerators.
+inline constexpr std::array<std::string_view, 15> kRequestKindNames = {
+    "hello",  "upload_keyframe", "update_poses", "change_session", "query_region",
+    "sync",   "status",          "sessions",     "wait",           "digest",
+    "verify", "compact",         "watch",        "cancel",         "unknown"};
+inline constexpr std::size_t kRequestKinds = kRequestKindNames.size();
+inline constexpr std::size_t kStatusCodes = 1 + static_cast<std::size_t>(StatusCode::kInternal);
+
+inline std::string_view RequestKindName(RequestKind kind) {
+  return kRequestKindNames[static_cast<std::size_t>(kind)];
+}
+
+// Of all threads; of the moment, but not of one moment.
+struct NetFigures {
+  struct Kind {
+    std::array<std::uint64_t, kStatusCodes> requests{};  // that ended, by outcome
+    DurationFigures durations;                           // from their last byte to the last reply
+  };
+
+  std::uint64_t connections = 0;
+  std::uint64_t refused = 0;  // connections since the start
+  std::array<Kind, kRequestKinds> kinds;
+  std::uint64_t received_bytes = 0;
+  std::uint64_t sent_bytes = 0;
+  std::uint64_t in_flight = 0;   // requests now
+  std::uint64_t held_bytes = 0;  // of requests now
+};
+
+struct NetCounters {
+  struct Kind {
+    std::array<ThreadCounter, kStatusCodes> requests;
+    DurationHistogram durations;
+  };
+
+  std::array<Kind, kRequestKinds> kinds;
+  ThreadCounter received_bytes;
+  ThreadCounter sent_bytes;
+  ThreadCounter in_flight;
+
+  void AddTo(NetFigures& figures) const {
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      for (std::size_t code = 0; code < kStatusCodes; ++code) {
+        figures.kinds[i].requests[code] += kinds[i].requests[code].value();
+      }
+      kinds[i].durations.AddTo(figures.kinds[i].durations);
+    }
+    figures.received_bytes += received_bytes.value();
+    figures.sent_bytes += sent_bytes.value();
+    figures.in_flight += in_flight.value();
+  }
+};
+
+}  // namespace atlas

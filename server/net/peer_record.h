@@ -1,0 +1,33 @@
+// Who a peer is, as the log names it, and where what it does is counted. For the thread of its
+// connection.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+#include "core/base/str_cat.h"
+#include "server/base/line_budget.h"
+#include "server/base/log_line.h"
+#include "server/net/net_counters.h"
+
+namespace atlas {
+
+struct PeerRecord {
+  std::string address;    // "ADDRESS:PORT"
+  std::string client;     // what it calls itself; empty until it is greeted
+  NetCounters& counters;  // of its thread, as is the next
+  LineBudget& lines;      // about requests
+  std::chrono::milliseconds slow_request;
+
+  LogLine Line(std::string_view message) const {
+    LogLine line(StrCat(address, ": ", message), message);
+    line.Add("peer", address);
+    if (!client.empty()) {
+      line.Add("client", client);
+    }
+    return line;
+  }
+};
+
+}  // namespace atlas

@@ -1,0 +1,104 @@
+// The daemon as whoever runs it sees it: other settings while it runs, and what it tells as it
+// stops.
+#include <csignal>
+#include <fstream>
+
+#include <boost/json/parse.hpp>
+
+#include "tests/client/end_to_end/end_to_end_fixture.h"
+#include "tests/server/http/http_peer.h"
+#include "tests/server/net/blocking_peer.h"
+
+namespace atlas {
+namespace {
+
+class OperationsEndToEndTest : public EndToEndTest {
+ protected:
+  static void Write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
+  static fs::path NewFile() {
+    return shared_root / ("atlasd" + std::to_string(++shared_data) + ".toml");
+  }
+  static std::string Message(const std::string& line) {
+    return std::string(boost::json::parse(line).at("message").as_string());
+  }
+  static bool Serves(const DaemonProcess& daemon) {
+    return RunAtlas(daemon.address(), {"status"}).exit_code == 0;
+  }
+};
+
+TEST_F(OperationsEndToEndTest, AGoodFileTakesEffectAndABadOneDoesNot) {
+  const fs::path file = NewFile();
+  Write(file, "log_format = 'text'\n[map]\ncell_size = 0.2\n");
+  DaemonProcess daemon(NewData(), {"--config", file.string()}, DaemonProcess::Log::kKept);
+  EXPECT_NE(daemon.ReadLogUntil("atlas in").find("[info] atlas in "), std::string::npos);
+
+  Write(file, "log_format = 'json'\nworkers = 7\n[map]\ncell_size = 0.2\n");
+  daemon.Signal(SIGHUP);
+  EXPECT_EQ(Message(daemon.ReadLogUntil("configuration")),
+            "signal 1: configuration read again, log_format changed");
+  EXPECT_EQ(Message(daemon.ReadLogUntil("restart")),
+            "signal 1: changes that need a restart: workers");
+
+  Write(file, "log_format = 'text'\nlog_level = 'loud'\n");
+  daemon.Signal(SIGHUP);
+  const std::string refused = Message(daemon.ReadLogUntil("configuration"));
+  EXPECT_NE(refused.find("is refused, the old one stays: invalid_argument"), std::string::npos);
+  EXPECT_NE(refused.find(file.string() + ": line 2: log_level is 'loud'"), std::string::npos);
+  fs::remove(file);
+  daemon.Signal(SIGHUP);
+  EXPECT_NE(Message(daemon.ReadLogUntil("configuration")).find("not_found: "), std::string::npos);
+
+  EXPECT_TRUE(Serves(daemon));
+  EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+}
+
+TEST_F(OperationsEndToEndTest, AFailedRequestIsALineWithItsIds) {
+  DaemonProcess daemon(NewData(), {"--log-format", "json"}, DaemonProcess::Log::kKept);
+  EXPECT_EQ(RunAtlas(daemon.address(), {"session", "retract", "bus/day"}).exit_code, 3);
+  const auto line = boost::json::parse(daemon.ReadLogUntil("failed"));
+  EXPECT_EQ(line.at("level").as_string(), "info");
+  EXPECT_EQ(line.at("kind").as_string(), "change_session");
+  EXPECT_EQ(line.at("code").as_string(), "not_found");
+  EXPECT_GT(line.at("request_id").to_number<std::uint64_t>(), 0U);
+  EXPECT_EQ(line.at("peer").as_string().rfind("127.0.0.1:", 0), 0U);
+  EXPECT_FALSE(line.at("client").as_string().empty());
+}
+
+TEST_F(OperationsEndToEndTest, ADaemonThatDrainsTells) {
+  DaemonProcess daemon(NewData(), {"--cell-size", "0.2", "--http", "127.0.0.1:0"});
+  ASSERT_EQ(Ingest(daemon).exit_code, 0);
+  ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+  EXPECT_EQ(Ask(daemon.http_port(), "/readyz").status, 200);
+  EXPECT_EQ(Ask(daemon.http_port(), "/healthz").body, "ok\n");
+  EXPECT_NE(Ask(daemon.http_port(), "/metrics").body.find("\nroadatlas_dirty_tiles 0\n"),
+            std::string::npos);
+
+  // A peer that reads nothing holds the daemon up.
+  auto peer = std::make_unique<BlockingPeer>(daemon.port(), 4'096);
+  ASSERT_TRUE(peer->Greet().has_hello_reply());
+  Bytes queries;
+  for (std::uint64_t id = 1; id <= 2'000; ++id) {
+    wire::Envelope query;
+    query.set_request_id(id);
+    query.mutable_query_region();
+    const Bytes frame = EncodeEnvelopeFrame(query).value();
+    queries.insert(queries.end(), frame.begin(), frame.end());
+  }
+  peer->SendBytes(queries);
+  daemon.Signal(SIGTERM);
+  EXPECT_EQ(AskUntil(daemon.http_port(), "/readyz", 503).body, "draining\n");
+  EXPECT_EQ(Ask(daemon.http_port(), "/healthz").status, 200);
+  peer.reset();
+  EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+}
+
+TEST_F(OperationsEndToEndTest, AnOperationsPortThatIsTakenLeavesNoTrace) {
+  DaemonProcess daemon(NewData(), {"--http", "127.0.0.1:0"});
+  const fs::path data = NewData();
+  const std::string taken = "127.0.0.1:" + std::to_string(daemon.http_port());
+  EXPECT_THROW(DaemonProcess(data, {"--http", taken}), std::runtime_error);
+  EXPECT_FALSE(fs::exists(data));
+}
+
+}  // namespace
+}  // namespace atlas

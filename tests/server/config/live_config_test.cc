@@ -1,0 +1,115 @@
+// Settings that change while the daemon runs: all or nothing.
+#include "server/config/live_config.h"
+
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace atlas {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class LiveConfigTest : public testing::Test {
+ protected:
+  LiveConfig Start(std::vector<std::string> arguments) {
+    arguments_ = std::move(arguments);
+    LiveConfig config(Read().value(), [this] { return Read(); });
+    config.AddPart([this](const DaemonConfig& wanted) { return Prepare(wanted); });
+    return config;
+  }
+  Result<DaemonCommand> Read() const {
+    std::vector<const char*> argv = {"atlasd", "--data", "/x"};
+    for (const std::string& argument : arguments_) {
+      argv.push_back(argument.c_str());
+    }
+    return ParseDaemonCommand(static_cast<int>(argv.size()), argv.data());
+  }
+  Result<LiveConfig::Commit> Prepare(const DaemonConfig& wanted) {
+    if (!part_status_.ok()) {
+      return Error(part_status_);
+    }
+    return [this, wanted] {
+      committed_.push_back(wanted.log_level);
+    };
+  }
+
+  std::vector<std::string> arguments_;
+  Status part_status_;
+  std::vector<std::string> committed_;
+};
+
+TEST_F(LiveConfigTest, WhatCanChangeDoesAndTheRestIsNamed) {
+  LiveConfig config = Start({"--workers", "2"});
+  arguments_ = {"--workers", "3", "--log-level", "debug", "--cell-size", "0.2"};
+  const auto outcome = config.Reload();
+  ASSERT_TRUE(outcome.has_value()) << outcome.error().message();
+  EXPECT_THAT(outcome->changed, ElementsAre("log_level"));
+  EXPECT_THAT(outcome->waiting, ElementsAre("map.cell_size", "workers"));
+  EXPECT_EQ(config.config().log_level, "debug");
+  EXPECT_EQ(config.config().workers, 2);
+  EXPECT_THAT(committed_, ElementsAre("debug"));
+}
+
+TEST_F(LiveConfigTest, WhatIsSaidInOtherWordsIsNoChange) {
+  LiveConfig config = Start({"--cell-size", "0.2", "--log-level", "info"});
+  arguments_ = {"--cell-size", "0.20", "--listen", "127.0.0.1:7447"};
+  const auto outcome = config.Reload();
+  ASSERT_TRUE(outcome.has_value());
+  EXPECT_THAT(outcome->changed, IsEmpty());
+  EXPECT_THAT(outcome->waiting, IsEmpty());
+  EXPECT_THAT(committed_, ElementsAre("info"));  // files that settings name may have changed
+}
+
+TEST_F(LiveConfigTest, ASettingThatIsGoneHasItsDefaultAgain) {
+  LiveConfig config = Start({"--log-level", "error", "--log-format", "json"});
+  arguments_ = {};
+  EXPECT_THAT(config.Reload()->changed, ElementsAre("log_format", "log_level"));
+  EXPECT_EQ(config.config().log_level, "info");
+  EXPECT_EQ(config.config().log_format, "text");
+}
+
+TEST_F(LiveConfigTest, OneThatWaitsForARestartIsNamedUntilItIsBack) {
+  LiveConfig config = Start({"--workers", "2"});
+  arguments_ = {"--workers", "3"};
+  EXPECT_THAT(config.Reload()->waiting, ElementsAre("workers"));
+  EXPECT_THAT(config.Reload()->waiting, ElementsAre("workers"));
+  arguments_ = {"--workers", "2"};
+  EXPECT_THAT(config.Reload()->waiting, IsEmpty());
+}
+
+TEST_F(LiveConfigTest, AMistakeLeavesEverythingAsItWas) {
+  LiveConfig config = Start({"--log-level", "debug"});
+  const std::vector<std::vector<std::string>> mistakes = {{"--log-level", "loud"},
+                                                          {"--log-format", "xml"},
+                                                          {"--segments", "3"},
+                                                          {"--config", "/nowhere.toml"}};
+  for (const auto& mistake : mistakes) {
+    arguments_ = mistake;
+    const auto outcome = config.Reload();
+    ASSERT_FALSE(outcome.has_value()) << mistake[0];
+    EXPECT_EQ(config.config().log_level, "debug") << mistake[0];
+  }
+  EXPECT_THAT(committed_, IsEmpty());
+}
+
+TEST_F(LiveConfigTest, APartThatRefusesKeepsTheOthersFromChanging) {
+  LiveConfig config = Start({});
+  config.AddPart([](const DaemonConfig& /*wanted*/) -> Result<LiveConfig::Commit> {
+    return Error(StatusCode::kInvalidData, "the certificate is damaged");
+  });
+  arguments_ = {"--log-level", "debug"};
+  const auto outcome = config.Reload();
+  ASSERT_FALSE(outcome.has_value());
+  EXPECT_THAT(outcome.error().message(), HasSubstr("certificate"));
+  EXPECT_EQ(config.config().log_level, "info");
+  EXPECT_THAT(committed_, IsEmpty());
+}
+
+}  // namespace
+}  // namespace atlas
