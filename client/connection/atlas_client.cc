@@ -135,7 +135,9 @@ Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
   if (!connection) return Error(connection.error());
   auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
   wire::Envelope request = HelloRequest(options);
-  const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply);
+  const milliseconds less =
+      std::min(options.connect_timeout - options.request_timeout, milliseconds(0));
+  const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply, less);
   if (!reply) return Error(reply.error());
   const wire::HelloReply& hello = reply->hello_reply();
   if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {

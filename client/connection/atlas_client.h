@@ -23,11 +23,11 @@ class RpcChannel;
 
 struct ConnectionOptions {
   Endpoint endpoint;
-  std::string client_name = "libatlas_client";  // for the daemon's logs
-  std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
-  std::optional<ConnectionTls> tls;             // none: in the clear
-  std::string token;                            // of a person; empty: none
-  std::chrono::milliseconds connect_timeout{5'000};
+  std::string client_name = "libatlas_client";        // for the daemon's logs
+  std::optional<MapProfile> expected_profile;         // another one: refused by the daemon
+  std::optional<ConnectionTls> tls;                   // none: in the clear
+  std::string token;                                  // of a person; empty: none
+  std::chrono::milliseconds connect_timeout{5'000};   // to connect, and to shake hands
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
 };
 

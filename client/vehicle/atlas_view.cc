@@ -67,7 +67,7 @@ Result<StoreSyncReport> AtlasView::Sync(const MapArea& area, const AroundOptions
   query.sections = options.sections;
   query.budget_bytes = options.budget_bytes;
   query.timeout = std::max(options.deadline - spent, milliseconds(1));
-  const Result<StoreSyncReport> report = SyncStore(**client, store_, std::move(query));
+  Result<StoreSyncReport> report = SyncStore(**client, store_, std::move(query));
   link_->Report(report ? Status() : report.error());
   return report;
 }

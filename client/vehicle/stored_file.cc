@@ -110,8 +110,12 @@ Result<Bytes> LoadFile(const fs::path& path, std::uint64_t max_bytes) {
 
 Status MakeFolder(const fs::path& folder) {
   std::error_code error;
-  fs::create_directories(folder, error);
-  return error ? SystemError("cannot make folder", folder, error.value()) : Status();
+  const bool is_new = fs::create_directories(folder, error);
+  if (error) return SystemError("cannot make folder", folder, error.value());
+  if (!is_new) return {};
+  const fs::path parent = fs::absolute(folder).lexically_normal().parent_path();
+  const int failed = SyncFolder(parent);
+  return failed == 0 ? Status() : SystemError("cannot make folder", folder, failed);
 }
 
 Status MoveFile(const fs::path& from, const fs::path& to) {

@@ -22,7 +22,7 @@ enum class Durability : std::uint8_t {
 Status StoreFile(const std::filesystem::path& path, ByteSpan bytes, Durability durability);
 // kNotFound, kResourceExhausted above `max_bytes`, else as above.
 Result<Bytes> LoadFile(const std::filesystem::path& path, std::uint64_t max_bytes);
-// With its parents; fine when it exists.
+// With its parents; fine when it exists. Its name is settled on the device.
 Status MakeFolder(const std::filesystem::path& folder);
 // Renames within a file system; both names are settled on the device.
 Status MoveFile(const std::filesystem::path& from, const std::filesystem::path& to);

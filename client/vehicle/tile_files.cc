@@ -169,12 +169,14 @@ std::vector<TileFiles::Found> TileFiles::List() {
     Remove(dated.found.facts);
   }
   std::vector<Dated> by_time;
+  by_time.reserve(newest.size());
   for (const auto& [id, dated] : newest) {
     by_time.push_back(dated);
   }
   std::stable_sort(by_time.begin(), by_time.end(),
                    [](const Dated& a, const Dated& b) { return a.written < b.written; });
   std::vector<Found> all;
+  all.reserve(by_time.size());
   for (const Dated& dated : by_time) {
     all.push_back(dated.found);
   }
