@@ -18,6 +18,8 @@ namespace fs = std::filesystem;
 constexpr std::string_view kSuffix = ".keyframe";
 constexpr std::string_view kReasonSuffix = ".reason";
 constexpr std::size_t kDigits = 16;
+// No spool comes so far; a file named above it is not ours, and numbers never outgrow their digits.
+constexpr std::uint64_t kMaxNumber = 1'000'000'000'000'000;
 
 std::string NameOf(std::uint64_t number, std::string_view suffix) {
   const std::string digits = std::to_string(number);
@@ -29,7 +31,8 @@ std::optional<std::uint64_t> NumberFrom(std::string_view name) {
   std::uint64_t number = 0;
   const char* end = name.data() + kDigits;
   const auto [stop, error] = std::from_chars(name.data(), end, number);
-  return error == std::errc() && stop == end ? std::optional(number) : std::nullopt;
+  const bool is_number = error == std::errc() && stop == end && number <= kMaxNumber;
+  return is_number ? std::optional(number) : std::nullopt;
 }
 
 void RemoveFile(const fs::path& path) {

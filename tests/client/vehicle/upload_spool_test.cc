@@ -204,6 +204,7 @@ TEST(UploadSpoolTest, WhatAKilledProgramLeavesIsPutInOrder) {
   std::ofstream(folder.path() / "0000000000000010.keyframe") << "garbage";
   std::ofstream(folder.path() / "0000000000000011.keyframe.partial") << "half";
   std::ofstream(folder.path() / "notes") << "not ours";
+  std::ofstream(folder.path() / "9999999999999999.keyframe") << "nor this";
   UploadSpool spool = OpenSpool(folder);
   EXPECT_FALSE(fs::exists(folder.path() / "0000000000000011.keyframe.partial"));
   ASSERT_TRUE(PutOne(spool, 6).ok());
