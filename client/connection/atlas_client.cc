@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/connection/rpc_channel.h"
+#include "client/connection/sync_exchange.h"
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
 
@@ -15,6 +16,7 @@ using Body = wire::Envelope;
 using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithPast = 2;
+constexpr std::uint32_t kMinorWithSync = 4;
 
 std::uint32_t TimeoutField(milliseconds timeout) {
   return static_cast<std::uint32_t>(
@@ -133,7 +135,9 @@ Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
   if (!connection) return Error(connection.error());
   auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
   wire::Envelope request = HelloRequest(options);
-  const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply);
+  const milliseconds less =
+      std::min(options.connect_timeout - options.request_timeout, milliseconds(0));
+  const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply, less);
   if (!reply) return Error(reply.error());
   const wire::HelloReply& hello = reply->hello_reply();
   if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {
@@ -179,6 +183,38 @@ Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
     Result<TileBlob> tile = TileFromWire(*reply->mutable_tile());
     if (!tile) return Error(tile.error());
     if (Status status = on_tile(*std::move(tile)); !status.ok()) return Error(std::move(status));
+  }
+}
+
+Status AtlasClient::CheckSync() const {
+  if (atlas_.protocol_minor >= kMinorWithSync) return {};
+  return {StatusCode::kUnsupported,
+          StrCat("the daemon speaks protocol ", kProtocolMajor, '.', atlas_.protocol_minor,
+                 ", a sync needs ", kProtocolMajor, '.', kMinorWithSync)};
+}
+
+Result<SyncSummary> AtlasClient::Sync(const SyncQuery& query, const TileCallback& on_tile) {
+  if (Status status = CheckSync(); !status.ok()) return Error(std::move(status));
+  Result<wire::Envelope> request = SyncRequestOf(query);
+  if (!request) return Error(request.error());
+  const Result<std::uint64_t> id = channel_->Send(*request);
+  if (!id) return Error(id.error());
+  SyncExchange exchange(query);
+  while (true) {
+    const Result<wire::Envelope> reply = channel_->ReceiveAnyFor(*id, query.timeout);
+    if (!reply) return Error(reply.error());
+    const std::uint64_t frame_bytes = channel_->last_frame_bytes();
+    if (reply->has_sync_end()) return exchange.OnEnd(reply->sync_end(), frame_bytes);
+    Status status;
+    if (reply->has_sync_manifest()) {
+      status = exchange.OnManifest(reply->sync_manifest(), frame_bytes);
+    } else if (reply->has_tile()) {
+      Result<TileBlob> tile = exchange.OnTile(reply->tile(), frame_bytes);
+      status = tile ? on_tile(*std::move(tile)) : tile.error();
+    } else {
+      status = channel_->Unexpected(*reply);
+    }
+    if (!status.ok()) return Error(std::move(status));
   }
 }
 

@@ -23,11 +23,11 @@ class RpcChannel;
 
 struct ConnectionOptions {
   Endpoint endpoint;
-  std::string client_name = "libatlas_client";  // for the daemon's logs
-  std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
-  std::optional<ConnectionTls> tls;             // none: in the clear
-  std::string token;                            // of a person; empty: none
-  std::chrono::milliseconds connect_timeout{5'000};
+  std::string client_name = "libatlas_client";        // for the daemon's logs
+  std::optional<MapProfile> expected_profile;         // another one: refused by the daemon
+  std::optional<ConnectionTls> tls;                   // none: in the clear
+  std::string token;                                  // of a person; empty: none
+  std::chrono::milliseconds connect_timeout{5'000};   // to connect, and to shake hands
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
 };
 
@@ -53,6 +53,11 @@ class AtlasClient {
   // Calls back once a tile, in the order sent. A failing callback ends the query with its status.
   // kUnsupported: an earlier revision, and the daemon is too old for that.
   Result<RegionSummary> QueryRegion(const RegionQuery& query, const TileCallback& on_tile);
+  // What is new in an area: calls back once a tile, in the order sent, as it arrives. Announced and
+  // sent agree, or it ends with kInvalidData; what a blob says is the caller's to check. A failing
+  // callback ends it with its status. A daemon that pauses for longer than the query's timeout and
+  // `request_timeout` together is kTimeout. kUnsupported when the daemon is too old for syncs.
+  Result<SyncSummary> Sync(const SyncQuery& query, const TileCallback& on_tile);
   Result<AtlasStatus> ReadStatus();
   // Returns when no tile is dirty; kTimeout after `timeout`.
   Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
@@ -81,6 +86,7 @@ class AtlasClient {
   AtlasClient(std::unique_ptr<RpcChannel> channel, const MapProfile& profile, AtlasIdentity atlas);
 
   Status CheckPast(const std::optional<std::uint64_t>& at_revision) const;
+  Status CheckSync() const;
 
   std::unique_ptr<RpcChannel> channel_;
   MapProfile profile_;

@@ -53,6 +53,15 @@ Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
   return {};
 }
 
+void KeyframeUploader::NoteRefusal(const InFlight& upload, const Status& refusal) {
+  const Status named = Named(refusal, upload.key);
+  if (options_.on_answer) {
+    options_.on_answer(upload.key, named);
+  } else if (first_refusal_.ok()) {
+    first_refusal_ = named;
+  }
+}
+
 Status KeyframeUploader::ReceiveOne() {
   const Result<wire::Envelope> reply = client_.channel_->Receive();
   if (!reply) return reply.error();
@@ -61,9 +70,7 @@ Status KeyframeUploader::ReceiveOne() {
       [&reply](const InFlight& upload) { return upload.request_id == reply->request_id(); });
   if (entry == in_flight_.end()) return {};  // of a request that was given up
   if (reply->has_error()) {
-    if (first_refusal_.ok()) {
-      first_refusal_ = Named(ErrorFromWire(reply->error()).status, entry->key);
-    }
+    NoteRefusal(*entry, ErrorFromWire(reply->error()).status);
   } else if (!reply->has_upload_reply()) {
     return {StatusCode::kInvalidData,
             StrCat("keyframe ", entry->key, ": the daemon answered with something else")};
@@ -73,6 +80,7 @@ Status KeyframeUploader::ReceiveOne() {
     totals_.duplicates += ack.duplicate() ? 1U : 0U;
     totals_.tiles_marked += ack.tiles_marked();
     totals_.revision = std::max(totals_.revision, ack.revision());
+    if (options_.on_answer) options_.on_answer(entry->key, {});
   }
   in_flight_bytes_ -= entry->size_bytes;
   in_flight_.erase(entry);

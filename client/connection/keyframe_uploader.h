@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <string>
 
 #include "client/connection/atlas_client.h"
@@ -15,6 +16,8 @@ namespace atlas {
 struct UploadOptions {
   std::size_t max_in_flight = 64;  // the daemon commits up to 64 at a time
   std::size_t max_in_flight_bytes = std::size_t{16} << 20;
+  // Told of each keyframe once it is answered, in any order. With it a refusal stops nothing.
+  std::function<void(const KeyframeKey&, const Status&)> on_answer = {};
 };
 
 struct UploadTotals {
@@ -47,6 +50,7 @@ class KeyframeUploader {
     std::size_t size_bytes = 0;
   };
 
+  void NoteRefusal(const InFlight& upload, const Status& refusal);
   // Link failures only; refusals are remembered.
   Status ReceiveOne();
   bool IsFull(std::size_t next_bytes) const;

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "client/connection/sync_query.h"
 #include "core/base/bytes.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/pose.h"

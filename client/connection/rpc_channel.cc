@@ -23,6 +23,7 @@ Result<std::uint64_t> RpcChannel::Send(wire::Envelope& request) {
 Result<wire::Envelope> RpcChannel::Receive(Milliseconds extra) {
   const Result<Bytes> payload = connection_.Receive(frame_timeout_ + extra);
   if (!payload) return Error(payload.error());
+  last_frame_bytes_ = kFrameHeaderBytes + payload->size();
   Result<wire::Envelope> reply = ParseEnvelope(*payload);
   if (!reply) {
     return Error(reply.error().WithContext("daemon at " + connection_.endpoint().ToText()));
@@ -34,21 +35,27 @@ Result<wire::Envelope> RpcChannel::Receive(Milliseconds extra) {
   return reply;
 }
 
-Result<wire::Envelope> RpcChannel::ReceiveFor(std::uint64_t id,
-                                              wire::Envelope::BodyCase expected,
-                                              wire::Envelope::BodyCase also,
-                                              Milliseconds extra) {
+Result<wire::Envelope> RpcChannel::ReceiveAnyFor(std::uint64_t id, Milliseconds extra) {
   while (true) {
     Result<wire::Envelope> reply = Receive(extra);
     if (!reply) return reply;
     if (reply->request_id() < id) continue;
     if (reply->request_id() != id) return Error(Unexpected(*reply));
     if (reply->has_error()) return Error(ErrorFromWire(reply->error()).status);
-    if (reply->body_case() != expected && reply->body_case() != also) {
-      return Error(Unexpected(*reply));
-    }
     return reply;
   }
+}
+
+Result<wire::Envelope> RpcChannel::ReceiveFor(std::uint64_t id,
+                                              wire::Envelope::BodyCase expected,
+                                              wire::Envelope::BodyCase also,
+                                              Milliseconds extra) {
+  Result<wire::Envelope> reply = ReceiveAnyFor(id, extra);
+  if (!reply) return reply;
+  if (reply->body_case() != expected && reply->body_case() != also) {
+    return Error(Unexpected(*reply));
+  }
+  return reply;
 }
 
 Result<wire::Envelope> RpcChannel::Call(wire::Envelope& request,

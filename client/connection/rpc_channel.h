@@ -29,19 +29,24 @@ class RpcChannel {
                                     wire::Envelope::BodyCase expected,
                                     wire::Envelope::BodyCase also,
                                     Milliseconds extra = Milliseconds(0));
+  // The next reply to request `id`, whatever its body; else as above.
+  Result<wire::Envelope> ReceiveAnyFor(std::uint64_t id, Milliseconds extra = Milliseconds(0));
   // Send and ReceiveFor with one body expected.
   Result<wire::Envelope> Call(wire::Envelope& request,
                               wire::Envelope::BodyCase expected,
                               Milliseconds extra = Milliseconds(0));
 
+  // The reply is one that no caller expects.
+  Status Unexpected(const wire::Envelope& reply) const;
+  // Of the frame received last, its header included.
+  std::uint64_t last_frame_bytes() const { return last_frame_bytes_; }
   DaemonConnection& connection() { return connection_; }
 
  private:
-  Status Unexpected(const wire::Envelope& reply) const;
-
   DaemonConnection connection_;
   Milliseconds frame_timeout_;
   std::uint64_t last_id_ = 0;
+  std::uint64_t last_frame_bytes_ = 0;
 };
 
 }  // namespace atlas

@@ -59,6 +59,7 @@ ALLOWED = {
     "client/connection": FLOOR_1 + WIRE,
     "client/score": FLOOR_1,
     "client/map": FLOOR_1 + ["core/tile", "client/connection"],
+    "client/vehicle": FLOOR_1 + ["core/tile", "client/connection", "client/map"],
     "client/drive": FLOOR_4 + ["core/localization", "client/connection", "client/map", "client/score"],
     "client/render": FLOOR_1 + ["core/tile"],
     "server/service": FUSED + ["server/service/compaction", "server/service/fusion", "server/service/history",

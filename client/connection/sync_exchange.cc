@@ -1,0 +1,290 @@
+#include "client/connection/sync_exchange.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "proto/wire/convert.h"
+
+namespace atlas {
+namespace {
+
+constexpr double kMaxCoordinate_m = 1e7;  // as for poses
+constexpr double kMaxLength_m = 1e8;
+constexpr std::size_t kMaxRoutePoints = 256;
+constexpr std::size_t kMaxTiles = 65'536;  // of an area; held ones; held blocks
+constexpr int kBlockBits = 6;              // of a tile's key within its block
+constexpr int kLevelShift = 58;            // of a tile's key
+
+Status Refuse(const std::string& why) {
+  return {StatusCode::kInvalidArgument, StrCat("sync: ", why)};
+}
+
+Status Wrong(const std::string& what) {
+  return {StatusCode::kInvalidData, StrCat("sync: the daemon ", what)};
+}
+
+bool IsPlace(const Eigen::Vector2d& p_m) {
+  return p_m.cwiseAbs().maxCoeff() <= kMaxCoordinate_m;
+}
+
+bool IsLength(double length_m) {
+  return length_m >= 0.0 && length_m <= kMaxLength_m;
+}
+
+void SetPoint(const Eigen::Vector2d& p_m, wire::Area::Point& out) {
+  out.set_x_um(std::llround(p_m.x() * 1e6));
+  out.set_y_um(std::llround(p_m.y() * 1e6));
+}
+
+std::uint64_t Micrometres(double length_m) {
+  return static_cast<std::uint64_t>(std::llround(length_m * 1e6));
+}
+
+Status SetArea(const DiscArea& disc, wire::Area& out) {
+  if (!IsPlace(disc.center_m) || !IsLength(disc.radius_m)) {
+    return Refuse("expected a centre within +-10000 km and a radius of 0 to 100000 km");
+  }
+  SetPoint(disc.center_m, *out.mutable_disc()->mutable_center());
+  out.mutable_disc()->set_radius_um(Micrometres(disc.radius_m));
+  return {};
+}
+
+Status SetArea(const BoxArea& box, wire::Area& out) {
+  if (!IsPlace(box.min_m) || !IsPlace(box.max_m) ||
+      !(box.min_m.array() <= box.max_m.array()).all()) {
+    return Refuse("expected a box within +-10000 km, its first corner the lower one");
+  }
+  SetPoint(box.min_m, *out.mutable_box()->mutable_min());
+  SetPoint(box.max_m, *out.mutable_box()->mutable_max());
+  return {};
+}
+
+Status SetArea(const CorridorArea& corridor, wire::Area& out) {
+  const auto& route = corridor.route_m;
+  if (route.empty() || route.size() > kMaxRoutePoints ||
+      !std::all_of(route.begin(), route.end(), &IsPlace) || !IsLength(corridor.half_width_m)) {
+    return Refuse(StrCat("a route of ", route.size(), " points, expected 1 to ", kMaxRoutePoints,
+                         " within +-10000 km, and half a width of 0 to 100000 km"));
+  }
+  for (const Eigen::Vector2d& point_m : route) {
+    SetPoint(point_m, *out.mutable_corridor()->add_route());
+  }
+  out.mutable_corridor()->set_half_width_um(Micrometres(corridor.half_width_m));
+  return {};
+}
+
+Status SetArea(const TilesArea& tiles, wire::Area& out) {
+  if (tiles.ids.size() > kMaxTiles) {
+    return Refuse(StrCat("an area of ", tiles.ids.size(), " tiles, expected at most ", kMaxTiles));
+  }
+  auto& keys = *out.mutable_tiles()->mutable_keys();
+  for (const TileId& id : tiles.ids) {
+    keys.Add(id.Key());
+  }
+  std::sort(keys.begin(), keys.end());
+  const bool is_twice = std::adjacent_find(keys.begin(), keys.end()) != keys.end();
+  return is_twice ? Refuse("a tile of the area is named twice") : Status();
+}
+
+template <typename Numbers>
+void SetSections(SectionBits sections, Numbers& out) {
+  if (sections == kEverySection) return;
+  for (std::uint32_t number = 0; number < 64; ++number) {
+    if ((sections >> number & 1U) != 0) out.Add(number);
+  }
+}
+
+Status SetHeld(const SyncQuery& query, wire::SyncRequest& out) {
+  std::size_t tiles = 0;
+  std::size_t blocks = 0;
+  for (const HeldGroup& group : query.held) {
+    if (group.sections == 0) return Refuse("held tiles without a section");
+    wire::Held& held = *out.add_held();
+    SetSections(group.sections, *held.mutable_sections());
+    for (const HeldGroup::OneTile& tile : group.tiles) {
+      held.add_keys(tile.id.Key());
+      held.add_payload_hashes(tile.payload_hash);
+    }
+    for (const HeldGroup::Block& block : group.blocks) {
+      held.add_blocks(block.block);
+      held.add_masks(block.mask);
+      held.add_digests(block.digest);
+    }
+    tiles += group.tiles.size();
+    blocks += group.blocks.size();
+  }
+  return tiles <= kMaxTiles && blocks <= kMaxTiles
+             ? Status()
+             : Refuse(StrCat(tiles, " tiles and ", blocks, " blocks are held, expected at most ",
+                             kMaxTiles, " of either"));
+}
+
+// What is held, to be asked by key.
+class HeldIndex {
+ public:
+  explicit HeldIndex(const std::vector<HeldGroup>& held) {
+    for (const HeldGroup& group : held) {
+      for (const HeldGroup::OneTile& tile : group.tiles) {
+        keys_.insert(tile.id.Key());
+      }
+      for (const HeldGroup::Block& block : group.blocks) {
+        masks_[block.block] |= block.mask;
+      }
+      blocks_ += group.blocks.size();
+    }
+  }
+
+  bool HasTile(std::uint64_t key) const {
+    const auto block = masks_.find(key >> kBlockBits);
+    return keys_.contains(key) ||
+           (block != masks_.end() && (block->second >> (key & 63U) & 1U) != 0);
+  }
+  bool HasBlock(std::uint64_t block) const { return masks_.contains(block); }
+  std::size_t tiles() const { return keys_.size(); }
+  std::size_t blocks() const { return blocks_; }
+
+ private:
+  std::unordered_set<std::uint64_t> keys_;
+  std::unordered_map<std::uint64_t, std::uint64_t> masks_;
+  std::size_t blocks_ = 0;
+};
+
+// nullopt: bits that do not belong to anything held. Missing ones are not set.
+std::optional<std::vector<bool>> BitsFromWire(const std::string& bytes, std::size_t count) {
+  std::vector<bool> bits(count, false);
+  for (std::size_t i = 0; i < 8 * bytes.size(); ++i) {
+    const bool is_set = (static_cast<std::uint8_t>(bytes[i / 8]) >> (i % 8) & 1U) != 0;
+    if (is_set && i >= count) return std::nullopt;
+    if (is_set) bits[i] = true;
+  }
+  return bits;
+}
+
+}  // namespace
+
+Result<wire::Envelope> SyncRequestOf(const SyncQuery& query) {
+  wire::Envelope envelope;
+  wire::SyncRequest& request = *envelope.mutable_sync_request();
+  Status status = std::visit(
+      [&](const auto& area) { return SetArea(area, *request.mutable_area()); }, query.area);
+  if (status.ok()) status = SetHeld(query, request);
+  if (status.ok() && query.sections == 0) status = Refuse("no section is wanted");
+  if (!status.ok()) return Error(std::move(status));
+  request.set_finest_level(query.finest_level);
+  request.set_coarsest_level(query.coarsest_level);
+  SetSections(query.sections, *request.mutable_sections());
+  request.set_budget_bytes(query.budget_bytes);
+  request.set_timeout_ms(static_cast<std::uint32_t>(
+      std::clamp<std::int64_t>(query.timeout.count(), 0, INT64_C(0xFFFFFFFF))));
+  request.set_wait_revision(query.wait_revision);
+  request.set_cursor(BytesToWire(query.cursor));
+  return envelope;
+}
+
+SyncExchange::SyncExchange(const SyncQuery& query) : query_(query) {}
+
+Status SyncExchange::Count(std::uint64_t frame_bytes) {
+  summary_.bytes += frame_bytes;
+  return query_.budget_bytes == 0 || summary_.bytes <= query_.budget_bytes
+             ? Status()
+             : Wrong(StrCat("sent ", summary_.bytes, " bytes, a budget of ", query_.budget_bytes,
+                            " was asked for"));
+}
+
+Status SyncExchange::CheckAllCame() const {
+  return came_ == announced_.size()
+             ? Status()
+             : Wrong(StrCat("announced ", announced_.size(), " tiles and sent ", came_));
+}
+
+Status SyncExchange::OnManifest(const wire::SyncManifest& manifest, std::uint64_t frame_bytes) {
+  ATLAS_RETURN_IF_ERROR(Count(frame_bytes));
+  ATLAS_RETURN_IF_ERROR(CheckAllCame());
+  if (!has_begun_) ATLAS_RETURN_IF_ERROR(TakeHoldings(manifest));
+  has_begun_ = true;
+  return Announce(manifest);
+}
+
+Status SyncExchange::Announce(const wire::SyncManifest& manifest) {
+  const int count = manifest.keys_size();
+  if (manifest.revisions_size() != count || manifest.payload_hashes_size() != count ||
+      manifest.bytes_size() != count) {
+    return Wrong("announced tiles without a revision, a hash or a size of each");
+  }
+  announced_.clear();
+  came_ = 0;
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t key = manifest.keys(i);
+    const std::uint64_t level = key >> kLevelShift;
+    const bool is_coarser = query_.coarsest_level != 0 && level > query_.coarsest_level;
+    if (!TileId::FromKey(key) || level < query_.finest_level || is_coarser) {
+      return Wrong(StrCat("announced a tile that was not asked for, key ", key));
+    }
+    announced_.push_back(
+        {key, manifest.revisions(i), manifest.payload_hashes(i), manifest.bytes(i)});
+  }
+  return {};
+}
+
+Status SyncExchange::TakeHoldings(const wire::SyncManifest& manifest) {
+  const HeldIndex held(query_.held);
+  auto tiles = BitsFromWire(manifest.current_tiles(), held.tiles());
+  auto blocks = BitsFromWire(manifest.current_blocks(), held.blocks());
+  if (!tiles || !blocks) return Wrong("says of tiles that are not held that they are current");
+  summary_.current_tiles = *std::move(tiles);
+  summary_.current_blocks = *std::move(blocks);
+  summary_.not_modified_tiles = manifest.not_modified();
+  for (const std::uint64_t key : manifest.removed()) {
+    const Result<TileId> id = TileId::FromKey(key);
+    if (!id || !held.HasTile(key)) {
+      return Wrong(StrCat("removed a tile that is not held, key ", key));
+    }
+    summary_.removed.push_back(*id);
+  }
+  for (const std::uint64_t block : manifest.differing_blocks()) {
+    if (!held.HasBlock(block)) {
+      return Wrong(StrCat("says of a block that is not held that it differs, ", block));
+    }
+    summary_.differing_blocks.push_back(block);
+  }
+  return {};
+}
+
+Result<TileBlob> SyncExchange::OnTile(const wire::TileMessage& tile, std::uint64_t frame_bytes) {
+  if (Status status = Count(frame_bytes); !status.ok()) return Error(std::move(status));
+  if (came_ == announced_.size()) return Error(Wrong("sent a tile that it did not announce"));
+  const Announced& announced = announced_[came_];
+  if (tile.key() != announced.key || tile.revision() != announced.revision ||
+      tile.payload_hash() != announced.payload_hash || tile.blob().size() != announced.bytes) {
+    return Error(Wrong(StrCat("sent another tile than it announced: key ", tile.key(), ", ",
+                              tile.blob().size(), " bytes, expected ", announced.key, ", ",
+                              announced.bytes)));
+  }
+  ++came_;
+  ++summary_.tiles;
+  const ByteSpan blob = BytesFromWire(tile.blob());
+  return TileBlob{*TileId::FromKey(tile.key()), tile.revision(), tile.payload_hash(),
+                  Bytes(blob.begin(), blob.end())};
+}
+
+Result<SyncSummary> SyncExchange::OnEnd(const wire::SyncEnd& end, std::uint64_t frame_bytes) {
+  Status status = Count(frame_bytes);
+  if (status.ok()) status = CheckAllCame();
+  if (status.ok() && !has_begun_) status = Wrong("ended without a manifest");
+  if (status.ok() && (end.tiles() != summary_.tiles || end.bytes() != summary_.bytes)) {
+    status = Wrong(StrCat("counted ", end.tiles(), " tiles and ", end.bytes(), " bytes, ",
+                          summary_.tiles, " and ", summary_.bytes, " came"));
+  }
+  if (!status.ok()) return Error(std::move(status));
+  summary_.revision = end.revision();
+  const ByteSpan cursor = BytesFromWire(end.cursor());
+  summary_.cursor.assign(cursor.begin(), cursor.end());
+  return std::move(summary_);
+}
+
+}  // namespace atlas

@@ -1,0 +1,83 @@
+// What a client asks of a sync and what it is told (docs/protocol.md, "Sync"): plain values, no
+// messages. Metres in the world frame.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/bytes.h"
+#include "core/geometry/tile_id.h"
+
+namespace atlas {
+
+struct DiscArea {
+  Eigen::Vector2d center_m = Eigen::Vector2d::Zero();
+  double radius_m = 0.0;
+};
+struct BoxArea {
+  Eigen::Vector2d min_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d max_m = Eigen::Vector2d::Zero();
+};
+// Within half a width of a route that begins where the vehicle is, of 1 to 256 points.
+struct CorridorArea {
+  std::vector<Eigen::Vector2d> route_m;
+  double half_width_m = 0.0;
+};
+struct TilesArea {
+  std::vector<TileId> ids;  // in any order, each once; at most 65,536
+};
+using MapArea = std::variant<DiscArea, BoxArea, CorridorArea, TilesArea>;
+
+// Sections of a tile as bits, 1 << its number (docs/formats/tile.md). All of them is more than each
+// of those that are known.
+using SectionBits = std::uint64_t;
+inline constexpr SectionBits kEverySection = ~SectionBits{0};
+
+// Tiles that are held with the same sections of each. No tile twice, nor beside its block.
+struct HeldGroup {
+  struct OneTile {
+    TileId id;
+    std::uint64_t payload_hash = 0;
+  };
+  // 8 x 8 tiles: those with the keys block << 6 | i for which bit i of the mask is set.
+  struct Block {
+    std::uint64_t block = 0;
+    std::uint64_t mask = 0;
+    std::uint64_t digest = 0;  // Hash64 over key and payload hash of each, in key order
+  };
+  SectionBits sections = kEverySection;
+  std::vector<OneTile> tiles;
+  std::vector<Block> blocks;
+};
+
+struct SyncQuery {
+  MapArea area;
+  std::uint8_t finest_level = 0;
+  std::uint8_t coarsest_level = 0;  // 0: the atlas's
+  SectionBits sections = kEverySection;
+  std::vector<HeldGroup> held;
+  std::uint64_t budget_bytes = 0;  // of the whole reply; 0: none
+  // Of the reply, and of the wait in it; 0: no end to the one, and none of the other.
+  std::chrono::milliseconds timeout{0};
+  std::uint64_t wait_revision = 0;  // until the tiles reflect it; 0: do not wait
+  Bytes cursor;                     // of the summary before, with area and levels as they were
+};
+
+struct SyncSummary {
+  std::uint64_t tiles = 0;
+  std::uint64_t bytes = 0;  // of the reply's frames
+  std::uint64_t revision = 0;
+  Bytes cursor;                          // empty: that was all
+  std::vector<TileId> removed;           // held ones that are no more
+  std::vector<bool> current_tiles;       // of the held ones, through all groups: is what it was
+  std::vector<bool> current_blocks;      // the same of blocks
+  std::uint64_t not_modified_tiles = 0;  // in blocks or by themselves
+  // Held ones of which some tile is not what it was: tell their tiles one by one, without a cursor.
+  std::vector<std::uint64_t> differing_blocks;
+};
+
+}  // namespace atlas

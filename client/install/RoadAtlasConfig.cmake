@@ -1,0 +1,12 @@
+# What the static libraries need at the end of the link.
+include(CMakeFindDependencyMacro)
+find_dependency(Boost 1.81)
+find_dependency(Eigen3)
+find_dependency(OpenSSL)
+find_dependency(PkgConfig)
+find_dependency(Protobuf)
+find_dependency(Threads)
+find_dependency(tl-expected)
+pkg_check_modules(ZSTD REQUIRED QUIET IMPORTED_TARGET libzstd)
+pkg_check_modules(XXHASH REQUIRED QUIET IMPORTED_TARGET libxxhash)
+include(${CMAKE_CURRENT_LIST_DIR}/RoadAtlasTargets.cmake)

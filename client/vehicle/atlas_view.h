@@ -1,0 +1,82 @@
+// The map around a vehicle, in one call: what is missing comes from the daemon as far as bytes and
+// time allow, the rest is what was held. Without a link it answers all the same. One thread at a
+// time; the tiles themselves are immutable and shared.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "client/vehicle/atlas_link.h"
+#include "client/vehicle/store_sync.h"
+#include "client/vehicle/tile_store.h"
+#include "core/base/lru_list.h"
+#include "core/base/status.h"
+#include "core/tile/tile.h"
+
+namespace atlas {
+
+struct AroundOptions {
+  std::uint8_t finest_level = 0;
+  SectionBits sections = kEverySection;  // contributors and surface among them
+  std::uint64_t budget_bytes = 0;        // of the replies; 0: none
+  // For connecting and for what the daemon sends; a link that goes silent holds a call up to the
+  // connection's request timeout longer.
+  std::chrono::milliseconds deadline{2'000};
+};
+
+struct MapAround {
+  // For each place the finest that is held, coarse first; a coarse tile is there where a finer one
+  // below it is not held, and then also lies under those that are.
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  std::uint64_t finest_places = 0;  // tiles of the finest level
+  std::uint64_t coarse_places = 0;  // tiles that the atlas has below the coarse ones: not held
+  bool is_current = false;          // the daemon said in this call that this is all there is
+  std::uint64_t revision = 0;       // of the atlas then
+  Status sync;                      // why it is not current; ok where budget or time ended
+  StoreSyncReport transfer;
+
+  bool is_finest_everywhere() const { return coarse_places == 0 && !tiles.empty(); }
+};
+
+class AtlasView {
+ public:
+  // Decoded tiles are kept up to so many bytes. A null link: always offline. Both outlive the view.
+  AtlasView(TileStore& store,
+            AtlasLink* link,
+            std::size_t max_decoded_bytes = std::size_t{256} << 20);
+
+  // The tiles that the disc touches. Fails only for what makes no sense (kInvalidArgument).
+  Result<MapAround> Around(const Eigen::Vector2d& position_m,
+                           double radius_m,
+                           const AroundOptions& options = {});
+  // Fetches what will be needed along a route of 1 to 256 points that begins where the vehicle is.
+  Result<StoreSyncReport> Prefetch(const std::vector<Eigen::Vector2d>& route_m,
+                                   double half_width_m,
+                                   const AroundOptions& options);
+
+ private:
+  struct Decoded {
+    std::uint64_t payload_hash = 0;
+    SectionBits sections = 0;
+    std::shared_ptr<const Tile> tile;
+  };
+
+  Result<StoreSyncReport> Sync(const MapArea& area, const AroundOptions& options);
+  // Null: not held, or without what a map needs.
+  std::shared_ptr<const Tile> Decode(const TileId& id);
+  void NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) const;
+  // Decodes; false when a held tile turned out to be damaged, and is not held any more.
+  bool Collect(const DiscArea& disc, const AroundOptions& options, MapAround& map);
+  std::uint64_t MissingBelow(const Tile& tile, const DiscArea& disc) const;
+
+  TileStore& store_;
+  AtlasLink* link_;
+  std::size_t max_decoded_bytes_;
+  LruList<Decoded> decoded_;
+};
+
+}  // namespace atlas

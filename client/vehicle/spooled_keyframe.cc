@@ -1,0 +1,61 @@
+#include "client/vehicle/spooled_keyframe.h"
+
+#include <string>
+
+#include "client/vehicle/stored_file.h"
+
+namespace atlas {
+namespace {
+
+// Frozen.
+constexpr std::uint32_t kMagic = 0x4B564152;  // "RAVK"
+constexpr std::uint8_t kVersion = 1;
+
+}  // namespace
+
+Bytes EncodeSpooled(const KeyframeUpload& upload) {
+  ByteWriter out;
+  out.U32(kMagic);
+  out.U8(kVersion);
+  out.String(upload.key.session.vehicle);
+  out.String(upload.key.session.session);
+  out.U32(upload.key.sequence);
+  out.I64(upload.time_ms);
+  const QuantizedPose& pose = upload.T_world_sensor;
+  for (const std::int64_t coordinate : {pose.x_um, pose.y_um, pose.z_um}) {
+    out.I64(coordinate);
+  }
+  for (const std::int32_t part : pose.quaternion) {
+    out.I32(part);
+  }
+  out.U32(static_cast<std::uint32_t>(upload.blob.size()));
+  out.Raw(upload.blob);
+  return WithChecksum(out.Take());
+}
+
+Result<SpooledKeyframe> DecodeSpooled(ByteSpan file) {
+  const Result<ByteSpan> content = WithoutChecksum(file);
+  if (!content) return Error(content.error());
+  ByteReader in(*content);
+  const bool is_ours = in.U32() == kMagic && in.U8() == kVersion;
+  SpooledKeyframe keyframe;
+  keyframe.key.session.vehicle = std::string(in.String(kMaxNameSize));
+  keyframe.key.session.session = std::string(in.String(kMaxNameSize));
+  keyframe.key.sequence = in.U32();
+  keyframe.time_ms = in.I64();
+  QuantizedPose& pose = keyframe.T_world_sensor;
+  for (std::int64_t* coordinate : {&pose.x_um, &pose.y_um, &pose.z_um}) {
+    *coordinate = in.I64();
+  }
+  for (std::int32_t& part : pose.quaternion) {
+    part = in.I32();
+  }
+  const ByteSpan blob = in.Raw(in.U32());
+  keyframe.blob.assign(blob.begin(), blob.end());
+  if (!is_ours || !in.ok() || in.remaining() != 0 || !keyframe.key.Validate().ok()) {
+    return Error(StatusCode::kInvalidData, "spooled keyframe: the file holds something else");
+  }
+  return keyframe;
+}
+
+}  // namespace atlas

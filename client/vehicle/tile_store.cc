@@ -1,0 +1,199 @@
+#include "client/vehicle/tile_store.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "client/vehicle/area_bounds.h"
+#include "client/vehicle/held_summary.h"
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+#include "core/tile/tile_container.h"
+
+namespace atlas {
+namespace {
+
+// Every byte of the blob is looked at here, once, so that nothing damaged is ever kept.
+Status CheckBlob(ByteSpan blob,
+                 const TileBlob& tile,
+                 const MapProfile& profile,
+                 SectionBits sections) {
+  const Result<TileContainer> container = DecodeContainer(blob);
+  if (!container) return container.error();
+  if (container->key != tile.id.Key() || container->profile_hash != profile.Hash()) {
+    return {StatusCode::kInvalidData, "a blob of another tile or profile"};
+  }
+  const bool is_whole = sections == kEverySection;
+  if (is_whole && Hash64(EncodeContainerPayload(*container)) != tile.payload_hash) {
+    return {StatusCode::kInvalidData, "the content is not what its hash says"};
+  }
+  return {};
+}
+
+}  // namespace
+
+TileStore::TileStore(AtlasKey atlas, const TileStoreOptions& options)
+    : atlas_(std::move(atlas)),
+      options_(options),
+      memory_(atlas_.profile.levels),
+      disk_(atlas_.profile.levels) {}
+
+Result<TileStore> TileStore::Open(AtlasKey atlas, const TileStoreOptions& options) {
+  TileStore store(std::move(atlas), options);
+  if (options.folder.empty()) return store;
+  if (Status status = store.OpenFolder(); !status.ok()) return Error(std::move(status));
+  return store;
+}
+
+Status TileStore::OpenFolder() {
+  Result<TileFiles> files = TileFiles::Open(options_.folder, atlas_);
+  if (!files) return files.error();
+  files_ = *std::move(files);
+  for (const TileFiles::Found& found : files_->List()) {
+    disk_.Insert(found.facts.id, found.bytes);
+    tiles_[found.facts.id.Key()] = {found.facts, nullptr, true};
+  }
+  Trim();
+  return {};
+}
+
+const TileFacts* TileStore::Find(const TileId& id) const {
+  const auto found = tiles_.find(id.Key());
+  return found == tiles_.end() ? nullptr : &found->second.facts;
+}
+
+std::shared_ptr<const Bytes> TileStore::Read(const TileId& id) {
+  const auto found = tiles_.find(id.Key());
+  if (found == tiles_.end()) return nullptr;
+  Entry& entry = found->second;
+  memory_.Use(id);
+  disk_.Use(id);
+  if (entry.blob != nullptr) return entry.blob;
+  Result<Bytes> blob = files_->Read(entry.facts);
+  if (!blob) {
+    Erase(found);
+    return nullptr;
+  }
+  auto shared = std::make_shared<const Bytes>(*std::move(blob));
+  entry.blob = shared;
+  memory_.Insert(id, shared->size());
+  Trim();
+  return shared;
+}
+
+SectionBits TileStore::SectionsThatCame(const TileBlob& tile, SectionBits asked) const {
+  const auto told = told_.find(tile.id.Key());
+  const bool is_rest = told != told_.end() && told->second.payload_hash == tile.payload_hash;
+  return is_rest ? asked & ~told->second.sections : asked;
+}
+
+// The blob with what is held of the same content, whose sections are added to those of the blob.
+Result<Bytes> TileStore::Joined(const TileBlob& tile, SectionBits& sections) {
+  const TileFacts* held = Find(tile.id);
+  if (held == nullptr || held->payload_hash != tile.payload_hash) return tile.blob;
+  const SectionBits held_sections = held->sections;
+  const std::shared_ptr<const Bytes> blob = Read(tile.id);
+  if (blob == nullptr) return tile.blob;
+  sections |= held_sections;
+  return MergeSections(*blob, tile.blob);
+}
+
+Status TileStore::Put(const TileBlob& tile, SectionBits asked) {
+  SectionBits sections = SectionsThatCame(tile, asked);
+  Result<Bytes> blob = Joined(tile, sections);
+  Status status = blob ? CheckBlob(*blob, tile, atlas_.profile, sections) : blob.error();
+  Remove(tile.id);
+  if (!status.ok()) {
+    return Status(StatusCode::kInvalidData, status.message()).WithContext(StrCat("tile ", tile.id));
+  }
+  Keep({tile.id, tile.revision, tile.payload_hash, sections}, *std::move(blob));
+  return {};
+}
+
+void TileStore::Keep(const TileFacts& facts, Bytes blob) {
+  Entry entry{facts, nullptr, false};
+  if (files_) {
+    const Result<std::uint64_t> written = files_->Write(facts, blob);
+    entry.is_on_disk = written.has_value();
+    if (written) disk_.Insert(facts.id, *written);
+    disk_failures_ += written ? 0U : 1U;
+  }
+  memory_.Insert(facts.id, blob.size());
+  entry.blob = std::make_shared<const Bytes>(std::move(blob));
+  tiles_[facts.id.Key()] = std::move(entry);
+  Trim();
+}
+
+void TileStore::Trim() {
+  while (const auto id = memory_.TakeAbove(options_.max_memory_bytes)) {
+    const auto entry = tiles_.find(id->Key());
+    entry->second.blob = nullptr;
+    if (!entry->second.is_on_disk) tiles_.erase(entry);
+  }
+  while (const auto id = disk_.TakeAbove(options_.max_disk_bytes)) {
+    const auto entry = tiles_.find(id->Key());
+    files_->Remove(entry->second.facts);
+    entry->second.is_on_disk = false;
+    if (entry->second.blob == nullptr) tiles_.erase(entry);
+  }
+}
+
+void TileStore::Erase(Entries::iterator entry) {
+  const TileFacts& facts = entry->second.facts;
+  memory_.Remove(facts.id);
+  disk_.Remove(facts.id);
+  if (entry->second.is_on_disk) files_->Remove(facts);
+  tiles_.erase(entry);
+}
+
+void TileStore::Remove(const TileId& id) {
+  const auto found = tiles_.find(id.Key());
+  if (found != tiles_.end()) Erase(found);
+}
+
+void TileStore::Apply(const SyncSummary& summary) {
+  for (const TileId& id : summary.removed) {
+    Remove(id);
+  }
+  const bool is_whole = summary.cursor.empty() && summary.differing_blocks.empty();
+  if (is_whole) differing_.clear();
+  differing_.insert(summary.differing_blocks.begin(), summary.differing_blocks.end());
+}
+
+std::vector<HeldGroup> TileStore::Held(const MapArea& area,
+                                       std::uint8_t finest,
+                                       std::uint8_t coarsest) {
+  const AreaBounds bounds(area, atlas_.profile);
+  HeldSummary summary(differing_);
+  told_.clear();
+  const std::uint64_t first = std::uint64_t{finest} << 58U;
+  const std::uint64_t last = (std::uint64_t{coarsest} + 1) << 58U;
+  for (auto entry = tiles_.lower_bound(first); entry != tiles_.end() && entry->first < last;
+       ++entry) {
+    const TileFacts& facts = entry->second.facts;
+    if (!bounds.MayTouchBlock(facts.id)) continue;
+    summary.Add(facts);
+    if (facts.sections != kEverySection) told_[entry->first] = facts;
+  }
+  return summary.Take();
+}
+
+std::vector<TileId> TileStore::TilesIn(const DiscArea& disc, std::uint8_t finest) const {
+  std::vector<TileId> ids;
+  for (auto entry = tiles_.lower_bound(std::uint64_t{finest} << 58U); entry != tiles_.end();
+       ++entry) {
+    if (Touches(disc, entry->second.facts.id, atlas_.profile)) {
+      ids.push_back(entry->second.facts.id);
+    }
+  }
+  return ids;
+}
+
+std::vector<TileId> TileStore::Tiles() const {
+  std::vector<TileId> ids;
+  for (const auto& [key, entry] : tiles_) {
+    ids.push_back(entry.facts.id);
+  }
+  return ids;
+}
+
+}  // namespace atlas

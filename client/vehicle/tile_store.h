@@ -1,0 +1,85 @@
+// The tiles that a vehicle holds, as syncs brought them: encoded, merged section by section,
+// bounded in memory and, where there is a folder, on disk, where they outlive the program. Nothing
+// of it depends on a daemon. One thread at a time, one process a folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "client/connection/requests.h"
+#include "client/vehicle/eviction_order.h"
+#include "client/vehicle/tile_files.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct TileStoreOptions {
+  std::size_t max_memory_bytes = std::size_t{256} << 20;
+  std::filesystem::path folder = {};  // empty: nothing outlives the store
+  std::uint64_t max_disk_bytes = std::uint64_t{4} << 30;
+};
+
+class TileStore {
+ public:
+  // Reads the folder's names, no tile. Errors of a folder that cannot be made.
+  static Result<TileStore> Open(AtlasKey atlas, const TileStoreOptions& options);
+
+  const AtlasKey& atlas() const { return atlas_; }
+  std::size_t size() const { return tiles_.size(); }
+  std::size_t memory_bytes() const { return memory_.bytes(); }
+  std::size_t disk_bytes() const { return disk_.bytes(); }
+  // Tiles that the disk had no room for, or would not take: held in memory only.
+  std::uint64_t disk_failures() const { return disk_failures_; }
+
+  // Null: not held.
+  const TileFacts* Find(const TileId& id) const;
+  // The blob; null when it is not held, or was damaged on disk, and then is not held any more.
+  std::shared_ptr<const Bytes> Read(const TileId& id);
+  // A tile that came with the sections `asked` of it, but for those that Held told of the same
+  // content. kInvalidData, and that tile not held, when the blob is not what the hash says.
+  Status Put(const TileBlob& tile, SectionBits asked);
+  void Remove(const TileId& id);
+  // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
+  void Apply(const SyncSummary& summary);
+
+  // What to tell a daemon in a sync of this area: blocks where there are many tiles, single ones
+  // where there are few. What is told now is what later Puts are the rest of.
+  std::vector<HeldGroup> Held(const MapArea& area, std::uint8_t finest, std::uint8_t coarsest);
+  // Of these levels, in key order: finest first.
+  std::vector<TileId> TilesIn(const DiscArea& disc, std::uint8_t finest) const;
+  std::vector<TileId> Tiles() const;
+
+ private:
+  struct Entry {
+    TileFacts facts;
+    std::shared_ptr<const Bytes> blob;  // null: only on disk
+    bool is_on_disk = false;
+  };
+  using Entries = std::map<std::uint64_t, Entry>;  // by key
+
+  TileStore(AtlasKey atlas, const TileStoreOptions& options);
+  Status OpenFolder();
+  SectionBits SectionsThatCame(const TileBlob& tile, SectionBits asked) const;
+  Result<Bytes> Joined(const TileBlob& tile, SectionBits& sections);
+  void Keep(const TileFacts& facts, Bytes blob);
+  void Trim();
+  void Erase(Entries::iterator entry);
+
+  AtlasKey atlas_;
+  TileStoreOptions options_;
+  std::optional<TileFiles> files_;
+  Entries tiles_;
+  EvictionOrder memory_;
+  EvictionOrder disk_;
+  std::set<std::uint64_t> differing_;  // blocks to be told tile by tile
+  // Told as held in part: they may be gone before the rest of them comes.
+  std::map<std::uint64_t, TileFacts> told_;
+  std::uint64_t disk_failures_ = 0;
+};
+
+}  // namespace atlas

@@ -1,0 +1,66 @@
+// Keyframes wait on the vehicle's disk until the daemon has them on its own: nothing that Put
+// accepted is lost with the program, the link or the power. One file a keyframe, numbered in the
+// order of Put. One thread at a time, one process a folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <vector>
+
+#include "client/connection/atlas_client.h"
+#include "client/connection/keyframe_uploader.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct SpoolOptions {
+  std::filesystem::path folder;
+  std::uint64_t max_bytes = std::uint64_t{4} << 30;  // of waiting keyframes
+  // Of those that were refused: the oldest go first.
+  std::uint64_t max_refused_bytes = std::uint64_t{256} << 20;
+  UploadOptions upload = {};
+};
+
+struct SpoolReport {
+  std::uint64_t acknowledged = 0;  // and gone from the disk; duplicates among them
+  std::uint64_t set_aside = 0;     // refused for good or damaged; with a .reason beside each
+};
+
+class UploadSpool {
+ public:
+  // What a killed program left is put in order. Reads names only.
+  static Result<UploadSpool> Open(const SpoolOptions& options);
+
+  // On the disk when it returns. kResourceExhausted when there is no room, kInvalidArgument for a
+  // name or a size that no daemon takes; nothing was written then.
+  Status Put(const KeyframeUpload& upload);
+  // Oldest first, as many at a time as the options say. Fails when the link does, with the first
+  // refusal that may pass (what waits is kept then), or when the client may not upload at all.
+  Result<SpoolReport> Send(AtlasClient& client);
+
+  std::size_t waiting() const { return waiting_.size(); }
+  std::uint64_t waiting_bytes() const { return waiting_bytes_; }
+  std::filesystem::path refused_folder() const { return options_.folder / "refused"; }
+
+ private:
+  using Number = std::uint64_t;
+  class Sending;
+
+  explicit UploadSpool(SpoolOptions options) : options_(std::move(options)) {}
+  Status Scan();
+  void Remove(Number number);
+  // Moves it out of the queue, the reason first.
+  Status SetAside(Number number, const std::string& reason);
+  void TrimRefused();
+  std::filesystem::path PathOf(Number number) const;
+
+  SpoolOptions options_;
+  std::map<Number, std::uint64_t> waiting_;  // with the bytes of each
+  std::map<Number, std::uint64_t> refused_;
+  std::uint64_t waiting_bytes_ = 0;
+  std::uint64_t refused_bytes_ = 0;
+  Number next_ = 1;
+};
+
+}  // namespace atlas

@@ -1,0 +1,191 @@
+// A vehicle with the real daemon: what travels after a correction, after a restart and after a cut.
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "client/vehicle/atlas_view.h"
+#include "client/vehicle/upload_spool.h"
+#include "tests/client/end_to_end/cut_proxy.h"
+#include "tests/client/end_to_end/end_to_end_fixture.h"
+
+namespace atlas {
+namespace {
+
+using HashById = std::map<TileId, std::uint64_t>;
+
+class VehicleTest : public EndToEndTest {
+ protected:
+  static AtlasClient Connect(const Endpoint& endpoint) {
+    ConnectionOptions options;
+    options.endpoint = endpoint;
+    auto client = AtlasClient::Connect(options);
+    if (!client) throw std::runtime_error(client.error().message());
+    return *std::move(client);
+  }
+  static AtlasClient Connect(const DaemonProcess& daemon) {
+    return Connect(*Endpoint::Parse(daemon.address()));
+  }
+  static AtlasLink LinkTo(const Endpoint& endpoint) {
+    LinkOptions options;
+    options.connection.endpoint = endpoint;
+    return AtlasLink(options);
+  }
+  static TileStore StoreFor(const AtlasClient& client, const fs::path& folder = {}) {
+    return *TileStore::Open({client.atlas().atlas_id, client.profile()}, {.folder = folder});
+  }
+  static void Fill(const DaemonProcess& daemon) {
+    ASSERT_EQ(Ingest(daemon).exit_code, 0);
+    ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+  }
+
+  // The atlas as a query without anything held tells it.
+  static HashById AtlasNow(AtlasClient& client) {
+    HashById tiles;
+    const auto end = client.QueryRegion({}, [&](const TileBlob& tile) {
+      tiles[tile.id] = tile.payload_hash;
+      return Status();
+    });
+    EXPECT_TRUE(end);
+    return tiles;
+  }
+  static HashById Held(TileStore& store) {
+    HashById tiles;
+    for (const TileId& id : store.Tiles()) {
+      EXPECT_NE(store.Read(id), nullptr) << id;
+      tiles[id] = store.Find(id)->payload_hash;
+    }
+    return tiles;
+  }
+
+  static SyncQuery Everywhere() {
+    SyncQuery query;
+    query.area = DiscArea{{0.0, 0.0}, 1e6};
+    return query;
+  }
+
+  // The pose of a scan of the drive, moved along x.
+  static QuantizedPose PoseOf(int scan, double dx_m) {
+    std::ifstream in(shared_drive / "poses.txt");
+    std::string line;
+    for (int i = 0; i <= scan; ++i) {
+      std::getline(in, line);
+    }
+    std::istringstream text(line);
+    std::array<double, 12> numbers{};
+    for (double& number : numbers) {
+      text >> number;
+    }
+    numbers[3] += dx_m;
+    return QuantizedPose::FromPose(*PoseFromRowMajor(numbers));
+  }
+};
+
+TEST_F(VehicleTest, AfterACorrectionExactlyTheChangedTilesTravel) {
+  DaemonProcess daemon(NewData(), kSmall);
+  Fill(daemon);
+  AtlasClient client = Connect(daemon);
+  TileStore store = StoreFor(client);
+  const auto first = SyncStore(client, store, Everywhere());
+  ASSERT_TRUE(first) << first.error().message();
+  const HashById before = AtlasNow(client);
+  EXPECT_EQ(first->tiles, before.size());
+
+  const PoseCorrection correction{{{"vehicle", "overpass"}, 3}, PoseOf(3, 0.4)};
+  const auto batch = client.UpdatePoses(std::span(&correction, 1), "test");
+  ASSERT_TRUE(batch) << batch.error().message();
+  ASSERT_TRUE(client.WaitUntilFused(std::chrono::seconds(60)));
+  const HashById after = AtlasNow(client);
+  std::uint64_t changed = 0;
+  for (const auto& [id, hash] : after) {
+    const auto found = before.find(id);
+    changed += found == before.end() || found->second != hash ? 1U : 0U;
+  }
+  ASSERT_GT(changed, 0U);
+  ASSERT_LT(changed, after.size());
+
+  const auto second = SyncStore(client, store, Everywhere());
+  ASSERT_TRUE(second) << second.error().message();
+  EXPECT_TRUE(second->is_complete);
+  EXPECT_EQ(second->tiles, changed);
+  EXPECT_EQ(Held(store), after);
+}
+
+TEST_F(VehicleTest, AWarmStartSendsNotOneTileAgain) {
+  const fs::path data = NewData();
+  const fs::path kept = shared_root / "kept_tiles";
+  HashById held;
+  std::size_t tiles = 0;
+  const auto drive = [](AtlasView& view) {
+    std::uint64_t sent = 0;
+    for (double x_m = -20.0; x_m <= 20.0; x_m += 5.0) {
+      const auto map = view.Around({x_m, -3.0}, 15.0);
+      EXPECT_TRUE(map && map->is_current && map->is_finest_everywhere()) << x_m;
+      if (map) sent += map->transfer.tiles;
+    }
+    return sent;
+  };
+  {
+    DaemonProcess daemon(data, kSmall);
+    Fill(daemon);
+    TileStore store = StoreFor(Connect(daemon), kept);
+    AtlasLink link = LinkTo(*Endpoint::Parse(daemon.address()));
+    AtlasView view(store, &link);
+    const std::uint64_t sent = drive(view);
+    EXPECT_EQ(sent, store.size());
+    held = Held(store);
+    tiles = store.size();
+    EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+  }
+  ASSERT_GT(tiles, 10U);
+  DaemonProcess restarted(data, {});
+  TileStore store = *TileStore::Open(TileFiles::Known(kept).at(0), {.folder = kept});
+  AtlasLink link = LinkTo(*Endpoint::Parse(restarted.address()));
+  AtlasView view(store, &link);
+  EXPECT_EQ(drive(view), 0U);
+  EXPECT_EQ(Held(store), held);
+}
+
+TEST_F(VehicleTest, ACutReplyLeavesAMapAndTheNextSyncCompletesIt) {
+  DaemonProcess daemon(NewData(), kSmall);
+  Fill(daemon);
+  AtlasClient client = Connect(daemon);
+  const HashById atlas = AtlasNow(client);
+  TileStore store = StoreFor(client);
+  std::size_t held = 0;
+  for (const std::int64_t bytes : {20'000, 40'000}) {
+    CutProxy proxy(*Endpoint::Parse(daemon.address()), bytes);
+    AtlasClient cut = Connect(proxy.endpoint());
+    const auto report = SyncStore(cut, store, Everywhere());
+    ASSERT_FALSE(report);
+    EXPECT_EQ(report.error().code(), StatusCode::kUnavailable);
+    EXPECT_GT(store.size(), held);  // it goes on where it was cut
+    held = store.size();
+  }
+  const auto map = AtlasView(store, nullptr).Around({0.0, -3.0}, 15.0);
+  ASSERT_TRUE(map);
+  EXPECT_FALSE(map->tiles.empty());
+  EXPECT_GT(map->coarse_places, 0U);
+  const auto rest = SyncStore(client, store, Everywhere());
+  ASSERT_TRUE(rest) << rest.error().message();
+  EXPECT_EQ(rest->tiles, atlas.size() - held);
+  EXPECT_EQ(Held(store), atlas);
+}
+
+TEST_F(VehicleTest, WhatTheDaemonRefusesForGoodIsSetAside) {
+  DaemonProcess daemon(NewData(), kSmall);
+  UploadSpool spool = *UploadSpool::Open({.folder = shared_root / "spool"});
+  const Bytes no_keyframe(100, 7);
+  KeyframeUpload upload;
+  upload.key = {{"car", "monday"}, 1};
+  upload.time_ms = 1'000;
+  upload.blob = no_keyframe;
+  ASSERT_TRUE(spool.Put(upload).ok());
+  AtlasClient client = Connect(daemon);
+  const auto report = spool.Send(client);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->set_aside, 1U);
+  EXPECT_EQ(spool.waiting(), 0U);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# Installs the client library into a folder of its own, builds a project of a vehicle and the examples
+# of docs/client.md against it, and runs the project. Usage: install_test.sh SOURCE BUILD CMAKE COMPILER
+set -euo pipefail
+source=$1 build=$2 cmake=$3 compiler=$4
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+"$cmake" --install "$build" --prefix "$folder/prefix" >/dev/null
+if grep -rlE '<boost/asio|\.pb\.h|<openssl' "$folder/prefix/include"; then
+  echo "public headers include what should stay behind the library"
+  exit 1
+fi
+cp -r "$source/tests/client/install/project" "$folder/project"
+awk '/^```cpp$/ { on = 1; next } /^```$/ { on = 0 } on' "$source/docs/client.md" >"$folder/project/examples.cc"
+[[ -s "$folder/project/examples.cc" ]]
+"$cmake" -S "$folder/project" -B "$folder/build" -DCMAKE_PREFIX_PATH="$folder/prefix" \
+  -DCMAKE_CXX_COMPILER="$compiler" >/dev/null
+"$cmake" --build "$folder/build"
+"$folder/build/vehicle" "$folder/tiles"

@@ -1,0 +1,291 @@
+#include "tests/client/vehicle/sync_peer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "core/base/hash.h"
+#include "core/tile/tile_container.h"
+#include "core/tile/tile_pyramid.h"
+#include "proto/wire/convert.h"
+
+namespace atlas {
+namespace {
+
+constexpr std::uint64_t kSpareBytes = 400;  // for a manifest of one tile and the end
+
+SectionMask SectionsOf(const google::protobuf::RepeatedField<std::uint32_t>& numbers) {
+  SectionMask sections = 0;
+  for (const std::uint32_t number : numbers) {
+    sections |= SectionMask{1} << number;
+  }
+  return sections == 0 ? kAllSections : sections;
+}
+
+// What one request holds, by tile: which sections of the current content.
+class Answer {
+ public:
+  Answer(const TinyWorld& world, const wire::SyncRequest& request)
+      : world_(world), request_(request), wanted_(SectionsOf(request.sections())) {
+    for (const wire::Held& held : request.held()) {
+      HearTiles(held);
+      HearBlocks(held);
+    }
+  }
+
+  const wire::SyncManifest& holdings() const { return holdings_; }
+  // Sections to send; 0: none.
+  SectionMask Missing(const TileId& id) const {
+    if (!IsInArea(id) || suppressed_.contains(id.Key() >> 6)) return 0;
+    const auto found = current_.find(id);
+    return found == current_.end() ? wanted_ : wanted_ & ~found->second;
+  }
+
+ private:
+  bool IsInArea(const TileId& id) const {
+    if (id.level < request_.finest_level()) return false;
+    if (!request_.area().has_disc()) return true;
+    const auto& disc = request_.area().disc();
+    const double side = std::ldexp(TinyProfile().tile_size_m(), id.level);
+    const Eigen::Vector2d low = side * Eigen::Vector2d(id.x, id.y);
+    const Eigen::Vector2d high = low.array() + side;
+    const Eigen::Vector2d center =
+        1e-6 * Eigen::Vector2d(static_cast<double>(disc.center().x_um()),
+                               static_cast<double>(disc.center().y_um()));
+    return (center.cwiseMax(low).cwiseMin(high) - center).norm() <=
+           1e-6 * static_cast<double>(disc.radius_um());
+  }
+
+  void HearTiles(const wire::Held& held) {
+    for (int i = 0; i < held.keys_size(); ++i) {
+      const TileId id = *TileId::FromKey(held.keys(i));
+      const auto found = world_.tiles().find(id);
+      if (!IsInArea(id)) continue;
+      if (found == world_.tiles().end()) {
+        holdings_.add_removed(held.keys(i));
+      } else if (found->second.encoded.payload_hash == held.payload_hashes(i)) {
+        current_[id] = SectionsOf(held.sections());
+      }
+    }
+  }
+
+  void HearBlocks(const wire::Held& held) {
+    for (int i = 0; i < held.blocks_size(); ++i) {
+      ByteWriter content;
+      std::uint64_t mask = 0;
+      bool is_in_area = false;
+      for (std::uint64_t key = held.blocks(i) << 6; key >> 6 == held.blocks(i); ++key) {
+        const TileId id = *TileId::FromKey(key);
+        const bool is_held = (held.masks(i) >> (key & 63) & 1) != 0;
+        const auto found = world_.tiles().find(id);
+        is_in_area |= is_held && IsInArea(id);
+        if (!is_held || found == world_.tiles().end()) continue;
+        mask |= std::uint64_t{1} << (key & 63);
+        content.U64(key);
+        content.U64(found->second.encoded.payload_hash);
+        current_[id] = SectionsOf(held.sections());
+      }
+      const bool is_same = mask == held.masks(i) && Hash64(content.bytes()) == held.digests(i);
+      if (is_same || !is_in_area) continue;
+      holdings_.add_differing_blocks(held.blocks(i));
+      suppressed_.insert(held.blocks(i));
+    }
+  }
+
+  const TinyWorld& world_;
+  const wire::SyncRequest& request_;
+  SectionMask wanted_;
+  std::map<TileId, SectionMask> current_;
+  std::set<std::uint64_t> suppressed_;
+  wire::SyncManifest holdings_;
+};
+
+wire::Envelope TileOf(const TileId& id, const TinyWorld::Stored& stored, SectionMask sections) {
+  wire::Envelope envelope;
+  wire::TileMessage& tile = *envelope.mutable_tile();
+  tile.set_key(id.Key());
+  tile.set_revision(stored.revision);
+  tile.set_payload_hash(stored.encoded.payload_hash);
+  tile.set_blob(BytesToWire(*SelectSections(stored.encoded.blob, sections)));
+  return envelope;
+}
+
+void Announce(const wire::TileMessage& tile, wire::SyncManifest& manifest) {
+  manifest.add_keys(tile.key());
+  manifest.add_revisions(tile.revision());
+  manifest.add_payload_hashes(tile.payload_hash());
+  manifest.add_bytes(static_cast<std::uint32_t>(tile.blob().size()));
+}
+
+std::uint64_t FrameBytes(wire::Envelope envelope, std::uint64_t id) {
+  envelope.set_request_id(id);
+  return EncodeEnvelopeFrame(envelope)->size();
+}
+
+struct Position {
+  std::uint64_t key = ~std::uint64_t{0};  // of the last tile: keys fall, coarse first
+  std::uint64_t revision = 0;             // of the world when the first reply began
+};
+
+Position PositionFrom(const wire::SyncRequest& request, const TinyWorld& world) {
+  if (request.cursor().empty()) return {~std::uint64_t{0}, world.revision()};
+  ByteReader in(BytesFromWire(request.cursor()));
+  const std::uint64_t key = in.U64();
+  return {key, in.U64()};
+}
+
+std::vector<TileId> CoarseFirst(const TinyWorld& world) {
+  std::vector<TileId> ids;
+  for (const auto& [id, stored] : world.tiles()) {
+    ids.push_back(id);
+  }
+  std::sort(ids.begin(), ids.end(),
+            [](const TileId& a, const TileId& b) { return a.Key() > b.Key(); });
+  return ids;
+}
+
+// All frames of a reply, the end last.
+std::vector<wire::Envelope> Reply(const TinyWorld& world, const wire::Envelope& envelope) {
+  const wire::SyncRequest& request = envelope.sync_request();
+  const Answer answer(world, request);
+  Position position = PositionFrom(request, world);
+  std::vector<wire::Envelope> frames(1);
+  *frames[0].mutable_sync_manifest() = answer.holdings();
+  std::uint64_t bytes = FrameBytes(frames[0], envelope.request_id());
+  std::uint32_t tiles = 0;
+  bool is_cut = false;
+  for (const TileId& id : CoarseFirst(world)) {
+    const TinyWorld::Stored& stored = world.tiles().at(id);
+    const SectionMask sections = answer.Missing(id);
+    const bool is_due = id.Key() < position.key || stored.revision > position.revision;
+    if (sections == 0 || !is_due) continue;
+    std::vector<wire::Envelope> pair(2);
+    pair[1] = TileOf(id, stored, sections);
+    Announce(pair[1].tile(), *pair[0].mutable_sync_manifest());
+    const std::uint64_t more =
+        FrameBytes(pair[0], envelope.request_id()) + FrameBytes(pair[1], envelope.request_id());
+    is_cut = request.budget_bytes() != 0 && bytes + more + kSpareBytes > request.budget_bytes();
+    if (is_cut) break;
+    bytes += more;
+    ++tiles;
+    position.key = std::min(position.key, id.Key());
+    frames.insert(frames.end(), pair.begin(), pair.end());
+  }
+  wire::SyncEnd& end = *frames.emplace_back().mutable_sync_end();
+  end.set_tiles(tiles);
+  end.set_revision(world.revision());
+  ByteWriter cursor;
+  cursor.U64(position.key);
+  cursor.U64(position.revision);
+  if (is_cut) end.set_cursor(BytesToWire(cursor.bytes()));
+  std::uint64_t total = bytes + FrameBytes(frames.back(), envelope.request_id());
+  for (int i = 0; i < 3; ++i) {
+    end.set_bytes(total);
+    total = bytes + FrameBytes(frames.back(), envelope.request_id());
+  }
+  end.set_bytes(total);
+  return frames;
+}
+
+}  // namespace
+
+MapProfile TinyProfile() {
+  MapProfile profile;
+  profile.tile_cells = 16;
+  profile.levels = 4;
+  return profile;
+}
+
+AtlasKey TinyAtlas() {
+  return {Bytes(16, 'a'), TinyProfile()};
+}
+
+void TinyWorld::Set(std::int32_t x, std::int32_t y, std::int32_t altitude_mm) {
+  Tile tile = EmptyTile({0, x, y}, TinyProfile());
+  tile.contributors = {{"car", "monday"}};
+  TileLayer layer;
+  layer.altitude_mm = altitude_mm;
+  layer.sigma_100um = 1'000;
+  layer.observations = 3;
+  for (std::size_t cell = 0; cell + 1 < tile.cell_begin.size(); ++cell) {
+    layer.altitude_mm += 10;
+    tile.layers.push_back(layer);
+    tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(cell + 1);
+  }
+  ++revision_;
+  Store(tile);
+  BuildParents(tile.id);
+}
+
+void TinyWorld::Erase(std::int32_t x, std::int32_t y) {
+  ++revision_;
+  decoded_.erase({0, x, y});
+  tiles_.erase({0, x, y});
+  BuildParents({0, x, y});
+}
+
+void TinyWorld::Store(const Tile& tile) {
+  EncodedTile encoded = EncodeTile(tile, TinyProfile());
+  Stored& stored = tiles_[tile.id];
+  if (stored.encoded.payload_hash == encoded.payload_hash) return;
+  stored = {revision_, std::move(encoded)};
+  decoded_[tile.id] = tile;
+}
+
+void TinyWorld::BuildParents(TileId id) {
+  while (id.level + 1 < TinyProfile().levels) {
+    id = id.Parent();
+    std::array<const Tile*, 4> children{};
+    for (std::size_t i = 0; i < children.size(); ++i) {
+      const auto found = decoded_.find(id.Children()[i]);
+      children[i] = found == decoded_.end() ? nullptr : &found->second;
+    }
+    const Tile parent = BuildParentTile(id, children, TinyProfile());
+    if (!parent.is_empty()) {
+      Store(parent);
+    } else {
+      decoded_.erase(id);
+      tiles_.erase(id);
+    }
+  }
+}
+
+void TinyWorld::ChangeSome(std::mt19937& random, int side, int changes) {
+  for (int i = 0; i < changes; ++i) {
+    const int x = static_cast<int>(random() % static_cast<unsigned>(side)) - side / 2;
+    const int y = static_cast<int>(random() % static_cast<unsigned>(side)) - side / 2;
+    if (random() % 4 == 0) {
+      Erase(x, y);
+    } else {
+      Set(x, y, static_cast<std::int32_t>(random() % 4'000));
+    }
+  }
+}
+
+SyncPeer::SyncPeer(const TinyWorld& world, int frames_until_cut)
+    : world_(world),
+      frames_left_(frames_until_cut),
+      peer_([this](PeerSocket& socket) { Serve(socket); }) {}
+
+void SyncPeer::Serve(PeerSocket& socket) {
+  const auto hello = socket.ReadRequest();
+  if (!hello) return;
+  wire::Envelope greeting;
+  wire::HelloReply& reply = *greeting.mutable_hello_reply();
+  reply.set_protocol_major(kProtocolMajor);
+  reply.set_protocol_minor(kProtocolMinor);
+  reply.set_profile(ProfileToWire(TinyProfile()));
+  reply.set_atlas_id(BytesToWire(TinyAtlas().atlas_id));
+  socket.Reply(hello->request_id(), std::move(greeting));
+  while (const auto request = socket.ReadRequest()) {
+    ++syncs_;
+    for (wire::Envelope& frame : Reply(world_, *request)) {
+      if (frames_left_-- <= 0) return;
+      tiles_sent_ += frame.has_tile() ? 1 : 0;
+      socket.Reply(request->request_id(), std::move(frame));
+    }
+  }
+}
+
+}  // namespace atlas

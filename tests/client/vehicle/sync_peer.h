@@ -1,0 +1,67 @@
+// A small atlas that changes, and a daemon that answers syncs about it: from the rules of
+// docs/protocol.md, without priorities. Its connections break where a test wants it.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <random>
+#include <vector>
+
+#include "client/vehicle/tile_files.h"
+#include "core/tile/tile_codec.h"
+#include "tests/client/support/test_peer.h"
+
+namespace atlas {
+
+// Tiles of 16 cells, 4 levels.
+MapProfile TinyProfile();
+AtlasKey TinyAtlas();
+
+class TinyWorld {
+ public:
+  struct Stored {
+    std::uint64_t revision = 0;
+    EncodedTile encoded;
+  };
+
+  // The tile at level 0 with one surface at this altitude, and its parents.
+  void Set(std::int32_t x, std::int32_t y, std::int32_t altitude_mm);
+  void Erase(std::int32_t x, std::int32_t y);
+  void ChangeSome(std::mt19937& random, int side, int changes);
+
+  const std::map<TileId, Stored>& tiles() const { return tiles_; }
+  std::uint64_t revision() const { return revision_; }
+
+ private:
+  void BuildParents(TileId id);
+  void Store(const Tile& tile);
+
+  std::map<TileId, Tile> decoded_;
+  std::map<TileId, Stored> tiles_;
+  std::uint64_t revision_ = 0;
+};
+
+// One connection to a daemon with this world. Change the world only while nothing is asked.
+class SyncPeer {
+ public:
+  static constexpr int kNever = 1 << 30;
+
+  // Closes the connection when so many frames of replies were sent.
+  explicit SyncPeer(const TinyWorld& world, int frames_until_cut = kNever);
+
+  ConnectionOptions options() const { return peer_.options(); }
+  int syncs() const { return syncs_; }
+  int tiles_sent() const { return tiles_sent_; }
+
+ private:
+  void Serve(PeerSocket& socket);
+
+  const TinyWorld& world_;
+  int frames_left_;
+  std::atomic<int> syncs_{0};
+  std::atomic<int> tiles_sent_{0};
+  TestPeer peer_;  // last: its thread uses the others
+};
+
+}  // namespace atlas

@@ -1,0 +1,239 @@
+// What was put is sent or waits, whatever the link, the daemon and the disk do.
+#include "client/vehicle/upload_spool.h"
+
+#include <fstream>
+#include <mutex>
+
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert.h"
+#include "tests/client/support/test_peer.h"
+#include "tests/client/vehicle/test_folder.h"
+
+namespace atlas {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A daemon that remembers the sequence numbers it took, refuses as told, and leaves after so many.
+class UploadPeer {
+ public:
+  explicit UploadPeer(std::map<std::uint32_t, Status> refusals = {}, int answers = 1 << 30)
+      : refusals_(std::move(refusals)),
+        answers_(answers),
+        peer_([this](PeerSocket& socket) { Serve(socket); }) {}
+
+  Result<SpoolReport> Take(UploadSpool& spool) {
+    auto client = AtlasClient::Connect(peer_.options());
+    return client ? spool.Send(*client) : Result<SpoolReport>(Error(client.error()));
+  }
+  std::vector<std::uint32_t> came() {
+    const std::lock_guard lock(mutex_);
+    return came_;
+  }
+
+ private:
+  void Serve(PeerSocket& socket) {
+    AnswerHello(socket, {});
+    while (const auto request = socket.ReadRequest()) {
+      if (answers_-- <= 0) return;
+      const std::uint32_t sequence = request->upload_keyframe().key().sequence();
+      wire::Envelope reply;
+      const auto refusal = refusals_.find(sequence);
+      if (refusal != refusals_.end()) {
+        *reply.mutable_error() = ErrorToWire(refusal->second);
+      } else {
+        const std::lock_guard lock(mutex_);
+        came_.push_back(sequence);
+        reply.mutable_upload_reply()->set_revision(1);
+      }
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+  }
+
+  std::map<std::uint32_t, Status> refusals_;
+  int answers_;
+  std::mutex mutex_;
+  std::vector<std::uint32_t> came_;
+  TestPeer peer_;
+};
+
+Status PutOne(UploadSpool& spool, std::uint32_t sequence, std::size_t bytes = 100) {
+  const Bytes blob(bytes, static_cast<std::uint8_t>(sequence));
+  KeyframeUpload upload;
+  upload.key = {{"car", "monday"}, sequence};
+  upload.time_ms = 1'000 + sequence;
+  upload.blob = blob;
+  return spool.Put(upload);
+}
+
+UploadSpool OpenSpool(const TestFolder& folder, std::uint64_t max_bytes = 1U << 30U) {
+  SpoolOptions options;
+  options.folder = folder.path();
+  options.max_bytes = max_bytes;
+  return *UploadSpool::Open(options);
+}
+
+std::vector<std::uint32_t> UpTo(std::uint32_t count) {
+  std::vector<std::uint32_t> numbers;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    numbers.push_back(i);
+  }
+  return numbers;
+}
+
+std::vector<fs::path> FilesOf(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file()) paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+TEST(UploadSpoolTest, SendsInOrderAndForgets) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  UploadPeer peer;
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->acknowledged, 20U);
+  EXPECT_EQ(peer.came(), UpTo(20));
+  EXPECT_EQ(spool.waiting(), 0U);
+  EXPECT_EQ(spool.waiting_bytes(), 0U);
+  EXPECT_TRUE(FilesOf(folder.path()).empty());
+}
+
+// Keyframes whose answers were lost with the link come again.
+TEST(UploadSpoolHourTest, AnHourWithoutALinkLosesNothing) {
+  const TestFolder folder;
+  constexpr std::uint32_t kKeyframes = 3'600;
+  {
+    UploadSpool spool = OpenSpool(folder);
+    for (std::uint32_t i = 0; i < kKeyframes; ++i) {
+      ASSERT_TRUE(PutOne(spool, i, 60'000).ok());
+    }
+  }
+  UploadSpool spool = OpenSpool(folder);
+  EXPECT_EQ(spool.waiting(), kKeyframes);
+  UploadPeer cut({}, 1'000);
+  EXPECT_EQ(cut.Take(spool).error().code(), StatusCode::kUnavailable);
+  UploadSpool again = OpenSpool(folder);
+  EXPECT_GE(again.waiting(), kKeyframes - 1'000);
+  const auto first = static_cast<std::uint32_t>(kKeyframes - again.waiting());
+  UploadPeer peer;
+  ASSERT_TRUE(peer.Take(again));
+  EXPECT_EQ(cut.came(), UpTo(1'000));
+  std::vector<std::uint32_t> came = UpTo(first);
+  const auto rest = peer.came();
+  came.insert(came.end(), rest.begin(), rest.end());
+  EXPECT_EQ(came, UpTo(kKeyframes));
+}
+
+TEST(UploadSpoolTest, AFullSpoolTakesNothingAndLosesNothing) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder, 1'000);
+  std::uint32_t taken = 0;
+  Status status;
+  while ((status = PutOne(spool, taken)).ok()) {
+    ++taken;
+  }
+  EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
+  EXPECT_LE(spool.waiting_bytes(), 1'000U);
+  EXPECT_EQ(FilesOf(folder.path()).size(), taken);
+  UploadPeer peer;
+  ASSERT_TRUE(peer.Take(spool));
+  EXPECT_EQ(peer.came(), UpTo(taken));
+  EXPECT_TRUE(PutOne(spool, taken).ok());
+}
+
+TEST(UploadSpoolTest, WhatIsRefusedForGoodIsSetAsideWithItsReason) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  UploadPeer peer({{1, {StatusCode::kConflict, "other content"}},
+                   {3, {StatusCode::kInvalidData, "of another profile"}}});
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->acknowledged, 3U);
+  EXPECT_EQ(report->set_aside, 2U);
+  EXPECT_EQ(spool.waiting(), 0U);
+  const auto refused = FilesOf(spool.refused_folder());
+  ASSERT_EQ(refused.size(), 4U);
+  std::string reason;
+  std::getline(std::ifstream(refused[1]), reason);
+  EXPECT_EQ(reason, "conflict: keyframe car/monday/1: other content");
+  EXPECT_EQ(OpenSpool(folder).waiting(), 0U);
+}
+
+TEST(UploadSpoolTest, WhatMayPassLaterIsKept) {
+  for (const StatusCode code : {StatusCode::kResourceExhausted, StatusCode::kUnavailable,
+                                StatusCode::kInternal, StatusCode::kPermissionDenied}) {
+    const TestFolder folder;
+    UploadSpool spool = OpenSpool(folder);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      ASSERT_TRUE(PutOne(spool, i).ok());
+    }
+    UploadPeer full({{0, {code, "not now"}}, {1, {code, "not now"}}, {2, {code, "not now"}}});
+    EXPECT_EQ(full.Take(spool).error().code(), code);
+    EXPECT_EQ(spool.waiting(), 3U);
+    UploadPeer peer;
+    ASSERT_TRUE(peer.Take(spool));
+    EXPECT_EQ(peer.came(), UpTo(3));
+  }
+}
+
+TEST(UploadSpoolTest, WhatAKilledProgramLeavesIsPutInOrder) {
+  const TestFolder folder;
+  {
+    UploadSpool spool = OpenSpool(folder);
+    for (std::uint32_t i = 0; i < 6; ++i) {
+      ASSERT_TRUE(PutOne(spool, i).ok());
+    }
+  }
+  const auto files = FilesOf(folder.path());
+  fs::resize_file(files[1], fs::file_size(files[1]) / 2);
+  fs::resize_file(files[2], 0);
+  std::fstream(files[3], std::ios::in | std::ios::out | std::ios::binary).seekp(60).put('?');
+  fs::copy_file(files[0], folder.path() / "0000000000000009.keyframe");  // twice
+  std::ofstream(folder.path() / "0000000000000010.keyframe") << "garbage";
+  std::ofstream(folder.path() / "0000000000000011.keyframe.partial") << "half";
+  std::ofstream(folder.path() / "notes") << "not ours";
+  std::ofstream(folder.path() / "9999999999999999.keyframe") << "nor this";
+  UploadSpool spool = OpenSpool(folder);
+  EXPECT_FALSE(fs::exists(folder.path() / "0000000000000011.keyframe.partial"));
+  ASSERT_TRUE(PutOne(spool, 6).ok());
+  UploadPeer peer;
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{0, 4, 5, 0, 6}));
+  EXPECT_EQ(report->set_aside, 4U);
+  EXPECT_EQ(spool.waiting(), 0U);
+  EXPECT_TRUE(fs::exists(folder.path() / "notes"));
+}
+
+// A file at every length that a write can stop at.
+TEST(UploadSpoolTest, AFileCutAnywhereIsNeverSent) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  ASSERT_TRUE(PutOne(spool, 0, 30).ok());
+  const fs::path path = FilesOf(folder.path()).at(0);
+  for (std::uintmax_t size = fs::file_size(path); size-- > 0;) {
+    fs::resize_file(path, size);
+    UploadSpool cut = OpenSpool(folder);
+    UploadPeer peer;
+    const auto report = peer.Take(cut);
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->set_aside, 1U) << size;
+    EXPECT_TRUE(peer.came().empty());
+    fs::rename(cut.refused_folder() / path.filename(), path);
+  }
+}
+
+}  // namespace
+}  // namespace atlas
