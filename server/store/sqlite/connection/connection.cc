@@ -10,13 +10,13 @@
 namespace atlas {
 namespace {
 
-int OpenFlags(ConnectionOptions::Mode mode) {
+int OpenFlags(DatabaseOptions::Mode mode) {
   switch (mode) {
-    case ConnectionOptions::Mode::kCreate:
+    case DatabaseOptions::Mode::kCreate:
       return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
-    case ConnectionOptions::Mode::kReadWrite:
+    case DatabaseOptions::Mode::kReadWrite:
       return SQLite::OPEN_READWRITE;
-    case ConnectionOptions::Mode::kReadOnly:
+    case DatabaseOptions::Mode::kReadOnly:
       break;
   }
   return SQLite::OPEN_READONLY;
@@ -63,7 +63,7 @@ Bytes Query::Blob() {
   return {data, data + column.getBytes()};
 }
 
-Connection::Connection(const ConnectionOptions& options)
+Connection::Connection(const DatabaseOptions& options)
     : database_(options.file.string(), OpenFlags(options.mode), options.busy_timeout_ms) {
   std::random_device random;
   std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });

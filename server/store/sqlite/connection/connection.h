@@ -57,7 +57,7 @@ class Query {
   int column_ = 0;
 };
 
-struct ConnectionOptions {
+struct DatabaseOptions {
   enum class Mode { kCreate, kReadWrite, kReadOnly };
 
   std::filesystem::path file;
@@ -68,7 +68,7 @@ struct ConnectionOptions {
 
 class Connection {
  public:
-  explicit Connection(const ConnectionOptions& options);
+  explicit Connection(const DatabaseOptions& options);
 
   // `sql` is a string literal: statements are kept by its address. Not to be nested in itself.
   Query Prepare(const char* sql);
