@@ -1,6 +1,7 @@
 #include "server/store/sqlite/connection/connection.h"
 
 #include <algorithm>
+#include <cctype>
 #include <random>
 
 #include <sqlite3.h>
@@ -16,10 +17,33 @@ int OpenFlags(DatabaseOptions::Mode mode) {
       return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
     case DatabaseOptions::Mode::kReadWrite:
       return SQLite::OPEN_READWRITE;
+    case DatabaseOptions::Mode::kUntouched:
+      return SQLite::OPEN_READONLY | SQLite::OPEN_URI;
     case DatabaseOptions::Mode::kReadOnly:
       break;
   }
   return SQLite::OPEN_READONLY;
+}
+
+// The file as a URI that says that nobody changes it.
+std::string UntouchedUri(const std::string& file) {
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : file) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_plain = std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '_' || c == '-';
+    uri += is_plain ? std::string(1, c) : std::string{'%', kHex[byte >> 4U], kHex[byte & 15U]};
+  }
+  return uri + "?immutable=1";
+}
+
+std::string NameToOpen(const DatabaseOptions& options) {
+  const std::string file = options.file.string();
+  return options.mode == DatabaseOptions::Mode::kUntouched ? UntouchedUri(file) : file;
+}
+
+bool IsReader(DatabaseOptions::Mode mode) {
+  return mode == DatabaseOptions::Mode::kReadOnly || mode == DatabaseOptions::Mode::kUntouched;
 }
 
 }  // namespace
@@ -64,9 +88,13 @@ Bytes Query::Blob() {
 }
 
 Connection::Connection(const DatabaseOptions& options)
-    : database_(options.file.string(), OpenFlags(options.mode), options.busy_timeout_ms) {
+    : database_(NameToOpen(options), OpenFlags(options.mode), options.busy_timeout_ms) {
   std::random_device random;
   std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });
+  if (IsReader(options.mode)) {
+    // The last one to leave does not move the log into the database.
+    sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  }
   // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.
   Execute(
       StrCat("PRAGMA cache_size = -", options.cache_kib,

@@ -58,7 +58,13 @@ class Query {
 };
 
 struct DatabaseOptions {
-  enum class Mode { kCreate, kReadWrite, kReadOnly };
+  enum class Mode {
+    kCreate,
+    kReadWrite,
+    kReadOnly,   // writers go on: takes locks in the files beside the database, makes them if need
+                 // be
+    kUntouched,  // the file alone, without a lock, and nothing beside it: nobody may be writing
+  };
 
   std::filesystem::path file;
   Mode mode = Mode::kReadOnly;
