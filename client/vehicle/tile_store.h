@@ -43,6 +43,8 @@ class TileStore {
   // A tile that came with the sections `asked` of it, but for those that Held told of the same
   // content. kInvalidData, and that tile not held, when the blob is not what the hash says.
   Status Put(const TileBlob& tile, SectionBits asked);
+  // The same of a tile with all its sections, whatever Held told.
+  Status PutWhole(const TileBlob& tile);
   void Remove(const TileId& id);
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
   void Apply(const SyncSummary& summary);
