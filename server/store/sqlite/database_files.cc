@@ -43,11 +43,16 @@ Status CheckKind(const fs::path& file, const struct stat& found) {
 
 Result<DatabaseFiles> DatabaseFiles::Look(const fs::path& file) {
   std::error_code error;
-  DatabaseFiles files;
-  files.database = fs::canonical(file, error);
+  const fs::path without_links = fs::canonical(file, error);
   if (error) {
     return Error(DiskError(kWhat, file, error.value()));
   }
+  return LookAt(without_links);
+}
+
+Result<DatabaseFiles> DatabaseFiles::LookAt(const fs::path& file) {
+  DatabaseFiles files;
+  files.database = file;
   struct stat found {};
   if (::stat(files.database.c_str(), &found) != 0) {
     return Error(DiskError(kWhat, file, errno));

@@ -22,11 +22,16 @@ struct DatabaseFiles {
   // kNotFound, kPermissionDenied: as the disk says. kInvalidArgument: a directory, or no file. None
   // of them is opened: closing it would take SQLite's locks from this process.
   static Result<DatabaseFiles> Look(const std::filesystem::path& file);
+  // The same as it is now.
+  Result<DatabaseFiles> LookAgain() const { return LookAt(database); }
 
   // Nobody has it open, and all of it is in the one file.
   bool is_alone() const { return !has_journal && (is_log_empty && !has_log_index); }
 
   friend bool operator==(const DatabaseFiles&, const DatabaseFiles&) = default;
+
+ private:
+  static Result<DatabaseFiles> LookAt(const std::filesystem::path& file);
 };
 
 }  // namespace atlas

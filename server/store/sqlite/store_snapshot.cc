@@ -95,7 +95,7 @@ Status StoreSnapshot::CheckUntouched() const {
   if (!files_.is_alone()) {
     return {};
   }
-  const Result<DatabaseFiles> now = DatabaseFiles::Look(files_.database);
+  const Result<DatabaseFiles> now = files_.LookAgain();
   return now && *now == files_
              ? Status()
              : Status(StatusCode::kUnavailable,

@@ -9,7 +9,8 @@ int main(int argc, char** argv) {
   if (argc != 4) return 2;
   auto file = atlas::AtlasFile::Open(argv[1]);
   if (!file) {
-    std::cerr << atlas::StatusCodeName(file.error().code()) << ": " << file.error().message() << '\n';
+    std::cerr << atlas::StatusCodeName(file.error().code()) << ": " << file.error().message()
+              << '\n';
     return 1;
   }
   auto store = atlas::TileStore::Open(file->key(), {});
@@ -18,6 +19,7 @@ int main(int argc, char** argv) {
   atlas::AtlasView view(*store, feed);
   const auto map = view.Around({std::atof(argv[2]), std::atof(argv[3])}, 50.0);
   if (!map || !map->sync.ok()) return 1;
-  std::cout << map->tiles.size() << " tiles, " << (map->is_current ? "current" : "not current") << '\n';
+  std::cout << map->tiles.size() << " tiles, " << (map->is_current ? "current" : "not current")
+            << '\n';
   return 0;
 }
