@@ -10,9 +10,8 @@ namespace {
 
 void NoteDirtyTiles(const AtlasFile& file, const CommandContext& context) {
   if (file.dirty_tiles() == 0) return;
-  context.err << "note: " << file.dirty_tiles()
-              << " tiles of the file wait to be fused and show what they showed before; a daemon "
-                 "that runs on it fuses them\n";
+  context.err << "note: tiles of the file that wait to be fused: " << file.dirty_tiles()
+              << "; they show what they showed before, until a daemon fuses them\n";
 }
 
 Result<std::unique_ptr<AtlasFile>> OpenFile(const CommandContext& context,

@@ -135,7 +135,7 @@ TEST_F(AtlasFileEndToEndTest, TilesThatWaitToBeFusedAreNoted) {
   const CommandRun noted = RunOn(file, {"point", "0", "-3"});
   EXPECT_EQ(noted.exit_code, 0);
   EXPECT_EQ(noted.out, before.out);
-  EXPECT_NE(noted.err.find("note: 2 tiles"), std::string::npos) << noted.err;
+  EXPECT_NE(noted.err.find("wait to be fused: 2;"), std::string::npos) << noted.err;
 }
 
 TEST_F(AtlasFileEndToEndTest, WhatIsNoAtlasFileHasItsExitCode) {

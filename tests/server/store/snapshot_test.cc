@@ -62,6 +62,19 @@ TEST_F(SnapshotTest, TheLogOfAKilledWriterCounts) {
   EXPECT_EQ(FolderState::Of(copy.parent_path()), before);
 }
 
+TEST_F(SnapshotTest, TheEmptyLogOfACopyIsNothing) {
+  Fill();
+  store_.reset();
+  const fs::path copy = CopyTo("copy");
+  std::ofstream(copy.string() + "-wal").flush();
+  const FolderState before = FolderState::Of(copy.parent_path());
+  auto snapshot = OpenFile(copy);
+  ASSERT_TRUE(snapshot) << snapshot.error().message();
+  EXPECT_EQ(ValueOf(*snapshot, {0, 4, -4}), 9);
+  EXPECT_EQ(FolderState::Of(copy.parent_path()), before);
+  EXPECT_FALSE(fs::exists(copy.string() + "-shm"));
+}
+
 TEST_F(SnapshotTest, AWriterThatComesLaterIsNoticed) {
   Fill();
   store_.reset();

@@ -42,10 +42,6 @@ std::string NameToOpen(const DatabaseOptions& options) {
   return options.mode == DatabaseOptions::Mode::kUntouched ? UntouchedUri(file) : file;
 }
 
-bool IsReader(DatabaseOptions::Mode mode) {
-  return mode == DatabaseOptions::Mode::kReadOnly || mode == DatabaseOptions::Mode::kUntouched;
-}
-
 }  // namespace
 
 Query::~Query() {
@@ -91,10 +87,6 @@ Connection::Connection(const DatabaseOptions& options)
     : database_(NameToOpen(options), OpenFlags(options.mode), options.busy_timeout_ms) {
   std::random_device random;
   std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });
-  if (IsReader(options.mode)) {
-    // The last one to leave does not move the log into the database.
-    sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  }
   // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.
   Execute(
       StrCat("PRAGMA cache_size = -", options.cache_kib,
