@@ -1,14 +1,14 @@
 // Brings a store up to date with a daemon, in as many requests as it takes within a budget.
 #pragma once
 
-#include <cstdint>
-
 #include "client/connection/atlas_client.h"
+#include "client/vehicle/tile_feed.h"
 #include "client/vehicle/tile_store.h"
 #include "core/base/status.h"
 
 namespace atlas {
 
+<<<<<<< HEAD
 struct StoreSyncReport {
   std::uint64_t tiles = 0;
   std::uint64_t deltas = 0;  // of these, as differences to what was held
@@ -18,6 +18,8 @@ struct StoreSyncReport {
   bool is_complete = false;    // the store got all that the query wants
 };
 
+=======
+>>>>>>> fil
 // What is held and the cursor of `query` are set here; its budget and its timeout bound all
 // requests together. Each tile is in the store as soon as it came: after a failure the store is as
 // good as it was, or better. kConflict: the daemon serves another atlas.

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "client/vehicle/atlas_view.h"
+#include "client/vehicle/store_sync.h"
 #include "client/vehicle/upload_spool.h"
 #include "tests/client/end_to_end/cut_proxy.h"
 #include "tests/client/end_to_end/end_to_end_fixture.h"
