@@ -58,7 +58,7 @@ class TcpServer::Impl {
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
         budget_(options.max_held_bytes),
-        limits_(options_),
+        limits_(options.of_name),
         places_(options.max_connections),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
         signals_(io_, SIGTERM, SIGINT) {
@@ -107,6 +107,8 @@ class TcpServer::Impl {
       }
     });
   }
+
+  void ChangeNameLimits(const NameLimits& limits) { limits_.Change(limits); }
 
   NetFigures ReadFigures() const {
     NetFigures figures;
@@ -261,6 +263,9 @@ void TcpServer::Stop() {
 }
 void TcpServer::ChangeSecurity(ServerSecurity security) {
   impl_->ChangeSecurity(std::move(security));
+}
+void TcpServer::ChangeNameLimits(const NameLimits& limits) {
+  impl_->ChangeNameLimits(limits);
 }
 NetFigures TcpServer::ReadFigures() const {
   return impl_->ReadFigures();
