@@ -28,10 +28,12 @@ struct NetOptions {
   std::size_t max_held_bytes = 512u << 20;     // requests and parts of them, all connections
   std::size_t tile_frame_bytes = 64u << 20;    // tiles ready to be sent, all connections
   NameLimits of_name;
-  std::size_t max_watches = 1024;  // all connections
-  std::size_t max_waits = 16;      // waits, digests, verifications, all connections
-  int service_threads = 4;         // that may block on the disk
-  int reading_threads = 2;         // for digests and verifications, which read all
+  double short_visits_per_s = 200;  // connections of less than a second; 0: no limit
+  std::size_t max_arrivals = 32;    // accepted and not begun yet, a thread
+  std::size_t max_watches = 1024;   // all connections
+  std::size_t max_waits = 16;       // waits, digests, verifications, all connections
+  int service_threads = 4;          // that may block on the disk
+  int reading_threads = 2;          // for digests and verifications, which read all
   std::chrono::milliseconds handshake{5'000};
   std::chrono::milliseconds idle{3'600'000};  // between two frames
   std::chrono::milliseconds frame{30'000};    // from a frame's first byte to its last, and besides

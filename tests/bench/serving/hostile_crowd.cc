@@ -1,5 +1,6 @@
 #include "tests/bench/serving/hostile_crowd.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <random>
@@ -58,7 +59,9 @@ void RandomBytes(Visit& visit) {
 
 void ClaimsMoreThanThereMayBe(Visit& visit) {
   visit.Greet();
-  visit.Say(EncodeHeader({0xffff'ffffu, 1}));
+  Bytes header = EncodeHeader({0, 1});
+  std::fill_n(header.begin() + 4, 4, std::uint8_t{0xff});  // the length
+  visit.Say(header);
   visit.WaitForTheEnd();
 }
 

@@ -76,11 +76,25 @@ class LoadRun {
     for (int i = 0; i < options_.connections; ++i) {
       ATLAS_RETURN_IF_ERROR(Connect());
     }
+    end_ = Clock::now();
+    for (auto& peer : peers_) {
+      if (!peer->is_greeted) {
+        ATLAS_RETURN_IF_ERROR(Begin(*peer));
+      }
+    }
+    ATLAS_RETURN_IF_ERROR(RunUntilAnswered());
     const auto begin = Clock::now();
     end_ = begin + options_.time;
     for (auto& peer : peers_) {
       ATLAS_RETURN_IF_ERROR(Begin(*peer));
     }
+    ATLAS_RETURN_IF_ERROR(RunUntilAnswered());
+    result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    return {};
+  }
+
+  // Until the time is over and no batch is under way.
+  Status RunUntilAnswered() {
     while (busy_ > 0) {
       std::array<epoll_event, 64> events{};
       const int count =
@@ -93,7 +107,6 @@ class LoadRun {
             OnEvent(*static_cast<LoadPeer*>(events[static_cast<std::size_t>(i)].data.ptr)));
       }
     }
-    result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     return {};
   }
 
