@@ -10,7 +10,7 @@ import tempfile
 from bench_daemon import Atlas, Certificate, rows_of
 from bench_nginx import Nginx
 
-ROUNDS = 2
+ROUNDS = 7
 ROUND_MS = 1500
 THREADS = 1  # of the daemon's network and of nginx; the load generator has a core of its own
 CONNECTIONS = 16
