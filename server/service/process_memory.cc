@@ -10,7 +10,7 @@ namespace {
 
 // That the heap of a thread keeps behind its last block: with less, whatever decodes an upload has
 // the system clear the same pages again for each.
-[[maybe_unused]] constexpr int kKeptBytes = 8 << 20;
+[[maybe_unused]] constexpr int kKeptBytes = 1 << 20;
 
 }  // namespace
 
