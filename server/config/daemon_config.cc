@@ -22,18 +22,17 @@ namespace {
 using Settings = GivenSettings;
 
 // Who adds one here gives it to a part of LiveConfig.
-constexpr std::string_view kLiveSettings[] = {
-    "access.anonymous",
-    "access.tokens",
-    "limits.connections_per_name",
-    "limits.held_mib_per_name",
-    "limits.mib_per_s_per_name",
-    "limits.requests_per_s_per_name",
-    "log_format",
-    "log_level",
-    "tls.certificate",
-    "tls.client_ca",
-    "tls.key"};
+constexpr std::string_view kLiveSettings[] = {"access.anonymous",
+                                              "access.tokens",
+                                              "limits.connections_per_name",
+                                              "limits.held_mib_per_name",
+                                              "limits.mib_per_s_per_name",
+                                              "limits.requests_per_s_per_name",
+                                              "log_format",
+                                              "log_level",
+                                              "tls.certificate",
+                                              "tls.client_ca",
+                                              "tls.key"};
 
 Status BadValue(const std::string& key, const std::string& text, const char* expected) {
   return Status(StatusCode::kInvalidArgument, StrCat(key, " is '", text, "', expected ", expected));
@@ -264,7 +263,8 @@ constexpr Setting kSettings[] = {
      "of whoever shows nothing: none, reader, vehicle, merge or admin", SettingType::kText,
      &ApplyAnonymous},
     {"access.allow_plaintext", "--allow-plaintext", "ATLASD_ALLOW_PLAINTEXT", "BOOL",
-     "listen beyond loopback without TLS", SettingType::kTruth, &ApplyTruth<&DaemonConfig::allow_plaintext>},
+     "listen beyond loopback without TLS", SettingType::kTruth,
+     &ApplyTruth<&DaemonConfig::allow_plaintext>},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell",
      SettingType::kNumber, &ApplyNumberTo<double, &DaemonConfig::cell_size_m>},
     {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",

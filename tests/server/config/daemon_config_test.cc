@@ -213,8 +213,7 @@ TEST_F(DaemonConfigTest, FusionMayStandBackOrStandStill) {
   const auto given = Parse({"--data", "/x"});
   EXPECT_TRUE(given->config.is_fusing);
   EXPECT_EQ(given->config.fusion_nice, DaemonConfig().fusion_nice);
-  const auto read =
-      Parse({"--config", File("data = '/x'\n[fusion]\nenabled = false\nnice = 3\n")});
+  const auto read = Parse({"--config", File("data = '/x'\n[fusion]\nenabled = false\nnice = 3\n")});
   ASSERT_TRUE(read.has_value()) << read.error().message();
   EXPECT_FALSE(read->config.is_fusing);
   EXPECT_EQ(read->config.fusion_nice, 3);
