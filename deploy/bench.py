@@ -12,6 +12,8 @@ import subprocess
 import sys
 import tempfile
 
+import bench_load
+import bench_nginx
 import bench_serving
 import bench_updates
 from bench_daemon import Atlas
@@ -200,7 +202,8 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               "localization": bench_localization, "fusion": bench_fusion, "accuracy": bench_accuracy,
               "curbs": bench_curbs,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
-                 for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS}.items()}}
+                 for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
+                                   **bench_load.BENCHMARKS}.items()}}
 
 
 def main():
@@ -212,7 +215,7 @@ def main():
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
-    bench_serving.NGINX = args.nginx
+    bench_nginx.PROGRAM = args.nginx
     for name in args.names or BENCHMARKS:
         BENCHMARKS[name](args.bin)
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Runs the benchmarks named (all, if none) and prints one JSON line a figure:
 # {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion] [accuracy] [curbs]
-#   [speed] [closure] [online] [passes] [corrections] [restarts] [scaling] [serving]
+#   [speed] [closure] [online] [passes] [corrections] [restarts] [scaling] [serving] [serving_tls]
+#   [reads] [uploads] [connections]
 # All but fusion, accuracy, online, passes, corrections, restarts and scaling need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the
 # meshes there too. curbs prints a line a threshold instead. curbs, online and passes draw docs/images/*.png.
 set -euo pipefail

@@ -1,9 +1,11 @@
 """A daemon for a benchmark, and the rows that programs print."""
 
 import json
+import pathlib
 import subprocess
 import sys
 import tempfile
+import urllib.request
 
 
 def rows_of(*command):
@@ -15,26 +17,61 @@ def rows_of(*command):
         sys.exit(process.returncode)
 
 
+class Certificate:
+    """One that vouches for itself, for 127.0.0.1."""
+
+    def __init__(self, folder):
+        self.file = pathlib.Path(folder) / "server.pem"
+        self.key = pathlib.Path(folder) / "server.key"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+                        "-days", "2", "-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1",
+                        "-keyout", self.key, "-out", self.file], check=True, stderr=subprocess.DEVNULL)
+
+
 class Atlas:
     """A daemon in a directory of its own, and the command line speaking to it."""
 
-    def __init__(self, bin_dir, *profile):
+    def __init__(self, bin_dir, *flags, certificate=None):
         self.bin = bin_dir
         self.folder = tempfile.TemporaryDirectory()
+        self.client_flags = []
+        if certificate:
+            flags += ("--tls-certificate", str(certificate.file), "--tls-key", str(certificate.key))
+            self.client_flags = ["--tls-ca", certificate.file]
         self.process = subprocess.Popen(
             [bin_dir / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
-             "--log-level", "error", *profile], stdout=subprocess.PIPE, text=True)
-        self.server = self.process.stdout.readline().split()[1]
+             "--http", "127.0.0.1:0", "--log-level", "error", *flags], stdout=subprocess.PIPE, text=True)
+        self.server, self.http = (self.process.stdout.readline().split()[1] for _ in range(2))
+        self.port = self.server.rsplit(":")[-1]
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        self.process.terminate()
-        self.process.wait()
+        self.stop()
         self.folder.cleanup()
 
+    @property
+    def database(self):
+        return pathlib.Path(self.folder.name) / "atlas/atlas.db"
+
+    def stop(self):
+        """Its files stay until the end."""
+        self.process.terminate()
+        self.process.wait()
+
     def run(self, *args):
-        out = subprocess.run([self.bin / "atlas", *map(str, args), "--server", self.server, "--json"],
+        out = subprocess.run([str(part) for part in (self.bin / "atlas", *args, "--server", self.server,
+                                                     *self.client_flags, "--json")],
                              check=True, stdout=subprocess.PIPE, text=True).stdout
         return json.loads(out.strip().splitlines()[-1])
+
+    def metric(self, name):
+        """Of those without labels."""
+        with urllib.request.urlopen(f"http://{self.http}/metrics", timeout=10) as page:
+            lines = page.read().decode().splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith(name + " "))
+
+    def resident_bytes(self):
+        lines = pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
+        return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))

@@ -9,7 +9,7 @@ BUILD_PACKAGES=(
   libssl-dev libpng-dev prometheus-cpp-dev
 )
 TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-protobuf python3-xxhash xz-utils)
-BENCH_PACKAGES=(libbenchmark-dev python3-matplotlib)
+BENCH_PACKAGES=(libbenchmark-dev openssl python3-matplotlib)
 TIDY_PACKAGES=(clang-tidy)
 
 # install_packages PACKAGE...: asks apt only for what is missing.

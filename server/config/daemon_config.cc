@@ -22,9 +22,17 @@ namespace {
 using Settings = GivenSettings;
 
 // Who adds one here gives it to a part of LiveConfig.
-constexpr std::string_view kLiveSettings[] = {
-    "access.anonymous", "access.tokens", "log_format", "log_level",
-    "tls.certificate",  "tls.client_ca", "tls.key"};
+constexpr std::string_view kLiveSettings[] = {"access.anonymous",
+                                              "access.tokens",
+                                              "limits.connections_per_name",
+                                              "limits.held_mib_per_name",
+                                              "limits.mib_per_s_per_name",
+                                              "limits.requests_per_s_per_name",
+                                              "log_format",
+                                              "log_level",
+                                              "tls.certificate",
+                                              "tls.client_ca",
+                                              "tls.key"};
 
 Status BadValue(const std::string& key, const std::string& text, const char* expected) {
   return Status(StatusCode::kInvalidArgument, StrCat(key, " is '", text, "', expected ", expected));
@@ -125,11 +133,12 @@ Status ApplyAnonymous(const std::string& /*key*/, const std::string& text, Daemo
   return {};
 }
 
-Status ApplyAllowPlaintext(const std::string& key, const std::string& text, DaemonConfig& config) {
+template <bool DaemonConfig::*kMember>
+Status ApplyTruth(const std::string& key, const std::string& text, DaemonConfig& config) {
   if (text != "true" && text != "false") {
     return BadValue(key, text, "true or false");
   }
-  config.allow_plaintext = text == "true";
+  config.*kMember = text == "true";
   return {};
 }
 
@@ -204,6 +213,12 @@ constexpr Setting kSettings[] = {
      "port 0 takes a free one; beyond loopback TLS is expected", SettingType::kText, &ApplyListen},
     {"workers", "--workers", "ATLASD_WORKERS", "N", "fusion threads; 0 is one a core",
      SettingType::kNumber, &ApplyCountTo<&DaemonConfig::workers, 0, 64>},
+    {"fusion.enabled", "--fusion", "ATLASD_FUSION", "BOOL",
+     "false: take uploads and leave their tiles dirty", SettingType::kTruth,
+     &ApplyTruth<&DaemonConfig::is_fusing>},
+    {"fusion.nice", "--fusion-nice", "ATLASD_FUSION_NICE", "N",
+     "steps of nice by which fusion threads stand back", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::fusion_nice, 0, 19>},
     {"network_threads", "--network-threads", "ATLASD_NETWORK_THREADS", "N",
      "threads that run connections; 0 is one for every four cores", SettingType::kNumber,
      &ApplyCountTo<&DaemonConfig::network_threads, 0, 64>},
@@ -217,6 +232,18 @@ constexpr Setting kSettings[] = {
      &ApplyCountTo<&DaemonConfig::survey_disk_mib, 0, 16'777'216>},
     {"reply_mib", "--reply-mib", "ATLASD_REPLY_MIB", "MIB", "memory for tiles ready to be sent",
      SettingType::kNumber, &ApplyCountTo<&DaemonConfig::reply_mib, 0, 65'536>},
+    {"limits.connections_per_name", "--connections-per-name", "ATLASD_CONNECTIONS_PER_NAME", "N",
+     "connections of one certificate's or token's name", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::name_connections, 1, 4'096>},
+    {"limits.held_mib_per_name", "--held-mib-per-name", "ATLASD_HELD_MIB_PER_NAME", "MIB",
+     "its requests under way", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::name_held_mib, 48, 512>},
+    {"limits.requests_per_s_per_name", "--requests-per-s-per-name",
+     "ATLASD_REQUESTS_PER_S_PER_NAME", "N", "its requests a second; 0: no limit",
+     SettingType::kNumber, &ApplyCountTo<&DaemonConfig::name_requests_per_s, 0, 10'000'000>},
+    {"limits.mib_per_s_per_name", "--mib-per-s-per-name", "ATLASD_MIB_PER_S_PER_NAME", "MIB",
+     "what it sends a second; 0: no limit", SettingType::kNumber,
+     &ApplyCountTo<&DaemonConfig::name_mib_per_s, 0, 65'536>},
     {"log_level", "--log-level", "ATLASD_LOG_LEVEL", "LEVEL", "debug, info, warning or error",
      SettingType::kText, &ApplyLogLevel},
     {"log_format", "--log-format", "ATLASD_LOG_FORMAT", "NAME", "text, or json: an object a line",
@@ -236,7 +263,8 @@ constexpr Setting kSettings[] = {
      "of whoever shows nothing: none, reader, vehicle, merge or admin", SettingType::kText,
      &ApplyAnonymous},
     {"access.allow_plaintext", "--allow-plaintext", "ATLASD_ALLOW_PLAINTEXT", "BOOL",
-     "listen beyond loopback without TLS", SettingType::kTruth, &ApplyAllowPlaintext},
+     "listen beyond loopback without TLS", SettingType::kTruth,
+     &ApplyTruth<&DaemonConfig::allow_plaintext>},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell",
      SettingType::kNumber, &ApplyNumberTo<double, &DaemonConfig::cell_size_m>},
     {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
@@ -256,11 +284,17 @@ std::map<std::string, std::string> Defaults() {
   return {{"data", "must be given"},
           {"listen", StrCat(config.host, ":", config.port)},
           {"workers", StrCat(config.workers)},
+          {"fusion.enabled", config.is_fusing ? "true" : "false"},
+          {"fusion.nice", StrCat(config.fusion_nice)},
           {"network_threads", StrCat(config.network_threads)},
           {"cache_mib", StrCat(config.cache_mib)},
           {"survey_mib", StrCat(config.survey_mib)},
           {"survey_disk_mib", StrCat(config.survey_disk_mib)},
           {"reply_mib", StrCat(config.reply_mib)},
+          {"limits.connections_per_name", StrCat(config.name_connections)},
+          {"limits.held_mib_per_name", StrCat(config.name_held_mib)},
+          {"limits.requests_per_s_per_name", StrCat(config.name_requests_per_s)},
+          {"limits.mib_per_s_per_name", StrCat(config.name_mib_per_s)},
           {"log_level", config.log_level},
           {"log_format", config.log_format},
           {"http", "off"},

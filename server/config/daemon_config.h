@@ -26,6 +26,8 @@ struct DaemonConfig {
   std::string host = "127.0.0.1";
   std::uint16_t port = 7447;
   int workers = 0;             // fusion threads; 0: one a core
+  bool is_fusing = true;       // else dirty tiles wait for a daemon that does
+  int fusion_nice = 19;        // how far fusion threads stand back behind the others
   int network_threads = 0;     // that run connections; 0: one for every four cores
   int cache_mib = 128;         // decoded keyframes, all workers together
   int survey_mib = 1024;       // what tiles keep from one fusion to the next
@@ -33,6 +35,11 @@ struct DaemonConfig {
   int reply_mib = 64;          // tiles ready to be sent
   std::string log_level = "info";
   std::string log_format = "text";
+  // Of one name, a certificate's or a token's, on all its connections; 0: no limit to a rate.
+  int name_connections = 64;
+  int name_held_mib = 128;  // of requests under way
+  int name_requests_per_s = 1'000;
+  int name_mib_per_s = 64;
   std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.

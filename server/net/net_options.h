@@ -9,6 +9,14 @@
 
 namespace atlas {
 
+// Of one name, on all its connections.
+struct NameLimits {
+  std::size_t connections = 64;
+  std::size_t held_bytes = 128u << 20;
+  double requests_per_s = 1'000;  // 0: no limit, as of the next
+  double bytes_per_s = 64u << 20;
+};
+
 struct NetOptions {
   int threads = 2;  // that run connections
   std::size_t max_connections = 4096;
@@ -19,15 +27,13 @@ struct NetOptions {
   std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection
   std::size_t max_held_bytes = 512u << 20;     // requests and parts of them, all connections
   std::size_t tile_frame_bytes = 64u << 20;    // tiles ready to be sent, all connections
-  // Of one name, on all its connections; 0: no limit to a rate.
-  std::size_t identity_connections = 64;
-  std::size_t identity_held_bytes = 128u << 20;
-  double identity_requests_per_s = 1'000;
-  double identity_bytes_per_s = 64u << 20;
-  std::size_t max_watches = 1024;  // all connections
-  std::size_t max_waits = 16;      // waits, digests, verifications, all connections
-  int service_threads = 4;         // that may block on the disk
-  int reading_threads = 2;         // for digests and verifications, which read all
+  NameLimits of_name;
+  double short_visits_per_s = 200;  // connections of less than a second; 0: no limit
+  std::size_t max_arrivals = 32;    // accepted and not begun yet, a thread
+  std::size_t max_watches = 1024;   // all connections
+  std::size_t max_waits = 16;       // waits, digests, verifications, all connections
+  int service_threads = 4;          // that may block on the disk
+  int reading_threads = 2;          // for digests and verifications, which read all
   std::chrono::milliseconds handshake{5'000};
   std::chrono::milliseconds idle{3'600'000};  // between two frames
   std::chrono::milliseconds frame{30'000};    // from a frame's first byte to its last, and besides

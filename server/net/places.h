@@ -16,7 +16,7 @@ class Places {
 
   // Null when all are taken.
   Place Take() {
-    if (taken_->fetch_add(1) >= max_places_) {
+    if (taken_->fetch_add(1) >= max_places_.load()) {
       taken_->fetch_sub(1);
       return nullptr;
     }
@@ -24,11 +24,13 @@ class Places {
               taken->fetch_sub(1);
             }};
   }
-  std::size_t max_places() const { return max_places_; }
+  std::size_t max_places() const { return max_places_.load(); }
+  // Nobody loses a place that was taken.
+  void set_max_places(std::size_t max_places) { max_places_.store(max_places); }
   std::size_t taken() const { return taken_->load(); }
 
  private:
-  std::size_t max_places_;
+  std::atomic<std::size_t> max_places_;
   std::shared_ptr<std::atomic<std::size_t>> taken_ = std::make_shared<std::atomic<std::size_t>>(0);
 };
 

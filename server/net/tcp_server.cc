@@ -16,6 +16,7 @@
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <netinet/tcp.h>
+#include <poll.h>
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
@@ -23,6 +24,7 @@
 #include "proto/wire/convert.h"
 #include "server/net/connection/byte_budget.h"
 #include "server/net/connection/net_thread.h"
+#include "server/net/connection/visit_pace.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
 
@@ -43,6 +45,21 @@ void NoticeDeath(tcp::socket& socket) {
   }
 }
 
+// It was reset while it waited for its turn.
+bool IsGone(tcp::socket& socket) {
+  pollfd state{socket.native_handle(), 0, 0};
+  return ::poll(&state, 1, 0) > 0;
+}
+
+// How soon to look again whether the threads have begun what they were given.
+constexpr std::chrono::milliseconds kArrivalPause{1};
+
+VisitPace::Options PaceFrom(const NetOptions& options) {
+  VisitPace::Options pace;
+  pace.short_visits_per_s = options.short_visits_per_s;
+  return pace;
+}
+
 }  // namespace
 
 class TcpServer::Impl {
@@ -58,9 +75,11 @@ class TcpServer::Impl {
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
         budget_(options.max_held_bytes),
-        limits_(options_),
+        limits_(options.of_name),
         places_(options.max_connections),
+        pace_(PaceFrom(options)),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
+        accept_pause_(io_),
         signals_(io_, SIGTERM, SIGINT) {
     std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to peers that are gone, too
     for (int i = 0; i < options.threads; ++i) {
@@ -108,6 +127,8 @@ class TcpServer::Impl {
     });
   }
 
+  void ChangeNameLimits(const NameLimits& limits) { limits_.Change(limits); }
+
   NetFigures ReadFigures() const {
     NetFigures figures;
     figures.connections = places_.taken();
@@ -126,6 +147,10 @@ class TcpServer::Impl {
  private:
   asio::awaitable<void> Accept() {
     while (acceptor_.is_open()) {
+      co_await KeepPace();
+      if (!acceptor_.is_open()) {
+        co_return;
+      }
       NetThread& thread = LeastBusyThread();
       error_code error;
       tcp::socket socket = co_await acceptor_.async_accept(
@@ -140,7 +165,27 @@ class TcpServer::Impl {
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
         continue;
       }
-      Admit(std::move(socket), thread);
+      if (IsGone(socket)) {
+        pace_.NoteGone();
+      } else {
+        Admit(std::move(socket), thread);
+      }
+    }
+  }
+
+  // As long as too many come and go, or more than the threads have begun.
+  asio::awaitable<void> KeepPace() {
+    auto pause = pace_.Pause(std::chrono::steady_clock::now());
+    while (acceptor_.is_open()) {
+      if (LeastBusyThread().arrivals() >= options_.max_arrivals) {
+        pause = std::max<VisitPace::Clock::duration>(pause, kArrivalPause);
+      }
+      if (pause == VisitPace::Clock::duration::zero()) {
+        co_return;
+      }
+      accept_pause_.expires_after(std::exchange(pause, VisitPace::Clock::duration::zero()));
+      error_code ignored;  // the time is over, or the server stops
+      co_await accept_pause_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
     }
   }
 
@@ -155,9 +200,11 @@ class TcpServer::Impl {
     Places::Place place = places_.Take();
     if (place == nullptr) {
       NoteRefusal();
+      pace_.NoteRefusal();
       Refuse(std::move(socket));
       return;
     }
+    place = pace_.Begin(std::move(place), std::chrono::steady_clock::now());
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
     NoticeDeath(socket);
@@ -205,6 +252,7 @@ class TcpServer::Impl {
     service_.EndWaits();
     error_code ignored;  // it may be closed already
     acceptor_.close(ignored);
+    accept_pause_.cancel();
     signals_.cancel(ignored);
     for (const auto& thread : threads_) {
       thread->Drain();
@@ -237,9 +285,11 @@ class TcpServer::Impl {
   ByteBudget budget_;
   IdentityLimits limits_;
   Places places_;  // of connections
+  VisitPace pace_;
   std::vector<std::unique_ptr<NetThread>> threads_;
   asio::io_context io_{1};  // what accepts; after what its coroutines refer to
   tcp::acceptor acceptor_;
+  asio::steady_timer accept_pause_;
   asio::signal_set signals_;
   ThreadCounter refused_;  // connections
   std::chrono::steady_clock::time_point refusal_noted_at_;
@@ -261,6 +311,9 @@ void TcpServer::Stop() {
 }
 void TcpServer::ChangeSecurity(ServerSecurity security) {
   impl_->ChangeSecurity(std::move(security));
+}
+void TcpServer::ChangeNameLimits(const NameLimits& limits) {
+  impl_->ChangeNameLimits(limits);
 }
 NetFigures TcpServer::ReadFigures() const {
   return impl_->ReadFigures();

@@ -34,6 +34,8 @@ class TcpServer {
   // From any thread: what new connections find from now on, and whom of those that are there it
   // closes. TLS stays with or without, as it was at the start.
   void ChangeSecurity(ServerSecurity security);
+  // From any thread: what each name may have from now on.
+  void ChangeNameLimits(const NameLimits& limits);
 
   // From any thread, as are the next two.
   NetFigures ReadFigures() const;

@@ -22,17 +22,14 @@ Status CheckTime(std::int64_t time_ms, std::int64_t now_ms) {
 }
 
 Result<KeyframeHeader> CheckBlob(ByteSpan blob, const MapProfile& profile) {
-  auto header = ReadKeyframeHeader(blob);
+  const auto header = ReadKeyframeHeader(blob);
   if (!header) {
     return header;
   }
   if (Status status = CheckKeyframeProfile(*header, profile); !status.ok()) {
     return Error(std::move(status));
   }
-  if (auto keyframe = DecodeKeyframe(blob); !keyframe) {
-    return Error(keyframe.error());
-  }
-  return header;
+  return CheckKeyframe(blob);
 }
 
 Result<std::vector<TileId>> Footprint(const QuantizedPose& pose,

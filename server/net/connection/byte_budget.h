@@ -14,9 +14,10 @@ class ByteBudget {
 
   // False, and nothing taken, when that is more than is left.
   bool Take(std::size_t bytes) {
+    const std::size_t max_bytes = max_bytes_.load();
     std::size_t taken_bytes = taken_bytes_.load();
     do {
-      if (bytes > max_bytes_ - taken_bytes) {
+      if (taken_bytes > max_bytes || bytes > max_bytes - taken_bytes) {
         return false;
       }
     } while (!taken_bytes_.compare_exchange_weak(taken_bytes, taken_bytes + bytes));
@@ -26,10 +27,13 @@ class ByteBudget {
     [[maybe_unused]] const std::size_t taken_bytes = taken_bytes_.fetch_sub(bytes);
     assert(bytes <= taken_bytes);
   }
+  std::size_t max_bytes() const { return max_bytes_.load(); }
+  // What was taken stays taken.
+  void set_max_bytes(std::size_t max_bytes) { max_bytes_.store(max_bytes); }
   std::size_t taken_bytes() const { return taken_bytes_.load(); }
 
  private:
-  const std::size_t max_bytes_;
+  std::atomic<std::size_t> max_bytes_;
   std::atomic<std::size_t> taken_bytes_ = 0;
 };
 

@@ -19,14 +19,15 @@ namespace atlas {
 // Of one name.
 class IdentityAllowance {
  public:
-  explicit IdentityAllowance(const NetOptions& options)
-      : connections_(options.identity_connections),
-        requests_(options.identity_requests_per_s),
-        bytes_(options.identity_bytes_per_s),
-        held_(options.identity_held_bytes) {}
+  explicit IdentityAllowance(const NameLimits& limits)
+      : connections_(limits.connections),
+        requests_(limits.requests_per_s),
+        bytes_(limits.bytes_per_s),
+        held_(limits.held_bytes) {}
 
   // Null: it has as many as it may.
   Places::Place TakeConnection() { return connections_.Take(); }
+  std::size_t max_connections() const { return connections_.max_places(); }
   // Of requests that are under way.
   ByteBudget& held() { return held_; }
   // It sent so much; how long nothing more is read from it.
@@ -34,6 +35,14 @@ class IdentityAllowance {
     const std::lock_guard lock(mutex_);
     return std::max(requests_.Take(static_cast<double>(requests), now),
                     bytes_.Take(static_cast<double>(bytes), now));
+  }
+  // From now on; what it has already it keeps.
+  void Change(const NameLimits& limits) {
+    connections_.set_max_places(limits.connections);
+    held_.set_max_bytes(limits.held_bytes);
+    const std::lock_guard lock(mutex_);
+    requests_.set_rate(limits.requests_per_s);
+    bytes_.set_rate(limits.bytes_per_s);
   }
 
  private:
@@ -46,8 +55,7 @@ class IdentityAllowance {
 
 class IdentityLimits {
  public:
-  // `options` outlive this.
-  explicit IdentityLimits(const NetOptions& options) : options_(options) {}
+  explicit IdentityLimits(const NameLimits& limits) : limits_(limits) {}
 
   // Shared by all who hold it; forgotten when nobody does.
   std::shared_ptr<IdentityAllowance> Of(const std::string& name) {
@@ -55,15 +63,25 @@ class IdentityLimits {
     std::erase_if(allowances_, [](const auto& entry) { return entry.second.expired(); });
     auto allowance = allowances_[name].lock();
     if (allowance == nullptr) {
-      allowance = std::make_shared<IdentityAllowance>(options_);
+      allowance = std::make_shared<IdentityAllowance>(limits_);
       allowances_[name] = allowance;
     }
     return allowance;
   }
+  // For those who are there, too.
+  void Change(const NameLimits& limits) {
+    const std::lock_guard lock(mutex_);
+    limits_ = limits;
+    for (const auto& [name, weak] : allowances_) {
+      if (const auto allowance = weak.lock()) {
+        allowance->Change(limits);
+      }
+    }
+  }
 
  private:
-  const NetOptions& options_;
   std::mutex mutex_;
+  NameLimits limits_;
   std::map<std::string, std::weak_ptr<IdentityAllowance>> allowances_;
 };
 

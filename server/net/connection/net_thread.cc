@@ -47,7 +47,9 @@ void NetThread::Serve(PeerConnection::Arrival arrival) {
   // A place here, beside the server's own, only counts: the server gives no more than there are.
   using Pair = std::pair<Places::Place, Places::Place>;
   arrival.place = std::make_shared<Pair>(std::move(arrival.place), connection_places_.Take());
+  ++arrivals_;
   auto begin = [this, arrival = std::move(arrival)]() mutable {
+    --arrivals_;
     const auto connection = std::make_shared<PeerConnection>(
         std::move(arrival), PeerConnection::Surroundings{handler_, budget_, limits_, buffer_,
                                                          options_, counters_, request_lines_});

@@ -39,6 +39,8 @@ class NetThread {
   // For the sockets of its connections.
   boost::asio::io_context& io() { return io_; }
   std::size_t connections() const { return connection_places_.taken(); }
+  // That Serve() was called for and that have not begun.
+  std::size_t arrivals() const { return arrivals_.load(); }
   const NetCounters& counters() const { return counters_; }
 
   // From any thread: begins a connection.
@@ -66,6 +68,7 @@ class NetThread {
   NetCounters counters_;
   LineBudget request_lines_;  // of the log
   Places connection_places_;
+  std::atomic<std::size_t> arrivals_ = 0;
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
   std::vector<std::weak_ptr<PeerConnection>> connections_;

@@ -211,11 +211,11 @@ Status PeerConnection::ComeIn(const wire::Envelope& hello) {
   const auto allowance = limits_.Of(identity_.name);
   own_place_ = allowance->TakeConnection();
   if (own_place_ == nullptr) {
-    return {StatusCode::kUnavailable, StrCat(options_.identity_connections, " connections of ",
+    return {StatusCode::kUnavailable, StrCat(allowance->max_connections(), " connections of ",
                                              identity_.name, " are open already; try again later")};
   }
   if (!allowance->held().Take(held_bytes_)) {
-    return HoldsTooMuch(options_.identity_held_bytes, identity_.name);
+    return HoldsTooMuch(allowance->held().max_bytes(), identity_.name);
   }
   allowance_ = allowance;
   return {};
@@ -343,7 +343,7 @@ Status PeerConnection::Hold(std::size_t bytes) {
   }
   if (allowance_ != nullptr && !allowance_->held().Take(bytes)) {
     budget_.GiveBack(bytes);
-    return HoldsTooMuch(options_.identity_held_bytes, identity_.name);
+    return HoldsTooMuch(allowance_->held().max_bytes(), identity_.name);
   }
   held_bytes_ += bytes;
   return {};

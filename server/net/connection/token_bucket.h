@@ -15,6 +15,11 @@ class TokenBucket {
   // 0: no limit.
   explicit TokenBucket(double per_s) : per_s_(per_s), tokens_(per_s) {}
 
+  // From now on; what is owed stays owed.
+  void set_rate(double per_s) {
+    per_s_ = per_s;
+    tokens_ = std::min(tokens_, per_s);
+  }
   // Takes them, whether they are there or not; how long to wait before anything else comes.
   Duration Take(double amount, Time now) {
     if (per_s_ <= 0.0) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/base/thread_priority.h"
 #include "server/store/await.h"
 
 namespace atlas {
@@ -63,6 +64,10 @@ void FusionScheduler::Stop() {
 }
 
 void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
+  if (options_.nice > 0 && !YieldToOthers(options_.nice)) {
+    log_(LogLevel::kWarning, StrCat("fusion: ", worker.owner, " cannot stand back by ",
+                                    options_.nice, ": it runs like the others"));
+  }
   while (!stop.stop_requested()) {
     const std::uint64_t seen = changes_.version();
     if (!Work(worker, stop)) {

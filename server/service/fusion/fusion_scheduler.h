@@ -29,7 +29,8 @@ using WallClock = std::function<std::int64_t()>;  // ms since 1970
 using TileChanged = std::function<void(const TileId& id, std::uint64_t revision)>;
 
 struct FusionOptions {
-  unsigned workers = 1;
+  unsigned workers = 1;  // 0: nothing is fused
+  int nice = 0;          // steps that they stand back behind the other threads (thread_priority.h)
   TileRefresherOptions building;
   std::uint32_t tiles_per_claim = 16;  // built together and finished in one group commit
   std::int64_t lease_ms = 120'000;

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "proto/wire/envelope.h"
+#include "tests/bench/serving/load_frames.h"
 #include "tests/bench/serving/load_protocol.h"
 
 namespace atlas::testing {
@@ -75,13 +76,7 @@ class AtlasParser final : public ReplyParser {
 
 class AtlasProtocol final : public LoadProtocol {
  public:
-  Bytes Greeting() const override {
-    wire::Envelope hello;
-    hello.set_request_id(1);
-    hello.mutable_hello()->set_protocol_major(kProtocolMajor);
-    hello.mutable_hello()->set_client_name("serving_bench");
-    return EncodeEnvelopeFrame(hello).value();
-  }
+  Bytes Greeting() const override { return HelloFrame(); }
 
   std::size_t Ask(std::span<const LoadTile* const> tiles, LoadMode mode, Bytes& out) override {
     wire::Envelope envelope;

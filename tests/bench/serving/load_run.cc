@@ -7,11 +7,7 @@
 #include <memory>
 #include <random>
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/epoll.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include "core/base/str_cat.h"
@@ -42,12 +38,9 @@ class Descriptor {
 };
 
 struct LoadPeer {
-  explicit LoadPeer(int fd) : socket(fd) {}
-
-  Descriptor socket;
+  std::unique_ptr<LoadSocket> socket;
   std::unique_ptr<ReplyParser> parser;
   Bytes unsent;
-  std::size_t sent_bytes = 0;
   std::size_t awaited = 0;  // replies of the batch under way
   std::size_t asked = 0;    // tiles of it
   Clock::time_point began;
@@ -80,14 +73,26 @@ class LoadRun {
       order_.push_back(&tile);
     }
     std::shuffle(order_.begin(), order_.end(), random_);
+    end_ = Clock::now();  // of greetings: nothing follows them yet
     for (int i = 0; i < options_.connections; ++i) {
       ATLAS_RETURN_IF_ERROR(Connect());
+      if (!peers_.back()->is_greeted) {
+        ATLAS_RETURN_IF_ERROR(Begin(*peers_.back()));
+      }
     }
+    ATLAS_RETURN_IF_ERROR(RunUntilAnswered());
     const auto begin = Clock::now();
     end_ = begin + options_.time;
     for (auto& peer : peers_) {
       ATLAS_RETURN_IF_ERROR(Begin(*peer));
     }
+    ATLAS_RETURN_IF_ERROR(RunUntilAnswered());
+    result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    return {};
+  }
+
+  // Until the time is over and no batch is under way.
+  Status RunUntilAnswered() {
     while (busy_ > 0) {
       std::array<epoll_event, 64> events{};
       const int count =
@@ -100,28 +105,22 @@ class LoadRun {
             OnEvent(*static_cast<LoadPeer*>(events[static_cast<std::size_t>(i)].data.ptr)));
       }
     }
-    result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     return {};
   }
 
   Status Connect() {
-    auto peer = std::make_unique<LoadPeer>(::socket(AF_INET, SOCK_STREAM, 0));
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(options_.port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (::connect(peer->socket.get(), reinterpret_cast<const sockaddr*>(&address),
-                  sizeof(address)) != 0) {
-      return Failure("connect");
+    auto socket = LoadSocket::Connect(options_.port, options_.tls);
+    if (!socket) {
+      return socket.error();
     }
-    const int on = 1;
-    ::setsockopt(peer->socket.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    auto peer = std::make_unique<LoadPeer>();
+    peer->socket = *std::move(socket);
     peer->parser = protocol_.NewParser();
     peer->is_greeted = protocol_.Greeting().empty();
     epoll_event event{};
     event.events = EPOLLIN;
     event.data.ptr = peer.get();
-    if (::epoll_ctl(poll_.get(), EPOLL_CTL_ADD, peer->socket.get(), &event) != 0) {
+    if (::epoll_ctl(poll_.get(), EPOLL_CTL_ADD, peer->socket->descriptor(), &event) != 0) {
       return Failure("epoll_ctl");
     }
     peers_.push_back(std::move(peer));
@@ -131,7 +130,6 @@ class LoadRun {
   // The next batch.
   Status Begin(LoadPeer& peer) {
     peer.unsent.clear();
-    peer.sent_bytes = 0;
     if (!peer.is_greeted) {
       peer.unsent = protocol_.Greeting();
       peer.awaited = 1;
@@ -146,31 +144,29 @@ class LoadRun {
     }
     ++busy_;
     peer.began = Clock::now();
-    return Send(peer);
-  }
-
-  // Small enough for any socket's buffer, so that it never has to wait for long.
-  static Status Send(LoadPeer& peer) {
-    while (peer.sent_bytes < peer.unsent.size()) {
-      const ssize_t size = ::send(peer.socket.get(), peer.unsent.data() + peer.sent_bytes,
-                                  peer.unsent.size() - peer.sent_bytes, MSG_NOSIGNAL);
-      if (size <= 0) {
-        return Failure("send");
-      }
-      peer.sent_bytes += static_cast<std::size_t>(size);
-    }
-    return {};
+    return peer.socket->Send(peer.unsent);  // small enough for any socket's buffer
   }
 
   Status OnEvent(LoadPeer& peer) {
-    const ssize_t size = ::recv(peer.socket.get(), buffer_.data(), buffer_.size(), 0);
-    ++result_.calls;
-    if (size <= 0) {
-      return size == 0 ? Status(StatusCode::kUnavailable, "the server closed a connection")
-                       : Failure("recv");
+    while (true) {
+      const LoadSocket::Moved came = peer.socket->Receive(buffer_);
+      ++result_.calls;
+      if (came.is_closed) {
+        return {StatusCode::kUnavailable, "the server closed a connection"};
+      }
+      if (came.bytes == 0) {
+        return {};
+      }
+      ATLAS_RETURN_IF_ERROR(Take(peer, ByteSpan(buffer_).first(came.bytes)));
+      if (!peer.socket->may_hold_more()) {
+        return {};
+      }
     }
-    result_.wire_bytes += static_cast<std::uint64_t>(size);
-    if (!peer.parser->Take(ByteSpan(buffer_).first(static_cast<std::size_t>(size)))) {
+  }
+
+  Status Take(LoadPeer& peer, ByteSpan bytes) {
+    result_.wire_bytes += bytes.size();
+    if (!peer.parser->Take(bytes)) {
       return {StatusCode::kInvalidData, "the server answered something else"};
     }
     const std::uint64_t replies = peer.parser->TakeReplies();

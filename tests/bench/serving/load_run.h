@@ -9,11 +9,13 @@
 
 #include "core/base/status.h"
 #include "tests/bench/serving/load_protocol.h"
+#include "tests/bench/serving/load_socket.h"
 
 namespace atlas::testing {
 
 struct LoadOptions {
   std::uint16_t port = 0;
+  const LoadTls* tls = nullptr;  // null: in the clear
   int connections = 16;
   std::size_t tiles_per_batch = 1;
   LoadMode mode = LoadMode::kFetch;
@@ -28,7 +30,7 @@ struct LoadResult {
   std::uint64_t tile_bytes = 0;  // of those that were sent
   std::vector<float> batch_ms;   // from the request to the last byte, each
   std::uint64_t wire_bytes = 0;  // received
-  std::uint64_t calls = 0;       // of the system, to read
+  std::uint64_t calls = 0;       // to read
 };
 
 // kUnavailable: it refuses, or closes; kInvalidData: it answers something else.

@@ -7,6 +7,7 @@
 
 #include "core/base/hash.h"
 #include "core/keyframe/keyframe_body.h"
+#include "core/keyframe/keyframe_body_check.h"
 #include "tests/core/support/golden.h"
 #include "tests/core/support/golden_profile.h"
 #include "tests/core/support/keyframe_worlds.h"
@@ -134,6 +135,51 @@ TEST(KeyframeCodecTest, RefusesStatesThatNoCellHas) {
   EXPECT_TRUE(BodyIsRefused(body, 8));
   body[0] = 0x04;  // free, but not seen
   EXPECT_TRUE(BodyIsRefused(body, 8));
+}
+
+// Bodies with one byte changed, in every way that one byte can be wrong.
+TEST(KeyframeCodecTest, ACheckTakesExactlyWhatIsDecoded) {
+  std::mt19937 random(3);
+  std::size_t taken = 0;
+  std::size_t refused = 0;
+  for (std::uint32_t seed = 0; seed < testing::Scaled(40); ++seed) {
+    MapProfile profile;
+    profile.column_segments = static_cast<std::uint8_t>(2u << (seed % 4));
+    const Keyframe keyframe =
+        RandomKeyframe(profile, 1 + static_cast<std::int32_t>(seed % 9), seed);
+    const Bytes body = EncodeKeyframeBody(keyframe);
+    for (int change = 0; change < 200; ++change) {
+      Bytes changed = body;
+      changed[random() % changed.size()] =
+          static_cast<std::uint8_t>(random() % 3 == 0 ? 0 : random());
+      changed.resize(change % 20 == 0 ? random() % body.size() : body.size());
+      Keyframe decoded;
+      decoded.grid = keyframe.grid;
+      const bool is_valid = DecodeKeyframeBody(changed, decoded).ok();
+      ASSERT_EQ(IsKeyframeBody(changed, keyframe.grid, decoded.block_count()), is_valid)
+          << "seed " << seed << ", change " << change;
+      (is_valid ? taken : refused) += 1;
+    }
+  }
+  EXPECT_GT(taken, 1'000u);
+  EXPECT_GT(refused, 1'000u);
+}
+
+TEST(KeyframeCodecTest, ACheckOfABlobSaysWhatDecodingSays) {
+  const Bytes blob = EncodeKeyframe(StreetKeyframe(MapProfile(), 12, 7));
+  EXPECT_EQ(CheckKeyframe(blob)->grid, DecodeKeyframe(blob)->grid);
+  for (std::size_t i = 0; i < blob.size(); ++i) {
+    Bytes flipped = blob;
+    flipped[i] ^= 1;
+    for (const Bytes& bad : {flipped, WithChecksum(flipped)}) {
+      const auto decoded = DecodeKeyframe(bad);
+      const auto checked = CheckKeyframe(bad);
+      ASSERT_EQ(checked.has_value(), decoded.has_value()) << "byte " << i;
+      if (!decoded) {
+        EXPECT_EQ(checked.error().message(), decoded.error().message());
+      }
+    }
+  }
 }
 
 TEST(KeyframeCodecTest, SaysThatANewerVersionIsUnsupported) {

@@ -209,6 +209,31 @@ TEST_F(DaemonConfigTest, TablesOfTheFileAreRead) {
               HasSubstr("true or false"));
 }
 
+TEST_F(DaemonConfigTest, FusionMayStandBackOrStandStill) {
+  const auto given = Parse({"--data", "/x"});
+  EXPECT_TRUE(given->config.is_fusing);
+  EXPECT_EQ(given->config.fusion_nice, DaemonConfig().fusion_nice);
+  const auto read = Parse({"--config", File("data = '/x'\n[fusion]\nenabled = false\nnice = 3\n")});
+  ASSERT_TRUE(read.has_value()) << read.error().message();
+  EXPECT_FALSE(read->config.is_fusing);
+  EXPECT_EQ(read->config.fusion_nice, 3);
+  EXPECT_THAT(Refusal({"--data", "/x", "--fusion-nice", "20"}), HasSubstr("from 0 to 19"));
+}
+
+TEST_F(DaemonConfigTest, WhatANameMayHaveIsRead) {
+  const auto read = Parse({"--config", File("data = '/x'\n[limits]\nconnections_per_name = 7\n"
+                                            "held_mib_per_name = 50\nmib_per_s_per_name = 0\n"
+                                            "requests_per_s_per_name = 9\n")});
+  ASSERT_TRUE(read.has_value()) << read.error().message();
+  EXPECT_EQ(read->config.name_connections, 7);
+  EXPECT_EQ(read->config.name_held_mib, 50);
+  EXPECT_EQ(read->config.name_mib_per_s, 0);
+  EXPECT_EQ(read->config.name_requests_per_s, 9);
+  EXPECT_THAT(Refusal({"--data", "/x", "--connections-per-name", "0"}),
+              HasSubstr("limits.connections_per_name is '0'"));
+  EXPECT_TRUE(IsLiveSetting("limits.connections_per_name"));
+}
+
 TEST_F(DaemonConfigTest, TheOperationsPortIsOffUnlessItIsOfLoopback) {
   EXPECT_EQ(Parse({"--data", "/x"})->config.http, std::nullopt);
   EXPECT_EQ(Parse({"--data", "/x", "--http", ""})->config.http, std::nullopt);

@@ -246,7 +246,7 @@ TEST_F(TlsTest, ARoleThatChangedHoldsAtOnce) {
 }
 
 TEST_F(TlsTest, ANameHasSoManyConnectionsAndOthersHaveTheirOwn) {
-  net_.identity_connections = 2;
+  net_.of_name.connections = 2;
   ServeTls();
   BlockingPeer first(port_, As("car.7"));
   first.Greet();
@@ -267,8 +267,22 @@ TEST_F(TlsTest, ANameHasSoManyConnectionsAndOthersHaveTheirOwn) {
   EXPECT_TRUE(again.Greet().has_hello_reply()) << "the place is free again";
 }
 
+TEST_F(TlsTest, WhatANameMayHaveChangesForThoseWhoAreThere) {
+  net_.of_name.connections = 1;
+  ServeTls();
+  BlockingPeer first(port_, As("car.7"));
+  first.Greet();
+  BlockingPeer refused(port_, As("car.7"));
+  EXPECT_EQ(CodeOf(refused.Greet()), StatusCode::kUnavailable);
+  NameLimits wider;
+  wider.connections = 2;
+  server_->ChangeNameLimits(wider);
+  BlockingPeer second(port_, As("car.7"));
+  EXPECT_TRUE(second.Greet().has_hello_reply());
+}
+
 TEST_F(TlsTest, WhoeverAsksTooOftenWaitsAndTheOthersDoNot) {
-  net_.identity_requests_per_s = 20;
+  net_.of_name.requests_per_s = 20;
   net_.frame = std::chrono::milliseconds(100);  // waiting is no fault of the peer
   ServeTls();
   BlockingPeer eager(port_, As("car.7"));

@@ -19,6 +19,14 @@ TEST(TokenBucketTest, ASecondsWorthComesAtOnceAndTheRestWaits) {
   EXPECT_EQ(bucket.Take(20.0, start + seconds(100)), seconds(1)) << "idle time buys no more";
 }
 
+TEST(TokenBucketTest, ARateThatChangesLeavesWhatIsOwed) {
+  TokenBucket bucket(10.0);
+  const TokenBucket::Time start{seconds(1'000)};
+  EXPECT_EQ(bucket.Take(15.0, start), milliseconds(500));
+  bucket.set_rate(5.0);
+  EXPECT_EQ(bucket.Take(0.0, start), seconds(1));
+}
+
 TEST(TokenBucketTest, WhoeverWaitsKeepsToTheRate) {
   std::mt19937 random(5);
   TokenBucket bucket(1'000.0);

@@ -1,0 +1,62 @@
+// A crowd of connections to a daemon, beside which a good client is measured.
+// Usage: crowd_bench PORT IDLE SLOW HOSTILE [tls]
+// Says {"open": N} when those that keep to the rules are connected, then lets the hostile ones go
+// until its standard input ends, and checks that the others have lost nothing.
+#include <csignal>
+#include <cstdlib>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <poll.h>
+
+#include "tests/bench/serving/hostile_crowd.h"
+#include "tests/bench/serving/quiet_crowd.h"
+
+namespace atlas::testing {
+namespace {
+
+constexpr int kTick_ms = 10;
+
+bool IsToldToEnd() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  return ::poll(&input, 1, kTick_ms) > 0;
+}
+
+std::size_t CountOf(const char* text) {
+  return static_cast<std::size_t>(std::atoi(text));
+}
+
+Status Run(int argc, char** argv) {
+  if (argc != 5 && argc != 6) {
+    return {StatusCode::kInvalidArgument, "usage: crowd_bench PORT IDLE SLOW HOSTILE [tls]"};
+  }
+  const auto port = static_cast<std::uint16_t>(std::atoi(argv[1]));
+  std::optional<LoadTls> tls;
+  const LoadTls* const way = argc == 6 ? &tls.emplace() : nullptr;
+  QuietCrowd quiet(port, way);
+  ATLAS_RETURN_IF_ERROR(quiet.Open(CountOf(argv[2]), CountOf(argv[3])));
+  std::cout << "{\"open\": " << CountOf(argv[2]) + CountOf(argv[3]) << "}" << std::endl;
+  HostileCrowd hostile(port, way, CountOf(argv[4]));
+  while (!IsToldToEnd()) {
+    ATLAS_RETURN_IF_ERROR(quiet.Tick());
+  }
+  hostile.Stop();
+  ATLAS_RETURN_IF_ERROR(quiet.CheckAll());
+  std::cout << "{\"slow_replies\": " << quiet.slow_replies() << ", \"visits\": " << hostile.visits()
+            << ", \"refused\": " << hostile.refused() << "}" << std::endl;
+  return {};
+}
+
+}  // namespace
+}  // namespace atlas::testing
+
+int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to a daemon that is gone, too
+  const atlas::Status status = atlas::testing::Run(argc, argv);
+  if (!status.ok()) {
+    std::cerr << "crowd_bench: " << status.message() << "\n";
+  }
+  return status.ok() ? 0 : 1;
+}

@@ -1,0 +1,162 @@
+#include "tests/bench/serving/hostile_crowd.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <random>
+
+#include <poll.h>
+
+#include "tests/bench/serving/load_frames.h"
+
+namespace atlas::testing {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPatience{2'000};  // of one who waits to be thrown out, or does not read
+constexpr int kQueriesUnread = 64;
+
+// One visit.
+struct Visit {
+  LoadSocket& socket;
+  std::mt19937_64& random;
+  const std::stop_token& stop;
+
+  // False: the daemon has closed.
+  bool Say(ByteSpan bytes) { return socket.Send(bytes).ok(); }
+  bool Greet() { return Say(HelloFrame()); }
+
+  // Reads and forgets, until the daemon closes or patience ends.
+  void WaitForTheEnd() {
+    std::array<std::uint8_t, 16'384> buffer{};
+    const auto end = Clock::now() + kPatience;
+    while (Clock::now() < end && !stop.stop_requested()) {
+      pollfd wait{socket.descriptor(), POLLIN, 0};
+      ::poll(&wait, 1, 50);
+      if (socket.Receive(buffer).is_closed) {
+        return;
+      }
+    }
+  }
+  void Idle(milliseconds time) {
+    const auto end = Clock::now() + time;
+    while (Clock::now() < end && !stop.stop_requested()) {
+      std::this_thread::sleep_for(milliseconds(20));
+    }
+  }
+};
+
+void RandomBytes(Visit& visit) {
+  Bytes noise(4'096);
+  for (std::uint8_t& byte : noise) {
+    byte = static_cast<std::uint8_t>(visit.random());
+  }
+  visit.Say(noise);
+  visit.WaitForTheEnd();
+}
+
+void ClaimsMoreThanThereMayBe(Visit& visit) {
+  visit.Greet();
+  Bytes header = EncodeHeader({0, 1});
+  std::fill_n(header.begin() + 4, 4, std::uint8_t{0xff});  // the length
+  visit.Say(header);
+  visit.WaitForTheEnd();
+}
+
+// As much as there may be, of which little comes.
+void ClaimsAndStalls(Visit& visit) {
+  visit.Greet();
+  visit.Say(EncodeHeader({kMaxFrameBytes, 1}));
+  visit.Say(Bytes(65'536));
+  visit.Idle(kPatience);
+}
+
+void LeavesWithinAFrame(Visit& visit) {
+  visit.Greet();
+  const Bytes frame = StatusFrame(2);
+  visit.Say(ByteSpan(frame).first(frame.size() / 2));
+  visit.socket.ResetAtClose();
+}
+
+void SpoilsAChecksum(Visit& visit) {
+  visit.Greet();
+  Bytes frame = StatusFrame(2);
+  frame.back() ^= 1;
+  visit.Say(frame);
+  visit.WaitForTheEnd();
+}
+
+void SaysNoHello(Visit& visit) {
+  visit.Say(StatusFrame(1));
+  visit.WaitForTheEnd();
+}
+
+void SaysNothing(Visit& visit) {
+  visit.WaitForTheEnd();
+}
+
+void LeavesAtOnce(Visit& visit) {
+  visit.socket.ResetAtClose();
+}
+
+// Asks for the whole atlas again and again, and reads nothing of it.
+void NeverReads(Visit& visit) {
+  visit.Greet();
+  for (int i = 0; i < kQueriesUnread; ++i) {
+    visit.Say(QueryFrame(static_cast<std::uint64_t>(i) + 2));
+  }
+  visit.Idle(kPatience);
+  visit.socket.ResetAtClose();
+}
+
+// Valid to the last bit but one: the message is none.
+void SendsNoMessage(Visit& visit) {
+  visit.Greet();
+  const Bytes noise(1'024, 0xff);
+  Bytes frame = EncodeFrameHeader(noise);
+  frame.insert(frame.end(), noise.begin(), noise.end());
+  visit.Say(frame);
+  visit.WaitForTheEnd();
+}
+
+constexpr void (*kBehaviours[])(Visit&) = {&RandomBytes,     &ClaimsMoreThanThereMayBe,
+                                           &ClaimsAndStalls, &LeavesWithinAFrame,
+                                           &SpoilsAChecksum, &SaysNoHello,
+                                           &SaysNothing,     &LeavesAtOnce,
+                                           &NeverReads,      &SendsNoMessage};
+
+}  // namespace
+
+HostileCrowd::HostileCrowd(std::uint16_t port, const LoadTls* tls, std::size_t peers)
+    : port_(port), tls_(tls) {
+  for (std::size_t i = 0; i < peers; ++i) {
+    threads_.emplace_back([this, i](const std::stop_token& stop) { Misbehave(i, stop); });
+  }
+}
+
+void HostileCrowd::Stop() {
+  for (std::jthread& thread : threads_) {
+    thread.request_stop();
+  }
+  threads_.clear();
+}
+
+void HostileCrowd::Misbehave(std::size_t number, const std::stop_token& stop) {
+  std::mt19937_64 random(number);
+  const std::size_t behaviours = std::size(kBehaviours);
+  const bool is_shaking_hands = tls_ != nullptr && (number / behaviours) % 2 == 0;
+  while (!stop.stop_requested()) {
+    ++visits_;
+    const auto socket = LoadSocket::Connect(port_, is_shaking_hands ? tls_ : nullptr);
+    if (!socket) {
+      ++refused_;
+      continue;
+    }
+    Visit visit{**socket, random, stop};
+    kBehaviours[number % behaviours](visit);
+  }
+}
+
+}  // namespace atlas::testing

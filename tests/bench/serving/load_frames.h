@@ -1,0 +1,32 @@
+// Frames that connections say, whole and as they must be.
+#pragma once
+
+#include "proto/wire/envelope.h"
+
+namespace atlas::testing {
+
+// Request 1.
+inline Bytes HelloFrame() {
+  wire::Envelope hello;
+  hello.set_request_id(1);
+  hello.mutable_hello()->set_protocol_major(kProtocolMajor);
+  hello.mutable_hello()->set_client_name("serving_bench");
+  return EncodeEnvelopeFrame(hello).value();
+}
+
+inline Bytes StatusFrame(std::uint64_t request_id) {
+  wire::Envelope request;
+  request.set_request_id(request_id);
+  request.mutable_status_request();
+  return EncodeEnvelopeFrame(request).value();
+}
+
+// The whole atlas.
+inline Bytes QueryFrame(std::uint64_t request_id) {
+  wire::Envelope request;
+  request.set_request_id(request_id);
+  request.mutable_query_region();
+  return EncodeEnvelopeFrame(request).value();
+}
+
+}  // namespace atlas::testing
