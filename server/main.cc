@@ -19,7 +19,7 @@
 
 #include "core/base/str_cat.h"
 #include "server/base/log_format.h"
-#include "server/config/daemon_config.h"
+#include "server/config/daemon_command.h"
 #include "server/config/live_config.h"
 #include "server/hangup_watch.h"
 #include "server/net/tcp_server.h"

@@ -14,6 +14,9 @@
 
 namespace atlas {
 
+// A numeric address of this machine alone.
+bool IsLoopback(const std::string& host);
+
 struct HostPort {
   std::string host;
   std::uint16_t port = 0;
@@ -75,17 +78,5 @@ using GivenSettings = std::map<std::string, GivenSetting>;  // by key in the fil
 Result<DaemonConfig> ConfigFrom(const GivenSettings& given);
 // It takes effect while the daemon runs; others need a restart.
 bool IsLiveSetting(const std::string& key);
-
-// What the command line asks for: to run with a configuration, or to print a text and end.
-struct DaemonCommand {
-  DaemonConfig config;
-  GivenSettings given;              // that it is made of
-  std::optional<std::string> text;  // of --help or --version
-};
-
-// kInvalidArgument on unknown flags and keys, on values (named with their flag, variable, or file
-// and line), and on an address that is not loopback; kNotFound on a configuration file that is not
-// there.
-Result<DaemonCommand> ParseDaemonCommand(int argc, const char* const* argv);
 
 }  // namespace atlas

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/status.h"
-#include "server/config/daemon_config.h"
+#include "server/config/daemon_command.h"
 
 namespace atlas {
 

@@ -1,5 +1,5 @@
 // Where settings come from, which goes before which, and what a mistake says.
-#include "server/config/daemon_config.h"
+#include "server/config/daemon_command.h"
 
 #include <cstdlib>
 #include <filesystem>
