@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 
+import bench_memory
 import bench_serving
 import bench_updates
 from bench_daemon import Atlas
@@ -200,19 +201,22 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               "localization": bench_localization, "fusion": bench_fusion, "accuracy": bench_accuracy,
               "curbs": bench_curbs,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
-                 for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS}.items()}}
+                 for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
+                                    **bench_memory.BENCHMARKS}.items()}}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, required=True)
     parser.add_argument("--nginx", default="nginx", help="for serving")
+    parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
     bench_serving.NGINX = args.nginx
+    bench_memory.LONG = args.long
     for name in args.names or BENCHMARKS:
         BENCHMARKS[name](args.bin)
 

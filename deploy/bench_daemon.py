@@ -21,10 +21,19 @@ class Atlas:
     def __init__(self, bin_dir, *profile):
         self.bin = bin_dir
         self.folder = tempfile.TemporaryDirectory()
+        self.start(*profile)
+
+    def start(self, *flags):
         self.process = subprocess.Popen(
-            [bin_dir / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
-             "--log-level", "error", *profile], stdout=subprocess.PIPE, text=True)
+            [self.bin / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
+             "--log-level", "error", *flags], stdout=subprocess.PIPE, text=True)
         self.server = self.process.stdout.readline().split()[1]
+
+    def restart(self):
+        """Stops in order and starts again, with default settings."""
+        self.process.terminate()
+        self.process.wait()
+        self.start()
 
     def __enter__(self):
         return self
