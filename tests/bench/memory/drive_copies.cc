@@ -39,8 +39,7 @@ Result<DriveCopies> DriveCopies::Read(const std::filesystem::path& folder,
   for (std::size_t i = 0; i < placed->size(); i += nth) {
     const PlacedKeyframe& keyframe = (*placed)[i];
     const std::uint32_t sequence = keyframe.key.sequence;
-    copies.keyframes_.push_back(
-        {sequence, poses.at(sequence), EncodeKeyframe(*keyframe.keyframe)});
+    copies.keyframes_.push_back({sequence, poses.at(sequence), EncodeKeyframe(*keyframe.keyframe)});
     copies.middle_m_ += poses.at(sequence).translation().head<2>();
   }
   copies.middle_m_ /= static_cast<double>(copies.keyframes_.size());

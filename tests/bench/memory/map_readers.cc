@@ -48,8 +48,8 @@ Result<ReadersReport> ReadOn(const ReadersOptions& options, std::uint32_t seed) 
   const Clock::time_point end = Clock::now() + options.time;
   for (std::uint64_t request = 1; Clock::now() < end; ++request) {
     const DiscArea disc{options.places_m[random() % options.places_m.size()], options.radius_m};
-    Status status = request % kQueryEvery == 0 ? Query(*client, disc, report)
-                                               : Sync(*client, disc, report);
+    Status status =
+        request % kQueryEvery == 0 ? Query(*client, disc, report) : Sync(*client, disc, report);
     if (!status.ok()) return Error(std::move(status));
   }
   return report;

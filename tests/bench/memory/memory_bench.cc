@@ -1,6 +1,6 @@
-// Fills a daemon's atlas with copies of a recorded drive, and reads it all over: what a daemon needs
-// to serve atlases of different sizes. JSON lines.
-// Usage: memory_bench fill SERVER DRIVE MIB NTH    until the database has so many MiB, of every
+// Fills a daemon's atlas with copies of a recorded drive, and reads it all over: what a daemon
+// needs to serve atlases of different sizes. JSON lines. Usage: memory_bench fill SERVER DRIVE MIB
+// NTH    until the database has so many MiB, of every
 //                                                  NTH keyframe; a line every 32 copies
 //        memory_bench read SERVER DRIVE COPIES SECONDS    places all over so many copies
 #include <algorithm>
@@ -87,7 +87,8 @@ int main(int argc, char** argv) {
   const int first = argc == 6 ? std::atoi(argv[4]) : 0;
   const int second = argc == 6 ? std::atoi(argv[5]) : 0;
   if ((what != "fill" && what != "read") || !endpoint || first < 1 || second < 1) {
-    std::cerr << "usage: memory_bench fill SERVER DRIVE MIB NTH | read SERVER DRIVE COPIES SECONDS\n";
+    std::cerr
+        << "usage: memory_bench fill SERVER DRIVE MIB NTH | read SERVER DRIVE COPIES SECONDS\n";
     return 2;
   }
   const atlas::Status status =
