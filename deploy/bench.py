@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 
+import bench_follow
 import bench_memory
 import bench_serving
 import bench_updates
@@ -202,7 +203,7 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               "curbs": bench_curbs,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
-                                    **bench_memory.BENCHMARKS}.items()}}
+                                    **bench_follow.BENCHMARKS, **bench_memory.BENCHMARKS}.items()}}
 
 
 def main():
