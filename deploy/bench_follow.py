@@ -32,7 +32,7 @@ def emit_totals(runs, emit):
     emit("follow.discs.bytes", total(runs["discs"]), "bytes", "none", None)
 
 
-def emit_first(firsts, emit):
+def emit_first(firsts, near, emit):
     def emit_times(name, times, against, asked):
         times = [time_s if time_s >= 0 else float("inf") for time_s in times]
         emit(f"{name}.median", statistics.median(times), "s", against, asked)
@@ -41,6 +41,8 @@ def emit_first(firsts, emit):
     emit_times("first_map.covered", [first["covered_s"] for first in firsts], "asked at most 2", 2)
     emit("first_map.covered.bytes", max(first["covered_bytes"] for first in firsts), "bytes down, most", "none", None)
     emit_times("first_map.planned", [first["planned_s"] for first in firsts], "none", None)
+    emit_times("first_map.near.planned", [first["planned_s"] for first in near], "none", None)
+    emit("first_map.near.bytes", max(sum(first["blob_bytes"]) for first in near), "bytes of tiles, most", "none", None)
     for level in reversed(range(len(firsts[0]["complete_s"]))):
         emit_times(f"first_map.level_{level}", [first["complete_s"][level] for first in firsts], "none", None)
 
@@ -61,10 +63,11 @@ def draw(runs, path):
         axis.annotate(f"{at / 1e6:.3g} MB", (runs[name][-1]["at_m"] / 1000, at), xytext=(-4, 5),
                       textcoords="offset points", ha="right", fontsize=8, color=color)
     axis.set_yscale("log")
+    axis.set_ylim(top=3e9)
     axis.set_xlabel("driven, km (a request every 20 m, 1.2 s at 60 km/h)")
     axis.set_ylabel("bytes both ways, in all")
     axis.grid(alpha=0.3, which="major")
-    axis.legend(fontsize=8, loc="center right", bbox_to_anchor=(1.0, 0.3))
+    axis.legend(fontsize=8, loc="center right", bbox_to_anchor=(1.0, 0.56))
     figure.tight_layout()
     figure.savefig(path, dpi=110)
 
@@ -84,7 +87,7 @@ def bench_follow(bin_dir, emit, drive):
         runs["discs"] = list(rows_of(bench, "discs", atlas.server, poses))
         emit_totals(runs, emit)
         draw(runs, IMAGE)
-        emit_first(list(rows_of(bench, "first", atlas.server, poses, PLACES)), emit)
+        emit_first(*(list(rows_of(bench, name, atlas.server, poses, PLACES)) for name in ("first", "near")), emit)
 
 
 BENCHMARKS = {"follow": bench_follow}

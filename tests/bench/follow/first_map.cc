@@ -75,6 +75,7 @@ class Vehicle {
     AtlasView view(*store, nullptr);
     SyncQuery query;
     query.area = DiscArea{options_.place_m.head<2>(), options_.radius_m};
+    query.sections = options_.sections;
     const auto reply = (*client)->Sync(query, [&](const TileBlob& tile) {
       ATLAS_RETURN_IF_ERROR(store->Put(tile, query.sections));
       Count(tile);
@@ -96,7 +97,9 @@ class Vehicle {
   // As far as it has not seen all of it yet.
   Status Look(AtlasView& view, const MapProfile& profile) {
     if (first_.covered_s && first_.planned_s) return {};
-    const auto map = view.Around(options_.place_m.head<2>(), options_.radius_m);
+    AroundOptions around;
+    around.sections = options_.sections;
+    const auto map = view.Around(options_.place_m.head<2>(), options_.radius_m, around);
     if (!map) return map.error();
     if (!first_.covered_s && Covers(*map)) {
       first_.covered_s = Elapsed_s();

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "client/connection/endpoint.h"
+#include "client/connection/sync_query.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
 #include "tests/bench/follow/slow_link.h"
@@ -21,6 +22,7 @@ struct FirstMapOptions {
   Eigen::Vector3d place_m = Eigen::Vector3d::Zero();   // of the sensor
   Eigen::Vector3d target_m = Eigen::Vector3d::Zero();  // ahead, to be planned to
   double radius_m = 100.0;
+  SectionBits sections = kEverySection;
 };
 
 // Seconds from the attempt to connect on.

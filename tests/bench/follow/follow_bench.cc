@@ -4,6 +4,8 @@
 //        follow_bench discs SERVER POSES           all finest tiles of each disc, as a query sends
 //        follow_bench first SERVER POSES COUNT     without a map, over a slow link, at so many
 //                                                  places of the drive
+//        follow_bench near SERVER POSES COUNT      the same for what planning to the next place
+//                                                  takes: 25 m, without columns
 #include <chrono>
 #include <cstdlib>
 #include <future>
@@ -24,6 +26,8 @@ constexpr double kSpacing_m = 20.0;
 constexpr double kSpeed_m_per_s = 60.0 / 3.6;
 constexpr double kRadius_m = 150.0;
 constexpr double kFirstRadius_m = 100.0;
+constexpr double kNearRadius_m = 25.0;
+constexpr SectionBits kSurface = 1U << 1U | 1U << 2U;  // and contributors
 
 void PrintRequest(std::size_t i, const MapAround& map, std::uint64_t sent, std::uint64_t received) {
   const double at_m = kSpacing_m * static_cast<double>(i);
@@ -107,11 +111,12 @@ void PrintFirst(const FirstMap& first) {
 }
 
 // All of them at once, each over a link of its own.
-Status TimeFirstMaps(const Endpoint& daemon, const Places& places, std::size_t count) {
+Status TimeFirstMaps(FirstMapOptions options, const Places& places, std::size_t count) {
   std::vector<std::future<Result<FirstMap>>> firsts;
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t at = i * (places.size() - 2) / count;
-    const FirstMapOptions options{daemon, {}, places[at], places[at + 1], kFirstRadius_m};
+    options.place_m = places[at];
+    options.target_m = places[at + 1];
     firsts.push_back(std::async(std::launch::async, [options] { return TimeFirstMap(options); }));
   }
   Status failure;
@@ -126,27 +131,40 @@ Status TimeFirstMaps(const Endpoint& daemon, const Places& places, std::size_t c
   return failure;
 }
 
+FirstMapOptions FirstOptions(const Endpoint& daemon, bool is_near) {
+  FirstMapOptions options;
+  options.daemon = daemon;
+  options.radius_m = is_near ? kNearRadius_m : kFirstRadius_m;
+  options.sections = is_near ? kSurface : kEverySection;
+  return options;
+}
+
+Status Run(const std::string& what,
+           const Endpoint& daemon,
+           const Places& places,
+           const std::string& more) {
+  if (what == "drive") return Follow(daemon, places, more);
+  if (what == "discs") return SendDiscs(daemon, places);
+  return TimeFirstMaps(FirstOptions(daemon, what == "near"), places,
+                       std::strtoul(more.c_str(), nullptr, 10));
+}
+
 }  // namespace
 }  // namespace atlas::testing
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   const auto daemon = atlas::Endpoint::Parse(argc > 3 ? argv[2] : "");
-  const bool is_known = what == "discs" ? argc == 4 : argc == 5;
-  if (!daemon || !is_known || (what != "drive" && what != "discs" && what != "first")) {
-    std::cerr
-        << "usage: follow_bench drive SERVER POSES FOLDER | discs SERVER POSES | first SERVER "
-           "POSES COUNT\n";
+  const bool has_more = what == "drive" || what == "first" || what == "near";
+  if (!daemon || argc != (has_more ? 5 : 4) || (!has_more && what != "discs")) {
+    std::cerr << "usage: follow_bench drive SERVER POSES FOLDER | discs SERVER POSES | first|near "
+                 "SERVER POSES COUNT\n";
     return 2;
   }
   const auto places = atlas::testing::PlacesAlong(argv[3], atlas::testing::kSpacing_m);
-  atlas::Status status = places ? atlas::Status() : places.error();
-  if (status.ok()) {
-    status = what == "drive"   ? atlas::testing::Follow(*daemon, *places, argv[4])
-             : what == "discs" ? atlas::testing::SendDiscs(*daemon, *places)
-                               : atlas::testing::TimeFirstMaps(*daemon, *places,
-                                                               std::strtoul(argv[4], nullptr, 10));
-  }
+  const atlas::Status status =
+      places ? atlas::testing::Run(what, *daemon, *places, has_more ? argv[4] : "")
+             : places.error();
   if (!status.ok()) {
     std::cerr << "follow_bench: " << status.message() << "\n";
     return 1;
