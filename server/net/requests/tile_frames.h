@@ -40,7 +40,6 @@ class TileFrames {
   const std::size_t max_bytes_;
   std::mutex mutex_;
   LruList<Entry> entries_;
-  std::size_t left_free_ = 0;  // bytes that went since memory was given back
 };
 
 }  // namespace atlas
