@@ -67,6 +67,9 @@ struct TileBlob {
   std::uint64_t revision = 0;
   std::uint64_t payload_hash = 0;
   Bytes blob;
+  // Not 0, and only in a sync that takes deltas: the blob is one to the held content with this
+  // hash. ApplyTileDelta makes the tile's blob of it.
+  std::uint64_t base_hash = 0;
 };
 
 struct RegionSummary {

@@ -183,6 +183,7 @@ Result<wire::Envelope> SyncRequestOf(const SyncQuery& query) {
       std::clamp<std::int64_t>(query.timeout.count(), 0, INT64_C(0xFFFFFFFF))));
   request.set_wait_revision(query.wait_revision);
   request.set_cursor(BytesToWire(query.cursor));
+  request.set_takes_deltas(query.takes_deltas);
   return envelope;
 }
 
@@ -265,11 +266,23 @@ Result<TileBlob> SyncExchange::OnTile(const wire::TileMessage& tile, std::uint64
                               tile.blob().size(), " bytes, expected ", announced.key, ", ",
                               announced.bytes)));
   }
+  if (tile.base_hash() != 0 && (!query_.takes_deltas || !IsHeld(tile))) {
+    return Error(Wrong(StrCat("sent a delta to what is not held, key ", tile.key())));
+  }
   ++came_;
   ++summary_.tiles;
+  summary_.deltas += tile.base_hash() != 0 ? 1U : 0U;
   const ByteSpan blob = BytesFromWire(tile.blob());
   return TileBlob{*TileId::FromKey(tile.key()), tile.revision(), tile.payload_hash(),
-                  Bytes(blob.begin(), blob.end())};
+                  Bytes(blob.begin(), blob.end()), tile.base_hash()};
+}
+
+bool SyncExchange::IsHeld(const wire::TileMessage& tile) const {
+  return std::any_of(query_.held.begin(), query_.held.end(), [&](const HeldGroup& group) {
+    return std::any_of(group.tiles.begin(), group.tiles.end(), [&](const HeldGroup::OneTile& held) {
+      return held.id.Key() == tile.key() && held.payload_hash == tile.base_hash();
+    });
+  });
 }
 
 Result<SyncSummary> SyncExchange::OnEnd(const wire::SyncEnd& end, std::uint64_t frame_bytes) {

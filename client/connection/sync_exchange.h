@@ -37,6 +37,7 @@ class SyncExchange {
   Status Announce(const wire::SyncManifest& manifest);
   Status TakeHoldings(const wire::SyncManifest& manifest);
   Status CheckAllCame() const;
+  bool IsHeld(const wire::TileMessage& tile) const;  // its base, told by itself
   Status Count(std::uint64_t frame_bytes);
 
   const SyncQuery& query_;

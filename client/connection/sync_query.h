@@ -65,11 +65,13 @@ struct SyncQuery {
   std::chrono::milliseconds timeout{0};
   std::uint64_t wait_revision = 0;  // until the tiles reflect it; 0: do not wait
   Bytes cursor;                     // of the summary before, with area and levels as they were
+  bool takes_deltas = false;        // to held tiles that are told one by one
 };
 
 struct SyncSummary {
   std::uint64_t tiles = 0;
-  std::uint64_t bytes = 0;  // of the reply's frames
+  std::uint64_t deltas = 0;  // of these
+  std::uint64_t bytes = 0;   // of the reply's frames
   std::uint64_t revision = 0;
   Bytes cursor;                          // empty: that was all
   std::vector<TileId> removed;           // held ones that are no more

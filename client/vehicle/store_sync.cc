@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace atlas {
 namespace {
@@ -35,12 +36,24 @@ class Allowance {
   Clock::time_point start_;
 };
 
-Result<SyncSummary> Ask(AtlasClient& client, TileStore& store, SyncQuery& query) {
+struct Answer {
+  SyncSummary summary;
+  bool has_lost_bases = false;  // of deltas: these tiles are not held now, and come as a whole
+};
+
+Result<Answer> Ask(AtlasClient& client, TileStore& store, SyncQuery& query) {
   query.held = store.Held(query.area, query.finest_level, CoarsestOf(query, store.atlas().profile));
-  Result<SyncSummary> reply =
-      client.Sync(query, [&](const TileBlob& tile) { return store.Put(tile, query.sections); });
-  if (reply) store.Apply(*reply);
-  return reply;
+  Answer answer;
+  Result<SyncSummary> reply = client.Sync(query, [&](const TileBlob& tile) {
+    Status status = store.Put(tile, query.sections);
+    const bool is_lost = !status.ok() && tile.base_hash != 0;
+    answer.has_lost_bases |= is_lost;
+    return is_lost ? Status() : status;
+  });
+  if (!reply) return Error(reply.error());
+  store.Apply(*reply);
+  answer.summary = *std::move(reply);
+  return answer;
 }
 
 }  // namespace
@@ -52,23 +65,26 @@ Result<StoreSyncReport> SyncStore(AtlasClient& client, TileStore& store, SyncQue
   }
   const Allowance allowance(query);
   query.cursor.clear();
+  query.takes_deltas = true;
   StoreSyncReport report;
   while (allowance.Leave(report.bytes, query)) {
-    const Result<SyncSummary> reply = Ask(client, store, query);
+    const Result<Answer> answer = Ask(client, store, query);
     // What is left of the budget may be too little for anything.
-    const bool is_spent = report.requests > 0 && !reply && query.budget_bytes != 0 &&
-                          reply.error().code() == StatusCode::kInvalidArgument;
+    const bool is_spent = report.requests > 0 && !answer && query.budget_bytes != 0 &&
+                          answer.error().code() == StatusCode::kInvalidArgument;
     if (is_spent) break;
-    if (!reply) return Error(reply.error());
+    if (!answer) return Error(answer.error());
+    const SyncSummary& reply = answer->summary;
     ++report.requests;
-    report.tiles += reply->tiles;
-    report.bytes += reply->bytes;
-    if (report.requests == 1) report.revision = reply->revision;
+    report.tiles += reply.tiles;
+    report.deltas += reply.deltas;
+    report.bytes += reply.bytes;
+    if (report.requests == 1) report.revision = reply.revision;
     query.wait_revision = 0;
-    const bool is_refined = !reply->differing_blocks.empty();
-    report.is_complete = !is_refined && reply->cursor.empty();
-    if (report.is_complete || (!is_refined && reply->tiles == 0)) break;
-    query.cursor = is_refined ? Bytes() : reply->cursor;
+    const bool is_told_anew = !reply.differing_blocks.empty() || answer->has_lost_bases;
+    report.is_complete = !is_told_anew && reply.cursor.empty();
+    if (report.is_complete || (!is_told_anew && reply.tiles == 0)) break;
+    query.cursor = is_told_anew ? Bytes() : reply.cursor;
   }
   return report;
 }

@@ -11,7 +11,8 @@ namespace atlas {
 
 struct StoreSyncReport {
   std::uint64_t tiles = 0;
-  std::uint64_t bytes = 0;  // of the replies' frames
+  std::uint64_t deltas = 0;  // of these, as differences to what was held
+  std::uint64_t bytes = 0;   // of the replies' frames
   std::uint64_t requests = 0;
   std::uint64_t revision = 0;  // the area is at least as new, if `is_complete`
   bool is_complete = false;    // the store got all that the query wants

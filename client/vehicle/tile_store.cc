@@ -8,6 +8,7 @@
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
 #include "core/tile/tile_container.h"
+#include "core/tile/tile_delta.h"
 
 namespace atlas {
 namespace {
@@ -86,8 +87,21 @@ SectionBits TileStore::SectionsThatCame(const TileBlob& tile, SectionBits asked)
   return is_rest ? asked & ~told->second.sections : asked;
 }
 
+// What came, made of what is held where it is a delta.
+Result<Bytes> TileStore::Whole(const TileBlob& tile) {
+  if (tile.base_hash == 0) return tile.blob;
+  const TileFacts* held = Find(tile.id);
+  const bool is_held = held != nullptr && held->payload_hash == tile.base_hash;
+  const std::shared_ptr<const Bytes> base = is_held ? Read(tile.id) : nullptr;
+  if (base == nullptr) {
+    return Error(StatusCode::kInvalidData, "a delta to what is not held");
+  }
+  return ApplyTileDelta(*base, tile.blob);
+}
+
 // The blob with what is held of the same content, whose sections are added to those of the blob.
 Result<Bytes> TileStore::Joined(const TileBlob& tile, SectionBits& sections) {
+  if (tile.base_hash != 0) return Whole(tile);
   const TileFacts* held = Find(tile.id);
   if (held == nullptr || held->payload_hash != tile.payload_hash) return tile.blob;
   const SectionBits held_sections = held->sections;

@@ -47,7 +47,8 @@ class TileStore {
   // The blob; null when it is not held, or was damaged on disk, and then is not held any more.
   std::shared_ptr<const Bytes> Read(const TileId& id);
   // A tile that came with the sections `asked` of it, but for those that Held told of the same
-  // content. kInvalidData, and that tile not held, when the blob is not what the hash says.
+  // content; or a delta to what is held. kInvalidData, and that tile not held, when the blob is not
+  // what the hash says, or the delta's base is not held any more.
   Status Put(const TileBlob& tile, SectionBits asked);
   void Remove(const TileId& id);
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
@@ -71,6 +72,7 @@ class TileStore {
   TileStore(AtlasKey atlas, const TileStoreOptions& options);
   Status OpenFolder();
   SectionBits SectionsThatCame(const TileBlob& tile, SectionBits asked) const;
+  Result<Bytes> Whole(const TileBlob& tile);
   Result<Bytes> Joined(const TileBlob& tile, SectionBits& sections);
   void Keep(const TileFacts& facts, Bytes blob);
   void Trim();

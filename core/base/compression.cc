@@ -1,5 +1,7 @@
 #include "core/base/compression.h"
 
+#include <algorithm>
+#include <bit>
 #include <cassert>
 #include <memory>
 
@@ -8,21 +10,54 @@
 #include "core/base/str_cat.h"
 
 namespace atlas {
+namespace {
 
-Bytes Compress(ByteSpan bytes, int level) {
-  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
-                                                                     &ZSTD_freeCCtx);
+constexpr int kMaxWindowLog = 27;  // what every decompressor takes
+
+using Compressor = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
+using Decompressor = std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)>;
+
+Compressor MakeCompressor(int level) {
+  Compressor context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+  return context;
+}
+
+Bytes CompressWith(ZSTD_CCtx* context, ByteSpan bytes) {
   Bytes frame(ZSTD_compressBound(bytes.size()));
   const std::size_t size =
-      ZSTD_compress2(context.get(), frame.data(), frame.size(), bytes.data(), bytes.size());
+      ZSTD_compress2(context, frame.data(), frame.size(), bytes.data(), bytes.size());
   assert(ZSTD_isError(size) == 0);  // the buffer is ZSTD_compressBound bytes long
   frame.resize(size);
   return frame;
 }
 
+// Both in one window, so that all of the prefix can be referred to.
+int WindowLog(std::size_t bytes) {
+  const ZSTD_bounds bounds = ZSTD_cParam_getBounds(ZSTD_c_windowLog);
+  return std::clamp(static_cast<int>(std::bit_width(bytes)), bounds.lowerBound, kMaxWindowLog);
+}
+
+}  // namespace
+
+Bytes Compress(ByteSpan bytes, int level) {
+  return CompressWith(MakeCompressor(level).get(), bytes);
+}
+
+Bytes CompressAgainst(ByteSpan prefix, ByteSpan bytes, int level) {
+  const Compressor context = MakeCompressor(level);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_windowLog, WindowLog(prefix.size() + bytes.size()));
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_enableLongDistanceMatching, 1);
+  ZSTD_CCtx_refPrefix(context.get(), prefix.data(), prefix.size());
+  return CompressWith(context.get(), bytes);
+}
+
 Result<Bytes> Decompress(ByteSpan frame, std::size_t expected_size) {
+  return DecompressAgainst({}, frame, expected_size);
+}
+
+Result<Bytes> DecompressAgainst(ByteSpan prefix, ByteSpan frame, std::size_t expected_size) {
   const unsigned long long declared = ZSTD_getFrameContentSize(frame.data(), frame.size());
   if (declared != expected_size) {
     return Error(StatusCode::kInvalidData, StrCat("compressed block does not declare the expected ",
@@ -31,8 +66,11 @@ Result<Bytes> Decompress(ByteSpan frame, std::size_t expected_size) {
   if (ZSTD_findFrameCompressedSize(frame.data(), frame.size()) != frame.size()) {
     return Error(StatusCode::kInvalidData, "compressed block is truncated or has trailing bytes");
   }
+  const Decompressor context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  ZSTD_DCtx_refPrefix(context.get(), prefix.data(), prefix.size());
   Bytes bytes(expected_size);
-  const std::size_t size = ZSTD_decompress(bytes.data(), bytes.size(), frame.data(), frame.size());
+  const std::size_t size =
+      ZSTD_decompressDCtx(context.get(), bytes.data(), bytes.size(), frame.data(), frame.size());
   if (ZSTD_isError(size) != 0 || size != expected_size) {
     return Error(StatusCode::kInvalidData,
                  StrCat("compressed block is damaged: ", ZSTD_getErrorName(size)));

@@ -26,6 +26,7 @@ Result<TileBody> TileBody::Create(const TileBodyId& id, ByteSpan blob) {
   message.set_key(id.key);
   message.set_revision(id.revision);
   message.set_payload_hash(id.payload_hash);
+  message.set_base_hash(id.base_hash);
   ByteWriter tile;
   tile.Raw(BytesFromWire(message.SerializeAsString()));
   tile.Varint(Tag(wire::TileMessage::kBlobFieldNumber, kLengthDelimited));

@@ -17,6 +17,7 @@ struct TileBodyId {
   std::uint64_t key = 0;
   std::uint64_t revision = 0;
   std::uint64_t payload_hash = 0;
+  std::uint64_t base_hash = 0;  // not 0: the blob is a delta to the content with this hash
 };
 
 class TileBody {
@@ -25,7 +26,7 @@ class TileBody {
   static Result<TileBody> Create(const TileBodyId& id, ByteSpan blob);
 
   const TileBodyId& id() const { return id_; }
-  std::size_t blob_bytes() const { return blob_bytes_; }
+  ByteSpan blob() const { return ByteSpan(bytes_).last(blob_bytes_); }
   ByteSpan bytes() const { return bytes_; }
   // Its header, then what follows bytes(): a frame is all three.
   Bytes FrameAround(std::uint64_t request_id) const;

@@ -6,12 +6,12 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/requests/atlas_wait.h"
 #include "server/net/requests/on_pool.h"
-#include "server/net/requests/region_reply.h"
+#include "server/net/requests/read_requests.h"
 #include "server/net/requests/request_conversion.h"
-#include "server/net/requests/sync_reply.h"
 #include "server/net/requests/watch_reply.h"
+#include "server/net/requests/whole_atlas_requests.h"
+#include "server/net/requests/write_requests.h"
 
 namespace atlas {
 namespace {
@@ -26,7 +26,7 @@ std::optional<asio::awaitable<void>> RequestHandler::Greet(Envelope request,
                                                            const Identity& identity,
                                                            ReplyWriter& out) {
   RequestRecord record(out.peer(), request);
-  const AtlasIdentity& atlas = service_.identity();
+  const AtlasIdentity& atlas = context_.service.identity();
   Envelope reply = ReplyTo(request);
   wire::HelloReply& hello = *reply.mutable_hello_reply();
   hello.set_protocol_major(kProtocolMajor);
@@ -34,7 +34,7 @@ std::optional<asio::awaitable<void>> RequestHandler::Greet(Envelope request,
   hello.set_profile(ProfileToWire(atlas.profile));
   hello.set_atlas_id(BytesToWire(atlas.atlas_id));
   hello.set_epoch(atlas.epoch);
-  hello.set_revision(service_.revision());
+  hello.set_revision(context_.service.revision());
   hello.set_max_frame_bytes(options_.max_frame_bytes);
   hello.set_name(identity.name);
   hello.set_role(std::string(RoleName(identity.role)));
@@ -52,9 +52,9 @@ asio::awaitable<void> RequestHandler::Resume(SessionKey session,
                                              RequestRecord record,
                                              ReplyWriter& out) {
   const Blocking<std::optional<SessionRecord>> find = [this, session] {
-    return service_.FindSession(session);
+    return context_.service.FindSession(session);
   };
-  const Result<std::optional<SessionRecord>> found = co_await OnPool(pool_, find);
+  const Result<std::optional<SessionRecord>> found = co_await OnPool(context_.pool, find);
   record.End(found ? Status() : found.error());
   if (!found) {
     co_await out.SendError(reply.request_id(), found.error());
@@ -74,14 +74,11 @@ std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Pe
   if (request.has_watch_request()) {
     return Watch(std::move(request), peer);
   }
-  if (request.has_upload_keyframe()) {
-    return Upload(std::move(request), peer);
-  }
   if (!request.has_sync_request()) {
-    return Await(std::move(request), peer.out);
+    return Await(std::move(request), peer);
   }
   RequestRecord record(peer.out.peer(), request);
-  auto reply = std::make_shared<SyncReply>(service_, frames_, std::move(request));
+  auto reply = std::make_shared<SyncReply>(context_.service, frames_, std::move(request));
   const bool may_begin = reply->message().wait_revision() == 0;
   if (may_begin && SyncAtOnce(*reply, record, peer.out)) {
     return std::nullopt;
@@ -111,7 +108,7 @@ asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
               StrCat("watch ", id, ": there is one under this id, or there are ",
                      Peer::kMaxCancellable, " on this connection")};
   } else {
-    status = co_await SendWatch(service_, request, peer.cancelled(id), peer.out);
+    status = co_await SendWatch(context_.service, request, peer.cancelled(id), peer.out);
     peer.End(id);
     const bool is_over = status.code() == StatusCode::kUnavailable;  // as every watch once is
     record.End(is_over ? Status() : status);
@@ -120,37 +117,37 @@ asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
   co_await peer.out.SendError(id, std::move(status));
 }
 
-asio::awaitable<void> RequestHandler::Await(Envelope request, ReplyWriter& out) {
-  RequestRecord record(out.peer(), request);
-  Status status = co_await Dispatch(request, out);
+asio::awaitable<void> RequestHandler::Await(Envelope request, Peer& peer) {
+  RequestRecord record(peer.out.peer(), request);
+  Status status = co_await Dispatch(request, peer);
   record.End(status);
   if (!status.ok()) {
-    co_await out.SendError(request.request_id(), std::move(status));
+    co_await peer.out.SendError(request.request_id(), std::move(status));
   }
 }
 
-asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, ReplyWriter& out) {
+asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, Peer& peer) {
   switch (request.body_case()) {
+    case Envelope::kUploadKeyframe:
+      return AnswerUpload(context_, request, peer);
     case Envelope::kUpdatePoses:
-      return UpdatePoses(request, out);
+      return AnswerUpdatePoses(context_, request, peer.out);
     case Envelope::kChangeSession:
-      return ChangeSession(request, out);
+      return AnswerChangeSession(context_, request, peer.out);
     case Envelope::kQueryRegion:
-      return request.query_region().has_at_revision() ? QueryThePast(request, out)
-                                                      : Query(request, out);
+      return AnswerQuery(context_, request, peer.out);
     case Envelope::kStatusRequest:
-      return ReadStatus(request, out);
-    case Envelope::kWaitRequest:
-      return Wait(request, out);
+      return AnswerStatus(context_, request, peer.out);
     case Envelope::kSessionsRequest:
-      return ListSessions(request, out);
+      return AnswerSessions(context_, request, peer.out);
+    case Envelope::kWaitRequest:
+      return AnswerWait(context_, request, peer.out);
     case Envelope::kDigestRequest:
-      return request.digest_request().has_at_revision() ? DigestThePast(request, out)
-                                                        : Digest(request, out);
+      return AnswerDigest(context_, request, peer.out);
     case Envelope::kVerifyRequest:
-      return Verify(request, out);
+      return AnswerVerify(context_, request, peer.out);
     case Envelope::kCompactRequest:
-      return Compact(request, out);
+      return AnswerCompact(context_, request, peer.out);
     default:
       return Refuse(request);
   }
@@ -165,120 +162,6 @@ asio::awaitable<Status> RequestHandler::Refuse(const Envelope& request) {
   co_return Status(StatusCode::kUnsupported, StrCat("request ", request.request_id(),
                                                     ": this daemon does not know its body (",
                                                     static_cast<int>(request.body_case()), ")"));
-}
-
-// Hands a write to the service on the pool; its answer, once it is on disk or refused.
-template <typename Request, typename T>
-asio::awaitable<Result<T>> RequestHandler::Write(Request request, Writing<Request, T> write) {
-  const auto owned = std::make_shared<Request>(std::move(request));
-  Starting<T> start = [this, owned, write](auto done) {
-    (service_.*write)(std::move(*owned), std::move(done));
-  };
-  co_return co_await StartOnPool(pool_, std::move(start));
-}
-
-asio::awaitable<void> RequestHandler::Upload(Envelope request, Peer& peer) {
-  RequestRecord record(peer.out.peer(), request);
-  Status status = co_await PutInOrder(request, peer);
-  record.End(status);
-  if (!status.ok()) {
-    co_await peer.out.SendError(request.request_id(), std::move(status));
-  }
-}
-
-asio::awaitable<Status> RequestHandler::PutInOrder(const Envelope& request, Peer& peer) {
-  UploadOrder::Turn turn(peer.uploads);
-  Result<UploadRequest> upload = UploadFromWire(request.upload_keyframe());
-  if (!upload) {
-    co_return upload.error();
-  }
-  const auto unchecked = std::make_shared<UploadRequest>(*std::move(upload));
-  const Blocking<NewKeyframe> check = [this, unchecked] {
-    return service_.CheckUpload(std::move(*unchecked));
-  };
-  Result<NewKeyframe> keyframe = co_await OnPool(pool_, check);
-  if (!keyframe) {
-    co_return keyframe.error();
-  }
-  co_await turn.Come();
-  const auto executor = co_await asio::this_coro::executor;
-  const auto put = std::make_shared<OneShot<PutKeyframeResult>>(executor);
-  const auto done = [put](Result<PutKeyframeResult> result) {
-    put->Set(std::move(result));
-  };
-  service_.PutKeyframe(*std::move(keyframe), done);
-  turn.Leave();
-  const Result<PutKeyframeResult> result = co_await put->Take();
-  if (!result) {
-    co_return result.error();
-  }
-  Envelope reply = ReplyTo(request);
-  UploadToWire(*result, *reply.mutable_upload_reply());
-  co_await peer.out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::UpdatePoses(const Envelope& request, ReplyWriter& out) {
-  Result<PoseBatchRequest> update = PosesFromWire(request.update_poses());
-  if (!update) {
-    co_return update.error();
-  }
-  const auto result = co_await Write(*std::move(update), &AtlasService::UpdatePoses);
-  if (!result) {
-    co_return result.error();
-  }
-  Envelope reply = ReplyTo(request);
-  PosesToWire(*result, *reply.mutable_update_poses_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::ChangeSession(const Envelope& request, ReplyWriter& out) {
-  Result<SessionChange> change = SessionChangeFromWire(request.change_session());
-  if (!change) {
-    co_return change.error();
-  }
-  const auto result = co_await Write(*std::move(change), &AtlasService::ChangeSession);
-  if (!result) {
-    co_return result.error();
-  }
-  Envelope reply = ReplyTo(request);
-  SessionChangeToWire(*result, *reply.mutable_change_session_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::Query(const Envelope& request, ReplyWriter& out) {
-  const wire::QueryRegion& query = request.query_region();
-  Result<RegionRequest> region = RegionFromWire(query);
-  if (!region) {
-    co_return region.error();
-  }
-  if (query.wait_revision() != 0) {
-    const Result<Places::Place> place = places_.Take();
-    if (!place) {
-      co_return place.error();
-    }
-    const Patience patience{TimeoutFromWire(query.timeout_ms()), out.peer_left()};
-    Status status = co_await WaitForRevision(service_, pool_, query.wait_revision(), patience);
-    if (!status.ok()) {
-      co_return status;
-    }
-  }
-  co_return co_await SendRegion(service_, pool_, request, *region, out);
-}
-
-// Fusing is long work: it has places and threads of its own, and ends when the peer leaves.
-asio::awaitable<Status> RequestHandler::QueryThePast(const Envelope& request, ReplyWriter& out) {
-  const Result<RegionRequest> region = RegionFromWire(request.query_region());
-  if (!region) {
-    co_return region.error();
-  }
-  const Result<Places::Place> place = places_.Take();
-  if (!place) {
-    co_return place.error();
-  }
-  co_return co_await SendRegion(service_, reading_pool_, request, *region, out);
 }
 
 bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out) {
@@ -319,169 +202,12 @@ asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
 asio::awaitable<Status> RequestHandler::WaitAndSync(std::shared_ptr<SyncReply> reply,
                                                     ReplyWriter& out) {
   const wire::SyncRequest& message = reply->message();
-  if (message.wait_revision() != 0) {
-    const Result<Places::Place> place = places_.Take();
-    if (!place) {
-      co_return place.error();
-    }
-    const Patience patience{TimeoutFromWire(message.timeout_ms()), out.peer_left()};
-    Status status = co_await WaitForRevision(service_, pool_, message.wait_revision(), patience);
-    if (!status.ok()) {
-      co_return status;
-    }
-  }
-  co_return co_await SendSync(std::move(reply), pool_, out);
-}
-
-asio::awaitable<Status> RequestHandler::ReadStatus(const Envelope& request, ReplyWriter& out) {
-  const Blocking<ServiceStatus> read = [this] {
-    return service_.ReadStatus();
-  };
-  const Result<ServiceStatus> status = co_await OnPool(pool_, read);
-  if (!status) {
-    co_return status.error();
-  }
-  Envelope reply = ReplyTo(request);
-  StatusToWire(*status, *reply.mutable_status_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::Wait(const Envelope& request, ReplyWriter& out) {
-  const Result<Places::Place> place = places_.Take();
-  if (!place) {
-    co_return place.error();
-  }
-  const Patience patience{TimeoutFromWire(request.wait_request().timeout_ms()), out.peer_left()};
-  const Result<WaitOutcome> outcome = co_await WaitUntilClean(service_, pool_, patience);
-  if (!outcome) {
-    co_return outcome.error();
-  }
-  if (!outcome->damage.ok()) {
-    co_return outcome->damage;
-  }
-  Envelope reply = ReplyTo(request);
-  WaitToWire(*outcome, *reply.mutable_wait_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::ListSessions(const Envelope& request, ReplyWriter& out) {
-  const Blocking<std::vector<SessionRecord>> list = [this] {
-    return service_.ListSessions();
-  };
-  const Result<std::vector<SessionRecord>> sessions = co_await OnPool(pool_, list);
-  if (!sessions) {
-    co_return sessions.error();
-  }
-  Envelope reply = ReplyTo(request);
-  wire::SessionsReply& message = *reply.mutable_sessions_reply();
-  for (const SessionRecord& record : *sessions) {
-    SessionToWire(record, *message.add_sessions());
-  }
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::Digest(const Envelope& request, ReplyWriter& out) {
-  const Result<Places::Place> place = places_.Take();
-  if (!place) {
-    co_return place.error();
-  }
-  const Patience patience{TimeoutFromWire(request.digest_request().timeout_ms()), out.peer_left()};
-  const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
-  if (!settled) {
-    co_return settled.error();
-  }
-  if (!settled->damage.ok()) {
-    co_return settled->damage;
-  }
-  const Blocking<AtlasDigest> compute = [this, patience] {
-    return service_.Digest(patience);
-  };
-  const Result<AtlasDigest> digest = co_await OnPool(reading_pool_, compute);
-  if (!digest) {
-    co_return digest.error();
-  }
-  Envelope reply = ReplyTo(request);
-  DigestToWire(*digest, *reply.mutable_digest_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::DigestThePast(const Envelope& request, ReplyWriter& out) {
-  const Result<Places::Place> place = places_.Take();
-  if (!place) {
-    co_return place.error();
-  }
-  const std::uint64_t revision = request.digest_request().at_revision();
-  const Patience patience{TimeoutFromWire(request.digest_request().timeout_ms()), out.peer_left()};
-  const Blocking<AtlasDigest> compute = [this, revision, patience] {
-    return service_.DigestAt(revision, patience);
-  };
-  const Result<AtlasDigest> digest = co_await OnPool(reading_pool_, compute);
-  if (!digest) {
-    co_return digest.error();
-  }
-  Envelope reply = ReplyTo(request);
-  DigestToWire(*digest, *reply.mutable_digest_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-asio::awaitable<Status> RequestHandler::Verify(const Envelope& request, ReplyWriter& out) {
-  const Result<Places::Place> place = places_.Take();
-  if (!place) {
-    co_return place.error();
-  }
-  const bool is_rebuild = request.verify_request().rebuild();
-  const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
-  if (is_rebuild) {
-    const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
-    if (!settled) {
-      co_return settled.error();
-    }
-  }
-  const Blocking<VerifyReport> check = [this, is_rebuild, patience] {
-    return service_.Verify(is_rebuild, patience);
-  };
-  const Result<VerifyReport> result = co_await OnPool(reading_pool_, check);
-  if (!result) {
-    co_return result.error();
-  }
-  Envelope reply = ReplyTo(request);
-  VerifyToWire(*result, *reply.mutable_verify_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
-}
-
-// The wait for the workers takes no thread; what is refused is refused before it.
-asio::awaitable<Status> RequestHandler::Compact(const Envelope& request, ReplyWriter& out) {
-  const CompactionRequest compaction = CompactionFromWire(request.compact_request());
-  Status status = CheckCompaction(compaction, service_.identity().profile);
+  Status status =
+      co_await AwaitRevision(context_, message.wait_revision(), message.timeout_ms(), out);
   if (!status.ok()) {
     co_return status;
   }
-  const Result<Places::Place> place = places_.Take();
-  if (!place) {
-    co_return place.error();
-  }
-  const Patience patience{TimeoutFromWire(request.compact_request().timeout_ms()), out.peer_left()};
-  const Result<WaitOutcome> settled = co_await RequireSettled(service_, pool_, patience);
-  if (!settled) {
-    co_return settled.error();
-  }
-  const Blocking<CompactionReport> compact = [this, compaction, patience] {
-    return service_.Compact(compaction, patience);
-  };
-  const Result<CompactionReport> report = co_await OnPool(reading_pool_, compact);
-  if (!report) {
-    co_return report.error();
-  }
-  Envelope reply = ReplyTo(request);
-  CompactionToWire(*report, *reply.mutable_compact_reply());
-  co_await out.Send(std::move(reply));
-  co_return Status();
+  co_return co_await SendSync(std::move(reply), context_.pool, out);
 }
 
 }  // namespace atlas

@@ -12,11 +12,11 @@
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/requests/peer.h"
+#include "server/net/requests/request_context.h"
 #include "server/net/requests/request_conversion.h"
 #include "server/net/requests/request_record.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
-#include "server/net/requests/wait_places.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
@@ -30,18 +30,15 @@ class RequestHandler {
                  boost::asio::thread_pool& pool,
                  boost::asio::thread_pool& reading_pool,
                  const NetOptions& options)
-      : service_(service),
-        pool_(pool),
-        reading_pool_(reading_pool),
+      : context_{service, pool, reading_pool, WaitPlaces(options.max_waits)},
         options_(options),
-        places_(options.max_waits),
         watch_places_(options.max_watches),
         frames_(options.tile_frame_bytes) {}
 
-  std::int64_t NowMs() const { return service_.NowMs(); }
+  std::int64_t NowMs() const { return context_.service.NowMs(); }
   // Whether the first frame of a connection is a Hello for this atlas.
   Status CheckGreeting(const wire::Envelope& request) const {
-    return CheckHello(request, service_.identity().profile);
+    return CheckHello(request, context_.service.identity().profile);
   }
   // Its reply, of a peer that may come in; with a session to be resumed it is to be awaited.
   std::optional<boost::asio::awaitable<void>> Greet(wire::Envelope request,
@@ -53,45 +50,25 @@ class RequestHandler {
 
  private:
   using Envelope = wire::Envelope;
-  template <typename Request, typename T>
-  using Writing = void (AtlasService::*)(Request, AtlasStore::Done<T>);
 
-  boost::asio::awaitable<void> Await(Envelope request, ReplyWriter& out);
+  boost::asio::awaitable<void> Await(Envelope request, Peer& peer);
   boost::asio::awaitable<void> Watch(Envelope request, Peer& peer);
   boost::asio::awaitable<void> Resume(SessionKey session,
                                       Envelope reply,
                                       RequestRecord record,
                                       ReplyWriter& out);
   static void Cancel(const Envelope& request, Peer& peer);
-  boost::asio::awaitable<void> Upload(Envelope request, Peer& peer);
-  boost::asio::awaitable<Status> PutInOrder(const Envelope& request, Peer& peer);
-  boost::asio::awaitable<Status> Dispatch(const Envelope& request, ReplyWriter& out);
+  boost::asio::awaitable<Status> Dispatch(const Envelope& request, Peer& peer);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
-  template <typename Request, typename T>
-  boost::asio::awaitable<Result<T>> Write(Request request, Writing<Request, T> write);
-  boost::asio::awaitable<Status> UpdatePoses(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> ChangeSession(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> Query(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> QueryThePast(const Envelope& request, ReplyWriter& out);
   // False: what is left takes long, or the disk, or the peer does not take it.
   static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);
   boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
                                     RequestRecord record,
                                     ReplyWriter& out);
   boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
-  boost::asio::awaitable<Status> ReadStatus(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> Wait(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> ListSessions(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> Digest(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> DigestThePast(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> Compact(const Envelope& request, ReplyWriter& out);
-  boost::asio::awaitable<Status> Verify(const Envelope& request, ReplyWriter& out);
 
-  AtlasService& service_;
-  boost::asio::thread_pool& pool_;
-  boost::asio::thread_pool& reading_pool_;
+  RequestContext context_;
   const NetOptions& options_;
-  WaitPlaces places_;
   Places watch_places_;
   TileFrames frames_;
 };

@@ -170,7 +170,7 @@ void AnnounceTile(const TileBody& tile,
   out.add_keys(tile.id().key);
   out.add_revisions(tile.id().revision);
   out.add_payload_hashes(tile.id().payload_hash);
-  out.add_bytes(static_cast<std::uint32_t>(tile.blob_bytes()));
+  out.add_bytes(static_cast<std::uint32_t>(tile.blob().size()));
   out.add_errors_mm(static_cast<std::uint32_t>(std::lround(1e3 * GeometricError(level, profile))));
 }
 

@@ -32,7 +32,7 @@ constexpr std::size_t kSmallRequestBytes = 16u
 }  // namespace
 
 SyncReply::SyncReply(AtlasService& service, TileFrames& frames, wire::Envelope request)
-    : service_(service), frames_(frames), envelope_(std::move(request)) {
+    : service_(service), tiles_(service, frames), envelope_(std::move(request)) {
   if (message().timeout_ms() > 0) {
     deadline_ = Clock::now() + TimeoutFromWire(message().timeout_ms());
   }
@@ -128,12 +128,15 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, Batch& batch) {
       return Step::kDone;
     }
     const SyncItem& item = plan_.items[next_];
-    Body body;
-    const Result<Step> found = FindTile(item, may_block, body);
-    if (!found || *found == Step::kBlocked) {
-      return found;
+    Result<std::optional<Body>> found =
+        tiles_.Find(*request_, item, message().takes_deltas(), may_block);
+    if (!found) {
+      return Error(found.error());
     }
-    if (body != nullptr) {
+    if (!*found) {
+      return Step::kBlocked;
+    }
+    if (const Body body = **std::move(found)) {
       const std::size_t frame_bytes = kTileFrameBytes + body->bytes().size();
       bytes += frame_bytes + kAnnouncementBytes;
       if (!Fits(bytes + kEndBytes)) {
@@ -142,62 +145,13 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, Batch& batch) {
       }
       AnnounceTile(*body, item.tile.id.level, profile(), manifest);
       batch.tile_bytes += frame_bytes;
-      batch.tiles.push_back(std::move(body));
+      batch.tiles.push_back(body);
     }
     last_.priority = item.priority;
     last_.key = item.tile.id.Key();
     ++next_;
   }
   return Step::kMore;
-}
-
-Result<SyncReply::Step> SyncReply::FindTile(const SyncItem& item, bool may_block, Body& body) {
-  body = frames_.Find({item.tile.id.Key(), item.tile.revision, item.sections});
-  if (body != nullptr) {
-    return Step::kMore;
-  }
-  if (!may_block) {
-    return Step::kBlocked;
-  }
-  Result<Body> read = ReadTile(item);
-  if (!read) {
-    return Error(read.error());
-  }
-  body = *std::move(read);
-  return Step::kMore;
-}
-
-// With the sections that are to be sent.
-Result<SyncReply::Body> SyncReply::ReadTile(const SyncItem& item) {
-  Result<std::optional<StoredTile>> read = service_.ReadTile(item.tile.id);
-  if (!read && read.error().code() == StatusCode::kInvalidData) {
-    return nullptr;
-  }
-  if (!read) {
-    return Error(read.error());
-  }
-  if (!*read) {
-    return nullptr;
-  }
-  StoredTile& tile = **read;
-  // Of other content than was planned nothing is held.
-  const SectionMask sections =
-      tile.payload_hash == item.tile.payload_hash ? item.sections : request_->sections;
-  if (sections != kAllSections) {
-    Result<Bytes> blob = SelectSections(tile.blob, sections);
-    if (!blob) {
-      return Error(blob.error());
-    }
-    tile.blob = *std::move(blob);
-  }
-  Result<TileBody> made =
-      TileBody::Create({tile.id.Key(), tile.revision, tile.payload_hash}, tile.blob);
-  if (!made) {
-    return Error(made.error());
-  }
-  auto body = std::make_shared<const TileBody>(*std::move(made));
-  frames_.Insert({tile.id.Key(), tile.revision, sections}, body);
-  return body;
 }
 
 Status SyncReply::Emit(const Batch& batch, std::vector<ReplyFrame>& out) {

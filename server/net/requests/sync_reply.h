@@ -12,7 +12,7 @@
 #include <boost/asio/thread_pool.hpp>
 
 #include "proto/wire/envelope.h"
-#include "server/net/requests/tile_frames.h"
+#include "server/net/requests/reply_tiles.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
@@ -39,7 +39,7 @@ class SyncReply {
 
  private:
   using Clock = std::chrono::steady_clock;
-  using Body = std::shared_ptr<const TileBody>;
+  using Body = ReplyTiles::Body;
   enum class End { kWhole, kCut };
   struct Batch {
     wire::Envelope manifest;
@@ -51,9 +51,6 @@ class SyncReply {
   Result<Step> Begin(bool may_block);
   Result<Step> Plan(bool may_block);
   Result<Step> Fill(bool may_block, Batch& batch);
-  // Null: it is gone by now, or damaged. kBlocked: `body` is not set.
-  Result<Step> FindTile(const SyncItem& item, bool may_block, Body& body);
-  Result<Body> ReadTile(const SyncItem& item);
   Status Emit(const Batch& batch, std::vector<ReplyFrame>& out);
   // The end counts itself: its own length depends on the number it carries.
   Result<Bytes> EndFrame(End how) const;
@@ -64,7 +61,7 @@ class SyncReply {
   const MapProfile& profile() const { return service_.identity().profile; }
 
   AtlasService& service_;
-  TileFrames& frames_;
+  ReplyTiles tiles_;
   const wire::Envelope envelope_;
   std::optional<SyncRequest> request_;  // from Begin() on
   std::optional<Clock::time_point> deadline_;

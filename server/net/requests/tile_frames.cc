@@ -32,8 +32,10 @@ void TileFrames::Insert(const Content& content, std::shared_ptr<const TileBody> 
 std::uint64_t TileFrames::NumberOf(const Content& content) {
   ByteWriter out;
   out.U64(content.key);
-  out.U64(content.revision);
+  out.U64(content.payload_hash);
   out.U64(content.sections);
+  out.U64(content.base_hash);
+  out.U64(content.base_sections);
   return Hash64(out.bytes());
 }
 

@@ -1,5 +1,5 @@
 // Tiles as they go out, kept for the next one who asks: bounded by bytes, disposable, thread-safe.
-// One of an earlier revision is never asked for again and leaves by its age.
+// Those of earlier contents leave by their age; until then they are what deltas are made against.
 #pragma once
 
 #include <cstddef>
@@ -19,13 +19,16 @@ class TileFrames {
 
   struct Content {
     std::uint64_t key = 0;
-    std::uint64_t revision = 0;
+    std::uint64_t payload_hash = 0;
     SectionMask sections = kAllSections;
+    // Of who holds an earlier content: the best to send, a delta or the whole. 0: the whole.
+    std::uint64_t base_hash = 0;
+    SectionMask base_sections = 0;
 
     bool operator==(const Content&) const = default;
   };
 
-  // Null: not there.
+  // Null: not there. Of whatever revision: the same content may get another.
   std::shared_ptr<const TileBody> Find(const Content& content);
   void Insert(const Content& content, std::shared_ptr<const TileBody> body);
 

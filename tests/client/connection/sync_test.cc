@@ -28,12 +28,14 @@ class Script {
   }
   Script& Tile(const TileId& id,
                std::uint64_t payload_hash = 77,
-               const std::string& blob = "blob") {
+               const std::string& blob = "blob",
+               std::uint64_t base_hash = 0) {
     wire::TileMessage& tile = *Add().mutable_tile();
     tile.set_key(id.Key());
     tile.set_revision(5);
     tile.set_payload_hash(payload_hash);
     tile.set_blob(blob);
+    tile.set_base_hash(base_hash);
     ++tiles_;
     return *this;
   }
@@ -161,6 +163,20 @@ TEST(SyncTest, WordsAboutTilesThatAreNotHeldAreInvalidData) {
   for (Script* script : {&current, &removed, &differing}) {
     EXPECT_EQ(Ask(script->End()).code(), StatusCode::kInvalidData);
   }
+}
+
+TEST(SyncTest, DeltasAreTakenToHeldTilesOnlyAndWhereTheyWereAskedFor) {
+  Script script;
+  script.Manifest({kFine}).Tile(kFine, 77, "blob", 55).End();
+  SyncQuery query = Everything();
+  query.held = {{kEverySection, {{kFine, 55}}, {}}};
+  EXPECT_EQ(Ask(script, query).code(), StatusCode::kInvalidData) << "not asked for";
+  query.takes_deltas = true;
+  const Outcome outcome = Ask(script, query);
+  ASSERT_TRUE(outcome.summary) << outcome.summary.error().message();
+  EXPECT_EQ(outcome.summary->deltas, 1U);
+  query.held[0].tiles[0].payload_hash = 56;
+  EXPECT_EQ(Ask(script, query).code(), StatusCode::kInvalidData) << "another content is held";
 }
 
 TEST(SyncTest, TilesOfOtherLevelsAndMoreThanTheBudgetAreInvalidData) {

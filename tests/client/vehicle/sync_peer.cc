@@ -7,6 +7,7 @@
 
 #include "core/base/hash.h"
 #include "core/tile/tile_container.h"
+#include "core/tile/tile_delta.h"
 #include "core/tile/tile_pyramid.h"
 #include "proto/wire/convert.h"
 
@@ -36,6 +37,12 @@ class Answer {
 
   const wire::SyncManifest& holdings() const { return holdings_; }
   // Sections to send; 0: none.
+  // What is held of an earlier content, to make a delta against; 0: nothing.
+  std::uint64_t BaseOf(const TileId& id) const {
+    const auto found = bases_.find(id);
+    return found == bases_.end() ? 0 : found->second.first;
+  }
+  SectionMask BaseSectionsOf(const TileId& id) const { return bases_.at(id).second; }
   SectionMask Missing(const TileId& id) const {
     if (!IsInArea(id) || suppressed_.contains(id.Key() >> 6)) return 0;
     const auto found = current_.find(id);
@@ -66,6 +73,8 @@ class Answer {
         holdings_.add_removed(held.keys(i));
       } else if (found->second.encoded.payload_hash == held.payload_hashes(i)) {
         current_[id] = SectionsOf(held.sections());
+      } else if (request_.takes_deltas() && world_.past_blobs().contains(held.payload_hashes(i))) {
+        bases_[id] = {held.payload_hashes(i), SectionsOf(held.sections())};
       }
     }
   }
@@ -97,6 +106,7 @@ class Answer {
   const wire::SyncRequest& request_;
   SectionMask wanted_;
   std::map<TileId, SectionMask> current_;
+  std::map<TileId, std::pair<std::uint64_t, SectionMask>> bases_;
   std::set<std::uint64_t> suppressed_;
   wire::SyncManifest holdings_;
 };
@@ -109,6 +119,17 @@ wire::Envelope TileOf(const TileId& id, const TinyWorld::Stored& stored, Section
   tile.set_payload_hash(stored.encoded.payload_hash);
   tile.set_blob(BytesToWire(*SelectSections(stored.encoded.blob, sections)));
   return envelope;
+}
+
+void MakeDelta(const TinyWorld& world,
+               const Answer& answer,
+               const TileId& id,
+               wire::TileMessage& tile) {
+  tile.set_base_hash(answer.BaseOf(id));
+  if (tile.base_hash() == 0) return;
+  const Bytes base =
+      *SelectSections(world.past_blobs().at(tile.base_hash()), answer.BaseSectionsOf(id));
+  tile.set_blob(BytesToWire(*EncodeTileDelta(base, BytesFromWire(tile.blob()))));
 }
 
 void Announce(const wire::TileMessage& tile, wire::SyncManifest& manifest) {
@@ -162,6 +183,7 @@ std::vector<wire::Envelope> Reply(const TinyWorld& world, const wire::Envelope& 
     if (sections == 0 || !is_due) continue;
     std::vector<wire::Envelope> pair(2);
     pair[1] = TileOf(id, stored, sections);
+    MakeDelta(world, answer, id, *pair[1].mutable_tile());
     Announce(pair[1].tile(), *pair[0].mutable_sync_manifest());
     const std::uint64_t more =
         FrameBytes(pair[0], envelope.request_id()) + FrameBytes(pair[1], envelope.request_id());
@@ -229,6 +251,7 @@ void TinyWorld::Store(const Tile& tile) {
   EncodedTile encoded = EncodeTile(tile, TinyProfile());
   Stored& stored = tiles_[tile.id];
   if (stored.encoded.payload_hash == encoded.payload_hash) return;
+  past_blobs_[encoded.payload_hash] = encoded.blob;
   stored = {revision_, std::move(encoded)};
   decoded_[tile.id] = tile;
 }

@@ -31,6 +31,8 @@ class TinyWorld {
   void ChangeSome(std::mt19937& random, int side, int changes);
 
   const std::map<TileId, Stored>& tiles() const { return tiles_; }
+  // By payload hash: all that a tile ever was.
+  const std::map<std::uint64_t, Bytes>& past_blobs() const { return past_blobs_; }
   std::uint64_t revision() const { return revision_; }
 
  private:
@@ -39,6 +41,7 @@ class TinyWorld {
 
   std::map<TileId, Tile> decoded_;
   std::map<TileId, Stored> tiles_;
+  std::map<std::uint64_t, Bytes> past_blobs_;
   std::uint64_t revision_ = 0;
 };
 

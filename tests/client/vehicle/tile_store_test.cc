@@ -8,6 +8,7 @@
 #include "client/vehicle/store_sync.h"
 #include "core/base/hash.h"
 #include "core/tile/tile_container.h"
+#include "core/tile/tile_delta.h"
 #include "tests/client/vehicle/sync_peer.h"
 #include "tests/client/vehicle/test_folder.h"
 
@@ -125,6 +126,52 @@ TEST(TileStoreTest, DifferingBlocksAreRememberedWhenTheBudgetEnds) {
   ASSERT_TRUE(rest);
   EXPECT_EQ(rest->requests, 1U);
   ExpectHolds(store, world);
+}
+
+TEST(TileStoreTest, ChangedTilesComeAsDeltas) {
+  TinyWorld world = SquareWorld(8);
+  TileStore store = OpenStore({});
+  ASSERT_TRUE(SyncOnce(world, store));
+  world.Set(3, 3, 5'000);
+  const auto report = SyncOnce(world, store);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_GT(report->tiles, 1U);
+  EXPECT_EQ(report->deltas, report->tiles);
+  ExpectHolds(store, world);
+}
+
+TEST(TileStoreTest, ADeltaIsOfNoUseWithoutItsBase) {
+  TinyWorld world;
+  world.Set(0, 0, 100);
+  const TileId id{0, 0, 0};
+  const EncodedTile base = world.tiles().at(id).encoded;
+  world.Set(0, 0, 300);
+  const EncodedTile target = world.tiles().at(id).encoded;
+  const TileBlob delta{id, 2, target.payload_hash, *EncodeTileDelta(base.blob, target.blob),
+                       base.payload_hash};
+  TileStore store = OpenStore({});
+  EXPECT_EQ(store.Put(delta, kEverySection).code(), StatusCode::kInvalidData) << "nothing held";
+  ASSERT_TRUE(store.Put({id, 1, base.payload_hash, base.blob}, kEverySection).ok());
+  ASSERT_TRUE(store.Put(delta, kEverySection).ok());
+  EXPECT_EQ(*store.Read(id), target.blob);
+  EXPECT_EQ(store.Put(delta, kEverySection).code(), StatusCode::kInvalidData) << "another base";
+  EXPECT_EQ(store.Find(id), nullptr) << "it comes as a whole the next time";
+}
+
+// The tiles that the deltas are made against are too many for the store.
+TEST(TileStoreTest, WhereTheBaseIsGoneTheWholeTileComes) {
+  TinyWorld world = SquareWorld(6);
+  TileStore store = OpenStore({.max_memory_bytes = 4'000});
+  ASSERT_TRUE(SyncOnce(world, store));
+  ASSERT_LT(store.size(), world.tiles().size());
+  for (int x = 0; x < 6; ++x) {
+    world.Set(x, 2, 9'000 + x);
+  }
+  const auto report = SyncOnce(world, store);
+  ASSERT_TRUE(report) << report.error().message();
+  for (const TileId& id : store.Tiles()) {
+    EXPECT_EQ(store.Find(id)->payload_hash, world.tiles().at(id).encoded.payload_hash) << id;
+  }
 }
 
 TEST(TileStoreTest, SectionsAreMerged) {

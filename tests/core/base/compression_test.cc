@@ -55,6 +55,29 @@ TEST(CompressionTest, AFlippedBitNeverChangesTheContent) {
   }
 }
 
+TEST(CompressionTest, WhatIsAlikeTakesNextToNothing) {
+  // Further back than a frame of this level looks by itself.
+  Bytes prefix(9'000'000);
+  std::mt19937 random(5);
+  for (auto& byte : prefix) {
+    byte = static_cast<std::uint8_t>(random());
+  }
+  Bytes text(prefix.begin(), prefix.begin() + 100'000);
+  text[500] ^= 1U;
+  const Bytes frame = CompressAgainst(prefix, text, 3);
+  EXPECT_LT(frame.size(), 200u);
+  EXPECT_EQ(DecompressAgainst(prefix, frame, text.size()).value(), text);
+  EXPECT_FALSE(DecompressAgainst({}, frame, text.size()).has_value());
+  prefix[1'000] ^= 1U;
+  EXPECT_FALSE(DecompressAgainst(prefix, frame, text.size()).has_value());
+}
+
+TEST(CompressionTest, ADifferenceToNothingIsTheWhole) {
+  const Bytes text = SomeText();
+  EXPECT_EQ(Decompress(CompressAgainst({}, text, 3), text.size()).value(), text);
+  EXPECT_EQ(DecompressAgainst(text, CompressAgainst(text, {}, 3), 0).value(), Bytes());
+}
+
 TEST(HashTest, GoldenValuesOfXxh64) {
   EXPECT_EQ(Hash64({}), 0xEF46DB3751D8E999ULL);
   const Bytes abc{'a', 'b', 'c'};

@@ -23,9 +23,9 @@ Bytes FrameOf(const TileBody& body, std::uint64_t request_id) {
 TEST(TileBodyTest, IsAFrameWithTheTileForAnyRequest) {
   for (const std::size_t size : {0u, 1u, 127u, 128u, 70'000u}) {
     const Bytes blob(size, 0xa5);
-    const auto body = TileBody::Create({0x1234'5678'9abc'def0u, 77, ~std::uint64_t{0}}, blob);
+    const auto body = TileBody::Create({0x1234'5678'9abc'def0u, 77, ~std::uint64_t{0}, 0}, blob);
     ASSERT_TRUE(body.has_value());
-    EXPECT_EQ(body->blob_bytes(), size);
+    EXPECT_EQ(body->blob().size(), size);
     for (const std::uint64_t request_id :
          {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{300}, ~std::uint64_t{0}}) {
       FrameDecoder decoder;
@@ -44,7 +44,7 @@ TEST(TileBodyTest, IsAFrameWithTheTileForAnyRequest) {
 }
 
 TEST(TileBodyTest, RefusesWhatNoFrameHolds) {
-  const auto body = TileBody::Create({1, 2, 3}, Bytes(kMaxFrameBytes));
+  const auto body = TileBody::Create({1, 2, 3, 0}, Bytes(kMaxFrameBytes));
   ASSERT_FALSE(body.has_value());
   EXPECT_EQ(body.error().code(), StatusCode::kInvalidArgument);
 }

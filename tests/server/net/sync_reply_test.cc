@@ -1,7 +1,9 @@
 #include "server/net/requests/sync_reply.h"
 
+#include <map>
 #include <vector>
 
+#include "core/tile/tile_delta.h"
 #include "proto/wire/convert.h"
 #include "tests/server/service/service_fixture.h"
 
@@ -94,6 +96,86 @@ TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
     ends += *step == SyncReply::Step::kDone ? 1u : 0u;
   }
   EXPECT_EQ(tiles, static_cast<std::uint64_t>(service_->ReadStatus()->counts.tiles));
+}
+
+// Tiles by key, of which contents.
+class SyncDeltaTest : public SyncReplyTest {
+ protected:
+  using Tiles = std::map<std::uint64_t, std::shared_ptr<const TileBody>>;
+
+  // What comes to who holds these, by their keys.
+  Tiles Sync(TileFrames& frames, const Tiles& held, bool takes_deltas, bool may_block = true) {
+    wire::Envelope envelope;
+    envelope.set_request_id(9);
+    wire::SyncRequest& request = *envelope.mutable_sync_request();
+    request.mutable_area()->mutable_disc()->set_radius_um(100'000'000);
+    request.set_takes_deltas(takes_deltas);
+    wire::Held& group = *request.add_held();
+    for (const auto& [key, tile] : held) {
+      group.add_keys(key);
+      group.add_payload_hashes(tile->id().payload_hash);
+    }
+    SyncReply reply(*service_, frames, envelope);
+    std::vector<ReplyFrame> out;
+    Result<SyncReply::Step> step = SyncReply::Step::kMore;
+    while (step && *step == SyncReply::Step::kMore) {
+      step = reply.Next(may_block, out);
+    }
+    EXPECT_EQ(step.value(), SyncReply::Step::kDone);
+    Tiles tiles;
+    for (const ReplyFrame& frame : out) {
+      if (frame.tile()) {
+        tiles[frame.tile()->id().key] = frame.tile();
+      }
+    }
+    return tiles;
+  }
+  void Change() {
+    ASSERT_TRUE(Upload(DriveUpload(7)));
+    Digest();
+  }
+  static Bytes Copy(ByteSpan bytes) { return {bytes.begin(), bytes.end()}; }
+};
+
+TEST_F(SyncDeltaTest, WhatChangedComesAsTheDifference) {
+  const Tiles before = Sync(frames_, {}, true);
+  for (const auto& [key, tile] : before) {
+    EXPECT_EQ(tile->id().base_hash, 0u) << "nothing is held";
+  }
+  Change();
+  TileFrames others(1u << 20);
+  const Tiles whole = Sync(others, before, false);
+  const Tiles deltas = Sync(frames_, before, true);
+  ASSERT_EQ(deltas.size(), whole.size());
+  std::size_t count = 0;
+  for (const auto& [key, tile] : deltas) {
+    const Bytes expected = Copy(whole.at(key)->blob());
+    if (tile->id().base_hash == 0) {
+      EXPECT_EQ(Copy(tile->blob()), expected);
+      continue;
+    }
+    ++count;
+    EXPECT_EQ(tile->id().base_hash, before.at(key)->id().payload_hash);
+    EXPECT_EQ(tile->id().payload_hash, whole.at(key)->id().payload_hash);
+    EXPECT_LT(tile->blob().size(), expected.size());
+    EXPECT_EQ(ApplyTileDelta(before.at(key)->blob(), tile->blob()).value(), expected);
+  }
+  EXPECT_GT(count, 0u);
+  // Of the next one who holds the same: from memory, without another thread.
+  const Tiles again = Sync(frames_, before, true, false);
+  EXPECT_EQ(again, deltas);
+}
+
+TEST_F(SyncDeltaTest, WholeTilesComeWhereTheBaseIsNotThereOrNotWanted) {
+  const Tiles before = Sync(frames_, {}, true);
+  Change();
+  TileFrames others(1u << 20);  // as after a restart
+  for (const Tiles& tiles : {Sync(others, before, true), Sync(frames_, before, false)}) {
+    EXPECT_FALSE(tiles.empty());
+    for (const auto& [key, tile] : tiles) {
+      EXPECT_EQ(tile->id().base_hash, 0u);
+    }
+  }
 }
 
 }  // namespace

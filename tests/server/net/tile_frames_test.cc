@@ -9,7 +9,7 @@ namespace atlas {
 namespace {
 
 std::shared_ptr<const TileBody> BodyOf(std::uint64_t key, std::size_t bytes = 10) {
-  return std::make_shared<const TileBody>(TileBody::Create({key, 5, 6}, Bytes(bytes)).value());
+  return std::make_shared<const TileBody>(TileBody::Create({key, 5, 6, 0}, Bytes(bytes)).value());
 }
 
 TEST(TileFramesTest, AreFoundByAllThatTheyAre) {

@@ -1,0 +1,121 @@
+#include "server/net/requests/whole_atlas_requests.h"
+
+#include "server/net/requests/answer.h"
+#include "server/net/requests/atlas_wait.h"
+#include "server/net/requests/on_pool.h"
+#include "server/net/requests/request_conversion.h"
+
+namespace atlas {
+namespace {
+
+namespace asio = boost::asio;
+
+// Until nothing is dirty, damaged tiles neither.
+asio::awaitable<Status> RequireUndamaged(RequestContext& context, const Patience& patience) {
+  const Result<WaitOutcome> settled =
+      co_await RequireSettled(context.service, context.pool, patience);
+  co_return settled ? settled->damage : settled.error();
+}
+
+asio::awaitable<Result<AtlasDigest>> ComputeDigest(RequestContext& context,
+                                                   const wire::DigestRequest& message,
+                                                   const Patience& patience) {
+  if (message.has_at_revision()) {
+    const Blocking<AtlasDigest> compute = [&context, revision = message.at_revision(), patience] {
+      return context.service.DigestAt(revision, patience);
+    };
+    co_return co_await OnPool(context.reading_pool, compute);
+  }
+  const Status settled = co_await RequireUndamaged(context, patience);
+  if (!settled.ok()) {
+    co_return Error(settled);
+  }
+  const Blocking<AtlasDigest> compute = [&context, patience] {
+    return context.service.Digest(patience);
+  };
+  co_return co_await OnPool(context.reading_pool, compute);
+}
+
+}  // namespace
+
+asio::awaitable<Status> AnswerWait(RequestContext& context,
+                                   const wire::Envelope& request,
+                                   ReplyWriter& out) {
+  const Result<Places::Place> place = context.places.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const Patience patience{TimeoutFromWire(request.wait_request().timeout_ms()), out.peer_left()};
+  const Result<WaitOutcome> outcome =
+      co_await WaitUntilClean(context.service, context.pool, patience);
+  if (outcome && !outcome->damage.ok()) {
+    co_return outcome->damage;
+  }
+  co_return co_await Answer(request, outcome, &wire::Envelope::mutable_wait_reply, WaitToWire, out);
+}
+
+asio::awaitable<Status> AnswerDigest(RequestContext& context,
+                                     const wire::Envelope& request,
+                                     ReplyWriter& out) {
+  const Result<Places::Place> place = context.places.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const wire::DigestRequest& message = request.digest_request();
+  const Patience patience{TimeoutFromWire(message.timeout_ms()), out.peer_left()};
+  const Result<AtlasDigest> digest = co_await ComputeDigest(context, message, patience);
+  co_return co_await Answer(request, digest, &wire::Envelope::mutable_digest_reply, DigestToWire,
+                            out);
+}
+
+asio::awaitable<Status> AnswerVerify(RequestContext& context,
+                                     const wire::Envelope& request,
+                                     ReplyWriter& out) {
+  const Result<Places::Place> place = context.places.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const bool is_rebuild = request.verify_request().rebuild();
+  const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
+  if (is_rebuild) {  // damage is what it is to report
+    const Result<WaitOutcome> settled =
+        co_await RequireSettled(context.service, context.pool, patience);
+    if (!settled) {
+      co_return settled.error();
+    }
+  }
+  const Blocking<VerifyReport> check = [&context, is_rebuild, patience] {
+    return context.service.Verify(is_rebuild, patience);
+  };
+  const Result<VerifyReport> report = co_await OnPool(context.reading_pool, check);
+  co_return co_await Answer(request, report, &wire::Envelope::mutable_verify_reply, VerifyToWire,
+                            out);
+}
+
+asio::awaitable<Status> AnswerCompact(RequestContext& context,
+                                      const wire::Envelope& request,
+                                      ReplyWriter& out) {
+  const CompactionRequest compaction = CompactionFromWire(request.compact_request());
+  Status status = CheckCompaction(compaction, context.service.identity().profile);
+  if (!status.ok()) {
+    co_return status;  // before any wait
+  }
+  const Result<Places::Place> place = context.places.Take();
+  if (!place) {
+    co_return place.error();
+  }
+  const Patience patience{TimeoutFromWire(request.compact_request().timeout_ms()), out.peer_left()};
+  const Result<WaitOutcome> settled =
+      co_await RequireSettled(context.service, context.pool, patience);
+  if (!settled) {
+    co_return settled.error();
+  }
+  const Blocking<CompactionReport> compact = [&context, compaction, patience] {
+    return context.service.Compact(compaction, patience);
+  };
+  const Result<CompactionReport> report = co_await OnPool(context.reading_pool, compact);
+  co_return co_await Answer(request, report, &wire::Envelope::mutable_compact_reply,
+                            CompactionToWire, out);
+}
+
+}  // namespace atlas

@@ -1,0 +1,28 @@
+// Requests that wait for the workers or read the whole atlas. Each takes a place of those who may
+// wait long (kUnavailable when there is none) and ends when its peer leaves.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+
+#include "proto/wire/envelope.h"
+#include "server/net/requests/request_context.h"
+#include "server/net/stream/reply_writer.h"
+
+namespace atlas {
+
+// Each sends its reply, or returns an error for the peer. All arguments outlive the call.
+
+boost::asio::awaitable<Status> AnswerWait(RequestContext& context,
+                                          const wire::Envelope& request,
+                                          ReplyWriter& out);
+boost::asio::awaitable<Status> AnswerDigest(RequestContext& context,
+                                            const wire::Envelope& request,
+                                            ReplyWriter& out);
+boost::asio::awaitable<Status> AnswerVerify(RequestContext& context,
+                                            const wire::Envelope& request,
+                                            ReplyWriter& out);
+boost::asio::awaitable<Status> AnswerCompact(RequestContext& context,
+                                             const wire::Envelope& request,
+                                             ReplyWriter& out);
+
+}  // namespace atlas

@@ -1,0 +1,25 @@
+// Requests that change the atlas: answered once the change is on disk, or refused.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+
+#include "proto/wire/envelope.h"
+#include "server/net/requests/peer.h"
+#include "server/net/requests/request_context.h"
+
+namespace atlas {
+
+// Each sends its reply, or returns an error for the peer. All arguments outlive the call.
+
+// Keyframes of one connection reach the store in the order in which they came.
+boost::asio::awaitable<Status> AnswerUpload(RequestContext& context,
+                                            const wire::Envelope& request,
+                                            Peer& peer);
+boost::asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
+                                                 const wire::Envelope& request,
+                                                 ReplyWriter& out);
+boost::asio::awaitable<Status> AnswerChangeSession(RequestContext& context,
+                                                   const wire::Envelope& request,
+                                                   ReplyWriter& out);
+
+}  // namespace atlas
