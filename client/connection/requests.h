@@ -13,6 +13,7 @@
 #include "core/base/bytes.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/session_action.h"
 #include "core/geometry/tile_id.h"
 
 namespace atlas {
@@ -110,8 +111,6 @@ struct SessionSummary {
   std::uint32_t last_sequence = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
 };
-
-enum class SessionAction : std::uint8_t { kRetract, kRestore };
 
 struct SessionChangeSummary {
   bool is_changed = false;

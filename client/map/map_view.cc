@@ -10,40 +10,30 @@
 
 namespace atlas {
 
-MapView::MapView(AtlasClient& client, const MapViewOptions& options)
-    : client_(client), options_(options), cache_(options.max_cache_bytes) {}
+MapView::MapView(MapSource& source, const MapViewOptions& options)
+    : source_(source), options_(options), cache_(options.max_cache_bytes) {}
 
-RegionQuery MapView::QueryOf(std::uint8_t level) const {
-  RegionQuery query;
-  query.finest_level = level;
-  query.is_only_finest = true;
-  query.at_revision = options_.at_revision;
-  return query;
-}
-
-Status MapView::Fetch(const RegionQuery& query, const OnTile& on_tile) {
-  const auto result = client_.QueryRegion(query, [&](TileBlob received) -> Status {
-    Result<Tile> tile = DecodeTile(received.blob, profile());
-    if (!tile) return tile.error().WithContext(StrCat("tile ", received.id));
-    if (tile->id != received.id) {
+Status MapView::Fetch(std::uint8_t level, const DiscArea& disc, const OnDecoded& on_tile) {
+  return source_.ReadLevel(level, disc, [&](const TileBlob& read) -> Status {
+    Result<Tile> tile = DecodeTile(read.blob, profile());
+    if (!tile) return tile.error().WithContext(StrCat("tile ", read.id));
+    if (tile->id != read.id) {
       return {StatusCode::kInvalidData,
-              StrCat("tile ", received.id, ": the blob says it is ", tile->id)};
+              StrCat("tile ", read.id, ": the blob says it is ", tile->id)};
     }
     ++tiles_loaded_;
     auto shared = std::make_shared<const Tile>(*std::move(tile));
-    cache_.Put(received.id, shared);
+    cache_.Put(read.id, shared);
     on_tile(shared);
     return {};
   });
-  return result ? Status() : result.error();
 }
 
 Result<std::shared_ptr<const Tile>> MapView::FetchOne(const TileId& id) {
   // A disc in the middle of the tile touches no other.
-  RegionQuery query = QueryOf(id.level);
-  query.disc = {TileCenter(id, profile()), 0.25 * TileSideMetres(id.level, profile())};
+  const DiscArea disc{TileCenter(id, profile()), 0.25 * TileSideMetres(id.level, profile())};
   std::shared_ptr<const Tile> fetched;
-  const Status status = Fetch(query, [&](const std::shared_ptr<const Tile>& tile) {
+  const Status status = Fetch(id.level, disc, [&](const std::shared_ptr<const Tile>& tile) {
     if (tile->id == id) fetched = tile;
   });
   if (!status.ok()) return Error(status);
@@ -56,10 +46,12 @@ Result<std::shared_ptr<const Tile>> MapView::Get(const TileId& id) {
   return FetchOne(id);
 }
 
-Status MapView::FetchDisc(const RegionQuery& query, const std::vector<TileId>& missing) {
+Status MapView::FetchDisc(std::uint8_t level,
+                          const DiscArea& disc,
+                          const std::vector<TileId>& missing) {
   std::set<TileId> received;
-  ATLAS_RETURN_IF_ERROR(
-      Fetch(query, [&](const std::shared_ptr<const Tile>& tile) { received.insert(tile->id); }));
+  ATLAS_RETURN_IF_ERROR(Fetch(
+      level, disc, [&](const std::shared_ptr<const Tile>& tile) { received.insert(tile->id); }));
   for (const TileId& id : missing) {
     if (!received.contains(id)) cache_.Put(id, nullptr);
   }
@@ -72,11 +64,9 @@ Status MapView::Load(const Eigen::Vector2d& center_m, double radius_m, std::uint
   std::vector<TileId> missing;
   std::copy_if(tiles->begin(), tiles->end(), std::back_inserter(missing),
                [this](const TileId& id) { return !cache_.Contains(id); });
-  // One query for the disc sends again what is held: worth it only when little is.
+  // One reading of the disc brings again what is held: worth it only when little is.
   if (2 * missing.size() > tiles->size()) {
-    RegionQuery query = QueryOf(level);
-    query.disc = {center_m, radius_m};
-    return FetchDisc(query, missing);
+    return FetchDisc(level, {center_m, radius_m}, missing);
   }
   for (const TileId& id : missing) {
     if (const auto tile = FetchOne(id); !tile) return tile.error();

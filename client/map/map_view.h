@@ -1,16 +1,15 @@
-// The atlas as a vehicle sees it: tiles come from the daemon when they are first asked for and are
+// The atlas as a vehicle sees it: tiles come from a source when they are first asked for and are
 // kept in a bounded cache. What was loaded stays as it was until Forget.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "client/connection/atlas_client.h"
+#include "client/map/map_source.h"
 #include "client/map/tile_cache.h"
 #include "core/base/status.h"
 #include "core/tile/tile.h"
@@ -20,16 +19,18 @@ namespace atlas {
 struct MapViewOptions {
   std::size_t max_cache_bytes = std::size_t{256} << 20;
   std::size_t max_tiles_per_load = 16'384;
-  std::optional<std::uint64_t> at_revision = std::nullopt;  // none: the atlas as it is
 };
 
 class MapView {
  public:
-  // The client outlives the view.
-  explicit MapView(AtlasClient& client, const MapViewOptions& options = {});
+  // The source outlives the view.
+  explicit MapView(MapSource& source, const MapViewOptions& options = {});
 
-  const MapProfile& profile() const { return client_.profile(); }
+  const MapProfile& profile() const { return source_.profile(); }
 
+  // Each fails as its source does, and with kInvalidData on a blob that is not the tile it should
+  // be.
+  //
   // Null where the atlas has no tile.
   Result<std::shared_ptr<const Tile>> Get(const TileId& id);
   // Makes sure that the tiles of `level` that the disc touches are known.
@@ -41,14 +42,13 @@ class MapView {
   std::uint64_t tiles_loaded() const { return tiles_loaded_; }
 
  private:
-  using OnTile = std::function<void(const std::shared_ptr<const Tile>&)>;
+  using OnDecoded = std::function<void(const std::shared_ptr<const Tile>&)>;
 
-  RegionQuery QueryOf(std::uint8_t level) const;
-  Status Fetch(const RegionQuery& query, const OnTile& on_tile);
+  Status Fetch(std::uint8_t level, const DiscArea& disc, const OnDecoded& on_tile);
   Result<std::shared_ptr<const Tile>> FetchOne(const TileId& id);
-  Status FetchDisc(const RegionQuery& query, const std::vector<TileId>& missing);
+  Status FetchDisc(std::uint8_t level, const DiscArea& disc, const std::vector<TileId>& missing);
 
-  AtlasClient& client_;
+  MapSource& source_;
   MapViewOptions options_;
   TileCache cache_;
   std::uint64_t tiles_loaded_ = 0;

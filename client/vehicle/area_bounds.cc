@@ -43,6 +43,11 @@ void AreaBounds::Set(const CorridorArea& corridor) {
 
 void AreaBounds::Set(const TilesArea& tiles) {
   for (const TileId& id : tiles.ids) {
+    const double side_m = std::ldexp(tile_m_, id.level);
+    const Eigen::Vector2d low = side_m * Eigen::Vector2d(id.x, id.y);
+    const Eigen::Vector2d high = low.array() + side_m;
+    min_m_ = blocks_.empty() ? low : min_m_.cwiseMin(low).eval();
+    max_m_ = blocks_.empty() ? high : max_m_.cwiseMax(high).eval();
     blocks_.insert(id.Key() >> kBlockBits);
   }
 }
@@ -54,14 +59,6 @@ bool AreaBounds::MayTouchBlock(const TileId& id) const {
       side_m * Eigen::Vector2d(id.x >> kBlockSideBits, id.y >> kBlockSideBits);
   const Eigen::Vector2d high = low.array() + side_m;
   return (low.array() <= max_m_.array()).all() && (high.array() >= min_m_.array()).all();
-}
-
-bool Touches(const DiscArea& disc, const TileId& id, const MapProfile& profile) {
-  const double side_m = std::ldexp(profile.tile_size_m(), id.level);
-  const Eigen::Vector2d low = side_m * Eigen::Vector2d(id.x, id.y);
-  const Eigen::Vector2d high = low.array() + side_m;
-  const Eigen::Vector2d nearest = disc.center_m.cwiseMax(low).cwiseMin(high);
-  return (nearest - disc.center_m).norm() <= disc.radius_m;
 }
 
 }  // namespace atlas

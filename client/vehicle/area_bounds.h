@@ -1,4 +1,5 @@
 // Which tiles an area may be about: a box around it, good enough to leave out what is far away.
+// Which it is about: area_touch.h.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +19,9 @@ class AreaBounds {
 
   // True for every tile whose block of 8 x 8 has a tile in the area, and for some others.
   bool MayTouchBlock(const TileId& id) const;
+  // The box. Of no tiles and of no route: a box around nothing, at the origin.
+  const Eigen::Vector2d& min_m() const { return min_m_; }
+  const Eigen::Vector2d& max_m() const { return max_m_; }
 
  private:
   void Set(const DiscArea& disc);
@@ -30,8 +34,5 @@ class AreaBounds {
   Eigen::Vector2d max_m_ = Eigen::Vector2d::Zero();
   std::set<std::uint64_t> blocks_;  // where the area is made of tiles
 };
-
-// With its edge.
-bool Touches(const DiscArea& disc, const TileId& id, const MapProfile& profile);
 
 }  // namespace atlas

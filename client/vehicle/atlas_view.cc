@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "client/map/tile_cache.h"
-#include "client/vehicle/area_bounds.h"
+#include "client/vehicle/area_touch.h"
+#include "client/vehicle/link_feed.h"
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
 
@@ -51,26 +52,13 @@ std::array<bool, 4> QuartersWithLayers(const Tile& tile, const MapProfile& profi
 }  // namespace
 
 AtlasView::AtlasView(TileStore& store, AtlasLink* link, std::size_t max_decoded_bytes)
-    : store_(store), link_(link), max_decoded_bytes_(max_decoded_bytes) {}
+    : store_(store),
+      own_feed_(std::make_unique<LinkFeed>(link)),
+      feed_(own_feed_.get()),
+      max_decoded_bytes_(max_decoded_bytes) {}
 
-Result<StoreSyncReport> AtlasView::Sync(const MapArea& area, const AroundOptions& options) {
-  using Clock = std::chrono::steady_clock;
-  using std::chrono::milliseconds;
-  if (link_ == nullptr) return Error(StatusCode::kUnavailable, "atlas view: without a link");
-  const Clock::time_point start = Clock::now();
-  const Result<AtlasClient*> client = link_->Client(options.deadline);
-  if (!client) return Error(client.error());
-  const auto spent = std::chrono::duration_cast<milliseconds>(Clock::now() - start);
-  SyncQuery query;
-  query.area = area;
-  query.finest_level = options.finest_level;
-  query.sections = options.sections;
-  query.budget_bytes = options.budget_bytes;
-  query.timeout = std::max(options.deadline - spent, milliseconds(1));
-  Result<StoreSyncReport> report = SyncStore(**client, store_, std::move(query));
-  link_->Report(report ? Status() : report.error());
-  return report;
-}
+AtlasView::AtlasView(TileStore& store, TileFeed& feed, std::size_t max_decoded_bytes)
+    : store_(store), feed_(&feed), max_decoded_bytes_(max_decoded_bytes) {}
 
 std::shared_ptr<const Tile> AtlasView::Decode(const TileId& id) {
   const TileFacts* facts = store_.Find(id);
@@ -147,7 +135,7 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
   if (status.ok()) status = CheckDisc(disc);
   if (!status.ok()) return Error(std::move(status));
   MapAround map;
-  NoteSync(Sync(disc, options), map);
+  NoteSync(feed_->Sync(store_, disc, options), map);
   // Each tile that was damaged on disk is gone after the pass that met it.
   bool is_damaged = false;
   while (!Collect(disc, options, map)) {
@@ -160,7 +148,7 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
     map.is_current = false;
     if (rest.budget_bytes == 0) return map;
   }
-  NoteSync(Sync(disc, rest), map);
+  NoteSync(feed_->Sync(store_, disc, rest), map);
   while (!Collect(disc, options, map)) {
     map.is_current = false;
   }
@@ -173,7 +161,7 @@ Result<StoreSyncReport> AtlasView::Prefetch(const std::vector<Eigen::Vector2d>& 
   if (Status status = CheckOptions(options, store_.atlas().profile); !status.ok()) {
     return Error(std::move(status));
   }
-  return Sync(CorridorArea{route_m, half_width_m}, options);
+  return feed_->Sync(store_, CorridorArea{route_m, half_width_m}, options);
 }
 
 }  // namespace atlas

@@ -1,9 +1,9 @@
-// The map around a vehicle, in one call: what is missing comes from the daemon as far as bytes and
-// time allow, the rest is what was held. Without a link it answers all the same. One thread at a
-// time; the tiles themselves are immutable and shared.
+// The map around a vehicle, in one call: what is missing comes from the daemon, or from an atlas
+// file (client/atlas_file/file_feed.h), as far as bytes and time allow, the rest is what was held.
+// Without a link it answers all the same. One thread at a time; the tiles themselves are immutable
+// and shared.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "client/vehicle/atlas_link.h"
-#include "client/vehicle/store_sync.h"
+#include "client/vehicle/tile_feed.h"
 #include "client/vehicle/tile_store.h"
 #include "core/base/lru_list.h"
 #include "core/base/status.h"
@@ -19,22 +19,13 @@
 
 namespace atlas {
 
-struct AroundOptions {
-  std::uint8_t finest_level = 0;
-  SectionBits sections = kEverySection;  // contributors and surface among them
-  std::uint64_t budget_bytes = 0;        // of the replies; 0: none
-  // For connecting and for what the daemon sends; a link that goes silent holds a call up to the
-  // connection's request timeout longer.
-  std::chrono::milliseconds deadline{2'000};
-};
-
 struct MapAround {
   // For each place the finest that is held, coarse first; a coarse tile is there where a finer one
   // below it is not held, and then also lies under those that are.
   std::vector<std::shared_ptr<const Tile>> tiles;
   std::uint64_t finest_places = 0;  // tiles of the finest level
   std::uint64_t coarse_places = 0;  // tiles that the atlas has below the coarse ones: not held
-  bool is_current = false;          // the daemon said in this call that this is all there is
+  bool is_current = false;          // its source said in this call that this is all there is
   std::uint64_t revision = 0;       // of the atlas then
   Status sync;                      // why it is not current; ok where budget or time ended
   StoreSyncReport transfer;
@@ -47,6 +38,10 @@ class AtlasView {
   // Decoded tiles are kept up to so many bytes. A null link: always offline. Both outlive the view.
   AtlasView(TileStore& store,
             AtlasLink* link,
+            std::size_t max_decoded_bytes = std::size_t{256} << 20);
+  // The same of another source, which outlives the view.
+  AtlasView(TileStore& store,
+            TileFeed& feed,
             std::size_t max_decoded_bytes = std::size_t{256} << 20);
 
   // The tiles that the disc touches. Fails only for what makes no sense (kInvalidArgument).
@@ -65,7 +60,6 @@ class AtlasView {
     std::shared_ptr<const Tile> tile;
   };
 
-  Result<StoreSyncReport> Sync(const MapArea& area, const AroundOptions& options);
   // Null: not held, or without what a map needs.
   std::shared_ptr<const Tile> Decode(const TileId& id);
   void NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) const;
@@ -74,7 +68,8 @@ class AtlasView {
   std::uint64_t MissingBelow(const Tile& tile, const DiscArea& disc) const;
 
   TileStore& store_;
-  AtlasLink* link_;
+  std::unique_ptr<TileFeed> own_feed_;  // over the link; null: somebody else's
+  TileFeed* feed_;
   std::size_t max_decoded_bytes_;
   LruList<Decoded> decoded_;
 };

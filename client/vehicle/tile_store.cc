@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/vehicle/area_bounds.h"
+#include "client/vehicle/area_touch.h"
 #include "client/vehicle/held_summary.h"
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
@@ -120,6 +121,16 @@ Status TileStore::Put(const TileBlob& tile, SectionBits asked) {
     return Status(StatusCode::kInvalidData, status.message()).WithContext(StrCat("tile ", tile.id));
   }
   Keep({tile.id, tile.revision, tile.payload_hash, sections}, *std::move(blob));
+  return {};
+}
+
+Status TileStore::PutWhole(const TileBlob& tile) {
+  const Status status = CheckBlob(tile.blob, tile, atlas_.profile, kEverySection);
+  Remove(tile.id);
+  if (!status.ok()) {
+    return Status(StatusCode::kInvalidData, status.message()).WithContext(StrCat("tile ", tile.id));
+  }
+  Keep({tile.id, tile.revision, tile.payload_hash, kEverySection}, tile.blob);
   return {};
 }
 

@@ -50,6 +50,8 @@ class TileStore {
   // content; or a delta to what is held. kInvalidData, and that tile not held, when the blob is not
   // what the hash says, or the delta's base is not held any more.
   Status Put(const TileBlob& tile, SectionBits asked);
+  // The same of a tile with all its sections, whatever Held told.
+  Status PutWhole(const TileBlob& tile);
   void Remove(const TileId& id);
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
   void Apply(const SyncSummary& summary);

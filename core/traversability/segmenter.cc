@@ -39,7 +39,7 @@ class WindowPass {
     if (!IsEnough()) {
       return;
     }
-    const std::optional<PlaneFit> fit = FitPlane(window_, fit_options_);
+    const std::optional<WindowPlane> fit = FitPlane(window_, fit_options_);
     Vote(fit && IsGround(fit->plane) ? &fit->plane : nullptr);
   }
 

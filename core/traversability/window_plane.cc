@@ -103,7 +103,7 @@ int WindowReturns::FilledRings() const {
   return filled;
 }
 
-std::optional<PlaneFit> FitPlane(const WindowReturns& window, const PlaneFitOptions& options) {
+std::optional<WindowPlane> FitPlane(const WindowReturns& window, const PlaneFitOptions& options) {
   const auto corner = [&](const Triple& triple, std::size_t k) {
     const std::uint32_t i =
         options.choice == TripleChoice::kOneInARing
@@ -113,7 +113,7 @@ std::optional<PlaneFit> FitPlane(const WindowReturns& window, const PlaneFitOpti
   };
   const float enough = options.min_inlier_ratio * static_cast<float>(window.size());
   auto least = static_cast<std::uint32_t>(std::ceil(enough));
-  std::optional<PlaneFit> best;
+  std::optional<WindowPlane> best;
   for (const Triple& triple : kTable) {
     const auto plane = ThroughPoints(corner(triple, 0), corner(triple, 1), corner(triple, 2));
     if (!plane) {
@@ -121,7 +121,7 @@ std::optional<PlaneFit> FitPlane(const WindowReturns& window, const PlaneFitOpti
     }
     const std::uint32_t inliers = CountInliers(window, *plane, options.threshold_m, least);
     if (inliers >= least) {
-      best = PlaneFit{*plane, inliers};
+      best = WindowPlane{*plane, inliers};
       least = inliers + 1;
     }
     if (inliers == window.size()) {

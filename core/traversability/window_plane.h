@@ -27,7 +27,7 @@ struct Plane {
   float offset_m = 0.0F;
 };
 
-struct PlaneFit {
+struct WindowPlane {
   Plane plane;
   std::uint32_t inliers = 0;
 };
@@ -46,6 +46,6 @@ struct PlaneFitOptions {
 // Best of a fixed table of 32 triples; nullopt when every triple is degenerate or has too few
 // inliers. Requires at least one return, and infinite padding beyond size(): it must lie on no
 // plane.
-std::optional<PlaneFit> FitPlane(const WindowReturns& window, const PlaneFitOptions& options);
+std::optional<WindowPlane> FitPlane(const WindowReturns& window, const PlaneFitOptions& options);
 
 }  // namespace atlas

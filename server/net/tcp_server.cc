@@ -109,7 +109,7 @@ class TcpServer::Impl {
     asio::post(io_, [this, security = std::move(security)] {
       security_ = security;
       for (const auto& thread : threads_) {
-        thread->ChangeAccess(security_.access);
+        thread->ChangeSecurity(security_);
       }
     });
   }

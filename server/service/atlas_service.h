@@ -75,7 +75,7 @@ class AtlasService {
   AtlasService& operator=(const AtlasService&) = delete;
   ~AtlasService();
 
-  const AtlasIdentity& identity() const { return store_.identity(); }
+  const StoreIdentity& identity() const { return store_.identity(); }
   std::int64_t NowMs() const { return clock_(); }  // since 1970
 
   // In two steps: the check takes its time, the other never blocks. `done` is called once it is on

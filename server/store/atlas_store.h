@@ -25,7 +25,7 @@ class AtlasStore : public TileIndex {
   template <typename T>
   using Done = std::function<void(Result<T>)>;
 
-  virtual const AtlasIdentity& identity() const = 0;
+  virtual const StoreIdentity& identity() const = 0;
   // Of the last change on disk; whoever was told of a change finds it counted. Never blocks, and is
   // of no snapshot: a reader may see what is just being committed.
   virtual std::uint64_t revision() const = 0;

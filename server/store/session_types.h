@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/geometry/keyframe_key.h"
+#include "core/geometry/session_action.h"
 
 namespace atlas {
 
@@ -33,9 +34,6 @@ struct SessionRecord {
 inline bool HasNoneYet(const SessionRecord& session) {
   return session.keyframes + session.compacted == 0;
 }
-
-// kRetract takes a session out of the map, kRestore makes a retracted one what it was before.
-enum class SessionAction : std::uint8_t { kRetract, kRestore };
 
 struct SessionChange {
   SessionKey key;

@@ -18,7 +18,7 @@
 namespace atlas {
 
 // Fixed when the atlas was created.
-struct AtlasIdentity {
+struct StoreIdentity {
   MapProfile profile;
   std::array<std::uint8_t, 16> atlas_id{};
   std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup

@@ -19,7 +19,8 @@ FUSED = SERVER + ["core/keyframe", "core/tile", "core/fusion", "core/fusion/obse
 STORE = SERVER + ["server/store"]
 WIRE = ["proto/wire", "proto/roadatlas/v1"]
 SERVING = SERVER + WIRE + ["server/service"]
-NET = ["server/net/net_counters.h", "server/net/net_options.h", "server/net/peer_record.h", "server/net/places.h"]
+NET = ["server/net/net_counters.h", "server/net/net_options.h", "server/net/peer_record.h", "server/net/places.h",
+       "server/net/server_security.h"]
 NET_ROOMS = ["server/net", "server/net/connection", "server/net/requests", "server/net/stream"]
 COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/output", "client/connection"]
 ALLOWED = {
@@ -60,6 +61,8 @@ ALLOWED = {
     "client/score": FLOOR_1,
     "client/map": FLOOR_1 + ["core/tile", "client/connection"],
     "client/vehicle": FLOOR_1 + ["core/tile", "client/connection", "client/map"],
+    "client/atlas_file": FLOOR_1 + ["client/connection", "client/map", "client/vehicle", "server/store",
+                                   "server/store/sqlite/store_snapshot.h"],
     "client/drive": FLOOR_4 + ["core/localization", "client/connection", "client/map", "client/score"],
     "client/render": FLOOR_1 + ["core/tile"],
     "server/service": FUSED + ["server/service/compaction", "server/service/fusion", "server/service/history",
@@ -89,11 +92,13 @@ ALLOWED = {
     "client/cli/output": FLOOR_4,
     "client/cli/files": FLOOR_1 + ["client/connection"],
     "client/cli/command_line": FLOOR_1 + ["client/cli/output", "client/connection"],
+    "client/cli/map_input": FLOOR_1 + ["client/atlas_file", "client/cli/command_line", "client/connection",
+                                       "client/map"],
     "client/cli/commands/atlas": FLOOR_1 + COMMAND_ROOMS,
-    "client/cli/commands/map": FLOOR_4 + COMMAND_ROOMS + ["core/planning", "client/map", "client/render", "client/score"],
+    "client/cli/commands/map": FLOOR_4 + COMMAND_ROOMS + ["core/planning", "client/cli/map_input", "client/map", "client/render", "client/score"],
     "client/cli/commands/drive": FLOOR_4 + COMMAND_ROOMS + ["core/simulation", "core/simulation/city",
-                                                            "core/simulation/mesh", "client/drive", "client/map",
-                                                            "client/score"],
+                                                            "core/simulation/mesh", "client/cli/map_input",
+                                                            "client/drive", "client/map", "client/score"],
     "client/cli/commands": ["client/cli/command_line", "client/cli/commands/atlas", "client/cli/commands/drive",
                             "client/cli/commands/map"],
     "client/cli": FLOOR_1 + ["client/cli/command_line", "client/cli/commands"],

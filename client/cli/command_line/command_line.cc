@@ -1,6 +1,7 @@
 #include "client/cli/command_line/command_line.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <fstream>
 #include <sstream>
@@ -24,7 +25,12 @@ struct CommonFlags {
   std::string server;
   ConnectionTls tls;
   std::string token_file;
+  std::optional<std::string> atlas_file;
 };
+
+// What says where a daemon is and who asks it.
+constexpr std::array kDaemonFlags = {"--server",  "--tls-ca",   "--tls-certificate",
+                                     "--tls-key", "--tls-name", "--token-file"};
 
 // CLI11 takes "-3" for a number but "-.5" for an option "-.".
 std::string WithLeadingZero(const std::string& argument) {
@@ -61,6 +67,19 @@ void AddCommonFlags(CLI::App& app, CommonFlags& common) {
       ->type_name("NAME")
       ->group("Security");
   add_file("--token-file", "ATLAS_TOKEN_FILE", common.token_file, "Holds our token");
+}
+
+void AddAtlasFlag(CLI::App& app, CommonFlags& common) {
+  const auto set = [&common](const std::string& text) {
+    if (text.empty() || text.starts_with("--")) {
+      throw CLI::ValidationError("--atlas", "expected the file of an atlas");
+    }
+    common.atlas_file = text;
+  };
+  app.add_option_function<std::string>(
+         "--atlas", set,
+         "Read this file, a daemon's atlas.db or a copy of it, instead of asking a daemon")
+      ->type_name("FILE");
 }
 
 void AddArgument(CLI::App& app, const Argument& argument) {
@@ -160,15 +179,32 @@ Result<ConnectionOptions> ConnectionFrom(const CommonFlags& common, const Comman
 }
 
 Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
+  CommandContext context{io.out, io.err, common.is_json, io.is_err_terminal, io.is_out_terminal,
+                         {},     {}};
+  if (common.atlas_file) {  // of a daemon nothing is asked: how it is reached does not matter
+    context.atlas_file = *common.atlas_file;
+    return command.Run(context);
+  }
   Result<ConnectionOptions> connection = ConnectionFrom(common, io);
   if (!connection) return connection.error();
-  CommandContext context{io.out,
-                         io.err,
-                         common.is_json,
-                         io.is_err_terminal,
-                         io.is_out_terminal,
-                         *std::move(connection)};
+  context.connection = *std::move(connection);
   return command.Run(context);
+}
+
+// What the environment says of a daemon does not count: it is there for other commands.
+Status CheckAtlasAlone(const std::vector<std::string>& arguments, const CommonFlags& common) {
+  if (!common.atlas_file) return {};
+  for (const std::string flag : kDaemonFlags) {
+    const bool is_given =
+        std::any_of(arguments.begin(), arguments.end(), [&flag](const std::string& argument) {
+          return argument == flag || argument.starts_with(flag + "=");
+        });
+    if (is_given) {
+      return {StatusCode::kInvalidArgument,
+              StrCat("--atlas reads a file, ", flag, " asks a daemon: expected one of them")};
+    }
+  }
+  return {};
 }
 
 class Parser {
@@ -182,6 +218,7 @@ class Parser {
     for (const auto& command : commands) {
       CLI::App& app = SubcommandFor(root_, *command);
       AddCommonFlags(app, common);
+      if (command->ReadsAtlasFiles()) AddAtlasFlag(app, common);
       ArgumentSet arguments;
       command->Declare(arguments);
       for (const Argument& argument : arguments.arguments()) {
@@ -239,7 +276,8 @@ ExitCode RunCommandLine(const std::vector<std::string>& arguments,
                         const CommandLineIo& io) {
   CommonFlags common;
   Parser parser(commands, common);
-  const Result<Command*> command = parser.Parse(arguments, io.out);
+  Result<Command*> command = parser.Parse(arguments, io.out);
+  if (const Status alone = CheckAtlasAlone(arguments, common); !alone.ok()) command = Error(alone);
   if (!command) {
     const bool is_json = IsJsonAskedFor(arguments);
     PrintFailure(command.error(), is_json, io.err);

@@ -69,10 +69,8 @@ void NetThread::ForEach(Action action) {
   });
 }
 
-void NetThread::ChangeAccess(std::shared_ptr<const AccessControl> access) {
-  ForEach([access = std::move(access)](PeerConnection& connection) {
-    connection.ChangeAccess(access);
-  });
+void NetThread::ChangeSecurity(const ServerSecurity& security) {
+  ForEach([security](PeerConnection& connection) { connection.ChangeSecurity(security); });
 }
 
 void NetThread::Drain() {

@@ -21,6 +21,7 @@
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
+#include "server/net/server_security.h"
 
 namespace atlas {
 
@@ -43,7 +44,7 @@ class NetThread {
   // From any thread: begins a connection.
   void Serve(PeerConnection::Arrival arrival);
   // From any thread: these rules hold from now on, for those who are there, too.
-  void ChangeAccess(std::shared_ptr<const AccessControl> access);
+  void ChangeSecurity(const ServerSecurity& security);
   // From any thread: connections end when they have answered what they have read.
   void Drain();
   // From any thread: calls `answer` on this one.

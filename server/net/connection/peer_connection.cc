@@ -244,19 +244,22 @@ PeerConnection::MaybeAwaited PeerConnection::Answer(wire::Envelope request) {
   return handler_.Handle(std::move(request), as_peer_);
 }
 
-void PeerConnection::ChangeAccess(std::shared_ptr<const AccessControl> access) {
-  access_ = std::move(access);
+void PeerConnection::ChangeSecurity(const ServerSecurity& security) {
+  access_ = security.access;
   if (!is_greeted_) {
     return;
   }
-  const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
-  if (!identity) {
-    const std::string what = StrCat(identity_.name, ", no longer: ", identity.error().message());
+  Status status = security.tls == nullptr ? Status() : stream_.CheckCertificate(*security.tls);
+  if (status.ok()) {
+    const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
+    status = identity ? Status() : identity.error();
+    identity_ = identity.value_or(identity_);
+  }
+  if (!status.ok()) {
+    const std::string what = StrCat(identity_.name, ", no longer: ", status.message());
     spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
-    return;
   }
-  identity_ = *identity;
 }
 
 asio::awaitable<void> PeerConnection::Serve(asio::awaitable<void> request, std::size_t bytes) {

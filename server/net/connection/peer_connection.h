@@ -24,6 +24,7 @@
 #include "server/net/peer_record.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
+#include "server/net/server_security.h"
 #include "server/net/stream/peer_stream.h"
 #include "server/net/stream/reply_writer.h"
 
@@ -66,7 +67,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // To be called now and then: closes when the peer owes something for too long.
   void CheckDeadlines(Clock::time_point now);
   // From now on these rules hold: closes when the peer may not come in any more.
-  void ChangeAccess(std::shared_ptr<const AccessControl> access);
+  void ChangeSecurity(const ServerSecurity& security);
 
   const PeerRecord& peer() const { return peer_; }
 

@@ -26,7 +26,7 @@ std::optional<asio::awaitable<void>> RequestHandler::Greet(Envelope request,
                                                            const Identity& identity,
                                                            ReplyWriter& out) {
   RequestRecord record(out.peer(), request);
-  const AtlasIdentity& atlas = context_.service.identity();
+  const StoreIdentity& atlas = context_.service.identity();
   Envelope reply = ReplyTo(request);
   wire::HelloReply& hello = *reply.mutable_hello_reply();
   hello.set_protocol_major(kProtocolMajor);

@@ -128,6 +128,10 @@ bool PeerStream::has_unread() {
          socket_.available(gone) > 0;
 }
 
+Status PeerStream::CheckCertificate(const TlsContext& tls) const {
+  return session_ == nullptr ? Status() : tls.CheckPeer(*session_);
+}
+
 std::optional<PeerCertificate> PeerStream::certificate() const {
   return session_ == nullptr ? std::nullopt : CertificateOf(*session_);
 }

@@ -47,6 +47,8 @@ class PeerStream {
   bool has_unread();
   // That the peer showed and that was verified; once bytes were read.
   std::optional<PeerCertificate> certificate() const;
+  // Whether this context believes it, too; ok where there is none. kPermissionDenied.
+  Status CheckCertificate(const TlsContext& tls) const;
   bool is_encrypted() const { return session_ != nullptr; }
   // Why TLS closed it; empty: it did not.
   const std::string& failure() const { return failure_; }

@@ -7,6 +7,7 @@
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
+#include <openssl/x509v3.h>
 
 #include "core/base/str_cat.h"
 
@@ -41,6 +42,16 @@ std::string NameEntry(const X509_NAME* name, int nid) {
   return entry;
 }
 
+// Where there are lists of what was revoked, no certificate counts without one.
+void UseRevocations(X509_STORE& store) {
+  STACK_OF(X509_OBJECT)* const objects = X509_STORE_get0_objects(&store);
+  for (int i = 0; i < sk_X509_OBJECT_num(objects); ++i) {
+    if (X509_OBJECT_get_type(sk_X509_OBJECT_value(objects, i)) == X509_LU_CRL) {
+      X509_STORE_set_flags(&store, X509_V_FLAG_CRL_CHECK);
+    }
+  }
+}
+
 Status UseClientAuthorities(SSL_CTX& context, const std::filesystem::path& file) {
   ATLAS_RETURN_IF_ERROR(CheckFile("list of authorities", file));
   STACK_OF(X509_NAME)* const names = SSL_load_client_CA_file(file.c_str());
@@ -49,6 +60,7 @@ Status UseClientAuthorities(SSL_CTX& context, const std::filesystem::path& file)
     return Refuse("list of authorities", file);
   }
   SSL_CTX_set_client_CA_list(&context, names);
+  UseRevocations(*SSL_CTX_get_cert_store(&context));
   SSL_CTX_set_verify(&context, SSL_VERIFY_PEER, nullptr);  // one without may show a token instead
   return {};
 }
@@ -105,6 +117,27 @@ SslSession TlsContext::NewSession(int descriptor) const {
   }
   SSL_set_accept_state(session.get());
   return session;
+}
+
+Status TlsContext::CheckPeer(const ssl_st& session) const {
+  X509* const certificate = SSL_get0_peer_certificate(&session);
+  if (certificate == nullptr) {
+    return {};
+  }
+  const std::unique_ptr<X509_STORE_CTX, decltype(&X509_STORE_CTX_free)> check(X509_STORE_CTX_new(),
+                                                                              &X509_STORE_CTX_free);
+  if (check == nullptr ||
+      X509_STORE_CTX_init(check.get(), SSL_CTX_get_cert_store(context_.get()), certificate,
+                          SSL_get_peer_cert_chain(&session)) != 1) {
+    return {StatusCode::kInternal, StrCat("TLS: ", TakeTlsErrors())};
+  }
+  X509_STORE_CTX_set_purpose(check.get(), X509_PURPOSE_SSL_CLIENT);
+  if (X509_verify_cert(check.get()) == 1) {
+    return {};
+  }
+  const int error = X509_STORE_CTX_get_error(check.get());
+  return {StatusCode::kPermissionDenied,
+          StrCat("its certificate does not count: ", X509_verify_cert_error_string(error))};
 }
 
 std::optional<PeerCertificate> CertificateOf(const ssl_st& session) {

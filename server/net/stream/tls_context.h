@@ -17,7 +17,9 @@ namespace atlas {
 struct TlsFiles {
   std::filesystem::path certificate;  // PEM, the chain of the daemon
   std::filesystem::path key;          // PEM, of the certificate
-  std::filesystem::path client_ca;    // PEM, who vouches for peers; empty: none is asked for one
+  // PEM, who vouches for peers; empty: none is asked for one. With revocation lists in it, one of
+  // each of these authorities, they count.
+  std::filesystem::path client_ca;
 };
 
 struct SslDeleter {
@@ -39,6 +41,10 @@ class TlsContext {
   // The daemon's end of a connection, before its handshake; null when there is no memory. The
   // descriptor, which does not block, is not owned.
   SslSession NewSession(int descriptor) const;
+
+  // Whether the peer's certificate, which another context believed, is believed by this one. Ok
+  // where there is none, kPermissionDenied.
+  Status CheckPeer(const ssl_st& session) const;
 
  private:
   struct ContextDeleter {

@@ -13,25 +13,11 @@
 #include <unistd.h>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/disk_error.h"
 
 namespace atlas {
 namespace fs = std::filesystem;
 namespace {
-
-Status DiskError(const std::string& what, const fs::path& path, int error) {
-  StatusCode code = StatusCode::kUnavailable;
-  if (error == EACCES || error == EPERM || error == EROFS) {
-    code = StatusCode::kPermissionDenied;
-  } else if (error == ENOSPC || error == EDQUOT) {
-    code = StatusCode::kResourceExhausted;
-  } else if (error == ENOENT) {
-    code = StatusCode::kNotFound;
-  } else if (error == ENOTDIR || error == EEXIST) {
-    code = StatusCode::kConflict;
-  }
-  return Status(code,
-                StrCat(what, " ", path.string(), ": ", std::generic_category().message(error)));
-}
 
 std::string ReadHolder(int fd) {
   std::array<char, 32> text{};

@@ -25,12 +25,12 @@
 namespace atlas {
 namespace {
 
-ConnectionOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
-  return {std::move(file), ConnectionOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
+DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
+  return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
 }
 
-ConnectionOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
-  return {std::move(file), ConnectionOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
+DatabaseOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
+  return {std::move(file), DatabaseOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
 }
 
 std::uint64_t ReadRevision(Connection& connection) {
@@ -41,7 +41,7 @@ class SqliteStore final : public AtlasStore {
  public:
   SqliteStore(const SqliteStoreOptions& options,
               DataDirectory directory,
-              const AtlasIdentity& identity,
+              const StoreIdentity& identity,
               std::unique_ptr<Connection> writer)
       : directory_(std::move(directory)),
         identity_(identity),
@@ -49,7 +49,7 @@ class SqliteStore final : public AtlasStore {
         writes_(std::move(writer), {options.max_queued_writes, options.max_group, &ReadRevision}),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
-  const AtlasIdentity& identity() const override { return identity_; }
+  const StoreIdentity& identity() const override { return identity_; }
   std::uint64_t revision() const override { return writes_.revision(); }
   Result<AtlasLine> ReadLine() override {
     return readers_.Run<AtlasLine>([](Connection& connection) {
@@ -237,7 +237,7 @@ class SqliteStore final : public AtlasStore {
   }
 
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
-  AtlasIdentity identity_;
+  StoreIdentity identity_;
   TileDirectory tiles_;  // outlives the writes, which report to it
   WriteQueue writes_;    // closed last of the connections: only it can empty the write-ahead log
   ReaderPool readers_;
@@ -346,7 +346,7 @@ Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& opt
   directory.RemoveUnfinished();
   try {
     Connection connection(
-        {directory.unfinished_file(), ConnectionOptions::Mode::kCreate, 2'000, 5'000});
+        {directory.unfinished_file(), DatabaseOptions::Mode::kCreate, 2'000, 5'000});
     CreateSchema(connection, {*options.new_profile, options.new_atlas_id, 1});
   } catch (const std::exception& error) {
     directory.RemoveUnfinished();

@@ -21,8 +21,9 @@ USAGE = {
         ["DRIVE", "--every", "1", "--every", "2"],
     ],
     "wait": [["now"], ["--timeout", "-1"], ["--timeout", "nan"], ["--timeout", "soon"], ["--timeout", "1e9"]],
-    "status": [["more"], ["--verbose"]],
+    "status": [["more"], ["--verbose"], ["--atlas", "WORK/x.db"]],
     "point": [[], ["1"], ["1", "2", "3"], ["1", "x"], ["nan", "0"], ["0", "inf"], ["1e30", "0"],
+              ["1", "2", "--atlas"], ["1", "2", "--atlas", "WORK/x.db"],  # and --server, which all lines have
               ["1e8", "-1e8"], ["1,2"], ["-x", "1"]],
     "query": [
         [], ["--center", "0,0"], ["--radius", "5"], ["--center", "0", "--radius", "5"],
@@ -37,7 +38,7 @@ USAGE = {
         ["--center", "0,0", "--radius", "5", "--budget", "1MB"],
     ],
     "poses": [[], ["apply"], ["revert"], ["apply", "a", "b"]],
-    "sessions": [["more"]],
+    "sessions": [["more"], ["--atlas", "WORK/x.db"]],
     "session": [[], ["retract"], ["restore"], ["purge", "vehicle/good"], ["retract", "vehicle/good", "more"],
                 ["restore", "vehicle"], ["retract", "vehicle/good/1"], ["retract", "--at", "1", "vehicle/good"]],
     "compact": [[], ["more"], ["--before"], ["--before", "yesterday"], ["--before", "-1"], ["--before", "nan"],

@@ -14,7 +14,8 @@ namespace atlas {
 
 struct CommandRun {
   int exit_code = -1;
-  std::vector<boost::json::value> lines;  // of stdout
+  std::string out;
+  std::vector<boost::json::value> lines;  // of it
   std::string err;
 
   const boost::json::value& json() const { return lines.at(lines.size() - 1); }
@@ -31,7 +32,8 @@ inline CommandRun RunAtlas(const std::string& server, std::vector<std::string> a
   const auto commands = MakeCommands();
   CommandRun run;
   run.exit_code = static_cast<int>(RunCommandLine(arguments, commands, {out, err, false, server}));
-  std::istringstream lines(out.str());
+  run.out = out.str();
+  std::istringstream lines(run.out);
   for (std::string line; std::getline(lines, line);) {
     run.lines.push_back(boost::json::parse(line));
   }

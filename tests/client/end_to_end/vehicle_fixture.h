@@ -9,6 +9,7 @@
 #include <string>
 
 #include "client/vehicle/atlas_view.h"
+#include "client/vehicle/store_sync.h"
 #include "tests/client/end_to_end/cut_proxy.h"
 #include "tests/client/end_to_end/end_to_end_fixture.h"
 

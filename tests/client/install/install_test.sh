@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Installs the client library into a folder of its own, builds a project of a vehicle and the examples
-# of docs/client.md against it, and runs the project. Usage: install_test.sh SOURCE BUILD CMAKE COMPILER
+# of docs/client.md against it, and runs the project. Usage: install_test.sh SOURCE BUILD BIN CMAKE COMPILER
 set -euo pipefail
-source=$1 build=$2 cmake=$3 compiler=$4
+source=$1 build=$2 bin=$3 cmake=$4 compiler=$5
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$cmake" --install "$build" --prefix "$folder/prefix" >/dev/null
-if grep -rlE '<boost/asio|\.pb\.h|<openssl' "$folder/prefix/include"; then
+if grep -rlE '<boost/asio|\.pb\.h|<openssl|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
   echo "public headers include what should stay behind the library"
   exit 1
 fi
@@ -17,3 +17,14 @@ awk '/^```cpp$/ { on = 1; next } /^```$/ { on = 0 } on' "$source/docs/client.md"
   -DCMAKE_CXX_COMPILER="$compiler" >/dev/null
 "$cmake" --build "$folder/build"
 "$folder/build/vehicle" "$folder/tiles"
+
+# An atlas without a tile, as its daemon left it.
+mkfifo "$folder/said"
+"$bin/atlasd" --data "$folder/atlas" --listen 127.0.0.1:0 --log-level error >"$folder/said" &
+daemon=$!
+head -n 1 "$folder/said" >/dev/null
+kill "$daemon"
+wait "$daemon"
+[[ $("$folder/build/map_of_file" "$folder/atlas/atlas.db" 0 0) == "0 tiles, current" ]]
+error=$("$folder/build/map_of_file" "$folder/project/main.cc" 0 0 2>&1) && exit 1
+[[ $error == invalid_data:* ]]

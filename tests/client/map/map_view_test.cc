@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "client/map/cell_address.h"
+#include "client/map/daemon_source.h"
 #include "core/tile/tile_codec.h"
 #include "tests/client/support/test_peer.h"
 
@@ -135,7 +136,8 @@ TEST(MapViewTest, FindsTheLayersOfOneCellAndAsksOnce) {
   TinyAtlas atlas({OneCellTile({0, 0, -1}, 98 * 128, 5490)});
   auto client = AtlasClient::Connect(atlas.options());
   ASSERT_TRUE(client);
-  MapView view(*client);
+  DaemonSource source(*client);
+  MapView view(source);
   const auto layers = view.LayersAt({0.05, -2.95});
   ASSERT_TRUE(layers) << layers.error().message();
   ASSERT_EQ(layers->size(), 1U);
@@ -150,7 +152,8 @@ TEST(MapViewTest, LoadKnowsWhatIsNotThere) {
   TinyAtlas atlas({OneCellTile({0, 0, 0}, 0, 1), OneCellTile({0, 1, 0}, 0, 2)});
   auto client = AtlasClient::Connect(atlas.options());
   ASSERT_TRUE(client);
-  MapView view(*client);
+  DaemonSource source(*client);
+  MapView view(source);
   ASSERT_TRUE(view.Load({6.4, 6.4}, 40.0, 0).ok());
   EXPECT_EQ(view.tiles_loaded(), 2U);
   EXPECT_EQ(atlas.queries(), 1);
@@ -163,7 +166,8 @@ TEST(MapViewTest, TileTooLargeForTheCacheIsStillHandedOut) {
   TinyAtlas atlas({OneCellTile({0, 0, 0}, 0, 1)});
   auto client = AtlasClient::Connect(atlas.options());
   ASSERT_TRUE(client);
-  MapView view(*client, {.max_cache_bytes = 10});
+  DaemonSource source(*client);
+  MapView view(source, {.max_cache_bytes = 10});
   for (int i = 0; i < 2; ++i) {
     const auto tile = view.Get({0, 0, 0});
     ASSERT_TRUE(tile) << tile.error().message();

@@ -84,4 +84,30 @@ CertificateFiles TestAuthority::Issue(const std::string& common_name,
   return files;
 }
 
+void TestAuthority::Revoke(const CertificateFiles& files) const {
+  std::FILE* file = std::fopen(files.certificate.c_str(), "r");
+  ASSERT_NE(file, nullptr);
+  X509* const certificate = PEM_read_X509(file, nullptr, nullptr, nullptr);
+  std::fclose(file);
+  ASSERT_NE(certificate, nullptr);
+  X509_CRL* const list = X509_CRL_new();
+  X509_CRL_set_version(list, X509_CRL_VERSION_2);
+  X509_CRL_set_issuer_name(list, X509_get_subject_name(own_));
+  ASN1_TIME* const time = X509_gmtime_adj(nullptr, -kDay_s);
+  X509_REVOKED* const revoked = X509_REVOKED_new();
+  X509_REVOKED_set_serialNumber(revoked, X509_get_serialNumber(certificate));
+  X509_REVOKED_set_revocationDate(revoked, time);
+  X509_CRL_add0_revoked(list, revoked);
+  X509_CRL_set1_lastUpdate(list, time);
+  X509_gmtime_adj(time, kDay_s);
+  X509_CRL_set1_nextUpdate(list, time);
+  EXPECT_GT(X509_CRL_sign(list, key_, EVP_sha256()), 0);
+  file = std::fopen(certificate_.c_str(), "a");
+  EXPECT_EQ(PEM_write_X509_CRL(file, list), 1);
+  std::fclose(file);
+  ASN1_TIME_free(time);
+  X509_CRL_free(list);
+  X509_free(certificate);
+}
+
 }  // namespace atlas

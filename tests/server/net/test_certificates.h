@@ -27,6 +27,8 @@ class TestAuthority {
   const std::filesystem::path& certificate() const { return certificate_; }
   // For a name, and an organizational unit if it is not empty.
   CertificateFiles Issue(const std::string& common_name, const std::string& unit = "") const;
+  // Adds a list of revocations with this certificate to the authority's own file.
+  void Revoke(const CertificateFiles& files) const;
 
  private:
   std::filesystem::path directory_;

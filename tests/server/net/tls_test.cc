@@ -202,6 +202,38 @@ TEST_F(TlsTest, ATokenThatIsTakenBackClosesItsConnections) {
   EXPECT_EQ(CodeOf(again.Greet(kProtocolMajor, "", "open sesame")), StatusCode::kPermissionDenied);
 }
 
+TEST_F(TlsTest, ACertificateThatIsTakenBackClosesItsConnectionsAndOpensNothing) {
+  ServeTls();
+  const CertificateFiles stolen = ca_->Issue("car.7");
+  BlockingPeer thief(port_, {ca_->certificate(), stolen});
+  ASSERT_TRUE(thief.Greet().has_hello_reply());
+  BlockingPeer car(port_, As("car.8"));
+  ASSERT_TRUE(car.Greet().has_hello_reply());
+  ca_->Revoke(stolen);
+  server_->ChangeSecurity(SecurityOf("renewed", security_.access));
+  EXPECT_TRUE(thief.IsClosed());
+  EXPECT_EQ(Ask(car, StatusOf(1)), StatusCode::kOk);
+  BlockingPeer again(port_, {ca_->certificate(), stolen});
+  EXPECT_EQ(again.Greet().body_case(), wire::Envelope::BODY_NOT_SET);
+  BlockingPeer other(port_, As("car.9"));
+  EXPECT_TRUE(other.Greet().has_hello_reply());
+}
+
+TEST_F(TlsTest, AnAuthorityThatIsTakenBackTakesItsVehiclesWithIt) {
+  ServeTls();
+  BlockingPeer car(port_, As("car.7"));
+  ASSERT_TRUE(car.Greet().has_hello_reply());
+  BlockingPeer alice(port_, Anonymous());
+  ASSERT_TRUE(alice.Greet(kProtocolMajor, "", "open sesame").has_hello_reply());
+  const TestAuthority other(directory_, "other");
+  const CertificateFiles own = ca_->Issue("daemon");
+  server_->ChangeSecurity(
+      {TlsContext::Load({own.certificate, own.key, other.certificate()}).value(),
+       security_.access});
+  EXPECT_TRUE(car.IsClosed());
+  EXPECT_EQ(Ask(alice, StatusOf(1)), StatusCode::kOk) << "a token needs no certificate";
+}
+
 TEST_F(TlsTest, ARoleThatChangedHoldsAtOnce) {
   ServeTls("reader");
   BlockingPeer alice(port_, Anonymous());

@@ -3,6 +3,7 @@
 
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
@@ -70,6 +71,7 @@ class LocalizeCommand : public Command {
   std::string Summary() const override {
     return "Find a drive's scans in the map, score the poses";
   }
+  bool ReadsAtlasFiles() const override { return true; }
 
   void Declare(ArgumentSet& arguments) override {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt");
@@ -85,14 +87,14 @@ class LocalizeCommand : public Command {
     ATLAS_RETURN_IF_ERROR(CompleteOptions());
     const Result<DriveFolder> drive = OpenDriveFolder(drive_.directory());
     if (!drive) return drive.error();
-    Result<AtlasClient> client = context.Connect();
-    if (!client) return client.error();
-    const auto report = Localize(*drive, *client, context);
+    const Result<OpenedMap> map = OpenedMap::Open(context);
+    if (!map) return map.error();
+    const auto report = Localize(*drive, map->source(), context);
     if (!report) return report.error();
     if (context.is_json) {
-      context.PrintJson(SummaryJson(*report, client->bytes_received()));
+      context.PrintJson(SummaryJson(*report, map->bytes_received()));
     } else {
-      PrintSummary(*report, client->bytes_received(), context.out);
+      PrintSummary(*report, map->bytes_received(), context.out);
     }
     return {};
   }
@@ -115,9 +117,9 @@ class LocalizeCommand : public Command {
   }
 
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,
-                                           AtlasClient& client,
+                                           MapSource& source,
                                            const CommandContext& context) const {
-    MapView view(client);
+    MapView view(source);
     // Lines of a stream would run into the bar on the same terminal.
     const bool is_stream_seen = context.is_json && context.is_out_terminal;
     const std::uint32_t first = drive.scans.front().number;

@@ -1,5 +1,6 @@
 // `atlas plan`: a route over the map's surfaces.
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
 #include "client/map/map_view.h"
@@ -56,6 +57,7 @@ class PlanCommand : public Command {
  public:
   std::string Name() const override { return "plan"; }
   std::string Summary() const override { return "A drivable route between two places"; }
+  bool ReadsAtlasFiles() const override { return true; }
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("--from", "X,Y,Z", request_.from, "Start, metres; Z names the surface");
@@ -65,12 +67,12 @@ class PlanCommand : public Command {
   }
 
   Status Run(CommandContext& context) override {
-    Result<AtlasClient> client = context.Connect();
-    if (!client) return client.error();
-    MapView view(*client);
+    const Result<OpenedMap> map = OpenedMap::Open(context);
+    if (!map) return map.error();
+    MapView view(map->source());
     ViewTiles tiles(view);
     const CpuTimer timer;
-    Result<Route> route = PlanRoute(tiles, client->profile(), request_);
+    Result<Route> route = PlanRoute(tiles, map->profile(), request_);
     const double ms = 1e3 * timer.elapsed_s();
     Status failure;
     if (!route) {

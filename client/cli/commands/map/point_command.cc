@@ -1,5 +1,6 @@
 // `atlas point X Y`: the surfaces above each other at a place, and what stands on each.
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/layer_json.h"
 #include "client/cli/output/text_table.h"
@@ -44,6 +45,7 @@ class PointCommand : public Command {
  public:
   std::string Name() const override { return "point"; }
   std::string Summary() const override { return "The surfaces at a place, lowest first"; }
+  bool ReadsAtlasFiles() const override { return true; }
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("X", "M", x_m_, "World coordinates of the place");
@@ -52,21 +54,19 @@ class PointCommand : public Command {
   }
 
   Status Run(CommandContext& context) override {
-    Result<AtlasClient> client = context.Connect();
-    if (!client) return client.error();
-    MapViewOptions options;
-    options.at_revision = at_revision_;
-    MapView view(*client, options);
+    const Result<OpenedMap> map = OpenedMap::Open(context, at_revision_);
+    if (!map) return map.error();
+    MapView view(map->source());
     const auto layers = view.LayersAt({x_m_, y_m_});
     if (!layers) return layers.error();
     if (context.is_json) {
       boost::json::array array;
       for (const TileLayer& layer : *layers) {
-        array.push_back(LayerJson(layer, client->profile()));
+        array.push_back(LayerJson(layer, map->profile()));
       }
       context.PrintJson({{"layers", std::move(array)}});
     } else {
-      PrintLayers(*layers, client->profile(), context.out);
+      PrintLayers(*layers, map->profile(), context.out);
     }
     return {};
   }

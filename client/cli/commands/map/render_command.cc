@@ -1,5 +1,6 @@
 // `atlas render`: a picture of the whole atlas.
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/render/map_picture.h"
 #include "core/base/str_cat.h"
@@ -8,17 +9,13 @@
 namespace atlas {
 namespace {
 
-LevelReader ReaderOf(AtlasClient& client) {
-  return [&client](std::uint8_t level, const TileCallback& on_tile) -> Status {
-    RegionQuery query;
-    query.finest_level = level;
-    query.is_only_finest = true;
-    const auto summary = client.QueryRegion(query, [&](const TileBlob& received) -> Status {
-      const Result<Tile> tile = DecodeTile(received.blob, client.profile());
-      if (!tile) return tile.error().WithContext(StrCat("tile ", received.id));
+LevelReader ReaderOf(MapSource& source) {
+  return [&source](std::uint8_t level, const TileCallback& on_tile) -> Status {
+    return source.ReadLevel(level, std::nullopt, [&](const TileBlob& read) -> Status {
+      const Result<Tile> tile = DecodeTile(read.blob, source.profile());
+      if (!tile) return tile.error().WithContext(StrCat("tile ", read.id));
       return on_tile(*tile);
     });
-    return summary ? Status() : summary.error();
   };
 }
 
@@ -26,6 +23,7 @@ class RenderCommand : public Command {
  public:
   std::string Name() const override { return "render"; }
   std::string Summary() const override { return "A picture of the map"; }
+  bool ReadsAtlasFiles() const override { return true; }
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("-o,--output", "FILE.png", file_, "Where the picture goes");
@@ -43,9 +41,9 @@ class RenderCommand : public Command {
     const auto color = ParseMapColor(color_);
     if (!color) return color.error();
     options.color = *color;
-    Result<AtlasClient> client = context.Connect();
-    if (!client) return client.error();
-    const auto picture = RenderMap(ReaderOf(*client), options, client->profile());
+    const Result<OpenedMap> map = OpenedMap::Open(context);
+    if (!map) return map.error();
+    const auto picture = RenderMap(ReaderOf(map->source()), options, map->profile());
     if (!picture) return picture.error();
     ATLAS_RETURN_IF_ERROR(WritePng(picture->image, file_));
     Print(*picture, context);

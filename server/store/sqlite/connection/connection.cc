@@ -1,6 +1,7 @@
 #include "server/store/sqlite/connection/connection.h"
 
 #include <algorithm>
+#include <cctype>
 #include <random>
 
 #include <sqlite3.h>
@@ -10,16 +11,35 @@
 namespace atlas {
 namespace {
 
-int OpenFlags(ConnectionOptions::Mode mode) {
+int OpenFlags(DatabaseOptions::Mode mode) {
   switch (mode) {
-    case ConnectionOptions::Mode::kCreate:
+    case DatabaseOptions::Mode::kCreate:
       return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
-    case ConnectionOptions::Mode::kReadWrite:
+    case DatabaseOptions::Mode::kReadWrite:
       return SQLite::OPEN_READWRITE;
-    case ConnectionOptions::Mode::kReadOnly:
+    case DatabaseOptions::Mode::kUntouched:
+      return SQLite::OPEN_READONLY | SQLite::OPEN_URI;
+    case DatabaseOptions::Mode::kReadOnly:
       break;
   }
   return SQLite::OPEN_READONLY;
+}
+
+// The file as a URI that says that nobody changes it.
+std::string UntouchedUri(const std::string& file) {
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : file) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_plain = std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '_' || c == '-';
+    uri += is_plain ? std::string(1, c) : std::string{'%', kHex[byte >> 4U], kHex[byte & 15U]};
+  }
+  return uri + "?immutable=1";
+}
+
+std::string NameToOpen(const DatabaseOptions& options) {
+  const std::string file = options.file.string();
+  return options.mode == DatabaseOptions::Mode::kUntouched ? UntouchedUri(file) : file;
 }
 
 }  // namespace
@@ -63,8 +83,8 @@ Bytes Query::Blob() {
   return {data, data + column.getBytes()};
 }
 
-Connection::Connection(const ConnectionOptions& options)
-    : database_(options.file.string(), OpenFlags(options.mode), options.busy_timeout_ms) {
+Connection::Connection(const DatabaseOptions& options)
+    : database_(NameToOpen(options), OpenFlags(options.mode), options.busy_timeout_ms) {
   std::random_device random;
   std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });
   // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.

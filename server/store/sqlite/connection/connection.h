@@ -57,8 +57,14 @@ class Query {
   int column_ = 0;
 };
 
-struct ConnectionOptions {
-  enum class Mode { kCreate, kReadWrite, kReadOnly };
+struct DatabaseOptions {
+  enum class Mode {
+    kCreate,
+    kReadWrite,
+    kReadOnly,   // writers go on: takes locks in the files beside the database, makes them if need
+                 // be
+    kUntouched,  // the file alone, without a lock, and nothing beside it: nobody may be writing
+  };
 
   std::filesystem::path file;
   Mode mode = Mode::kReadOnly;
@@ -68,7 +74,7 @@ struct ConnectionOptions {
 
 class Connection {
  public:
-  explicit Connection(const ConnectionOptions& options);
+  explicit Connection(const DatabaseOptions& options);
 
   // `sql` is a string literal: statements are kept by its address. Not to be nested in itself.
   Query Prepare(const char* sql);

@@ -17,7 +17,7 @@ namespace atlas {
 
 class ReaderPool {
  public:
-  ReaderPool(ConnectionOptions options, std::size_t max_connections)
+  ReaderPool(DatabaseOptions options, std::size_t max_connections)
       : options_(std::move(options)), max_connections_(max_connections) {}
 
   // Runs `read(Connection&)`, which returns a Result<T>, in one snapshot.
@@ -50,7 +50,7 @@ class ReaderPool {
   std::unique_ptr<Connection> Take();
   void Return(std::unique_ptr<Connection> connection);
 
-  ConnectionOptions options_;
+  DatabaseOptions options_;
   std::size_t max_connections_;
   std::mutex mutex_;
   std::condition_variable returned_;

@@ -149,7 +149,7 @@ Status CheckVersions(Connection& connection) {
 
 }  // namespace
 
-void CreateSchema(Connection& connection, const AtlasIdentity& identity) {
+void CreateSchema(Connection& connection, const StoreIdentity& identity) {
   connection.Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = DELETE; BEGIN IMMEDIATE;");
   connection.Execute(kTables);
   const Bytes profile = identity.profile.Encode();
@@ -164,7 +164,7 @@ void CreateSchema(Connection& connection, const AtlasIdentity& identity) {
                          .c_str());
 }
 
-Result<AtlasIdentity> ReadIdentity(Connection& connection) {
+Result<StoreIdentity> ReadIdentity(Connection& connection) {
   if (Status status = CheckVersions(connection); !status.ok()) {
     return Error(std::move(status));
   }
@@ -175,7 +175,7 @@ Result<AtlasIdentity> ReadIdentity(Connection& connection) {
   }
   const Bytes profile_bytes = row.Blob();
   const Bytes atlas_id = row.Blob();
-  AtlasIdentity identity;
+  StoreIdentity identity;
   identity.epoch = row.Unsigned();
   if (atlas_id.size() != identity.atlas_id.size() ||
       row.Int() != MetaHash(profile_bytes, atlas_id, identity.epoch)) {

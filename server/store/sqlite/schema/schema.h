@@ -11,10 +11,10 @@ inline constexpr std::int64_t kStoreApplicationId = 0x52414131;  // "RAA1"
 inline constexpr std::int64_t kStoreSchemaVersion = 4;
 
 // Makes the tables of an empty database and writes who it is, in one transaction.
-void CreateSchema(Connection& connection, const AtlasIdentity& identity);
+void CreateSchema(Connection& connection, const StoreIdentity& identity);
 
 // kInvalidData on a database of another program or a damaged identity, kUnsupported on another
 // schema version.
-Result<AtlasIdentity> ReadIdentity(Connection& connection);
+Result<StoreIdentity> ReadIdentity(Connection& connection);
 
 }  // namespace atlas

@@ -21,6 +21,7 @@ struct Recorded {
   bool is_rebuild = false;
   bool is_json = false;
   Endpoint server;
+  std::optional<std::filesystem::path> atlas_file;
   int runs = 0;
 };
 
@@ -42,10 +43,12 @@ class RecordingCommand : public Command {
     arguments.Choice("--color", {"red", "blue"}, recorded_.color, "");
     arguments.Flag("--rebuild", recorded_.is_rebuild, "");
   }
+  bool ReadsAtlasFiles() const override { return name_ == "point"; }
   Status Run(CommandContext& context) override {
     ++recorded_.runs;
     recorded_.is_json = context.is_json;
     recorded_.server = context.connection.endpoint;
+    recorded_.atlas_file = context.atlas_file;
     return status_;
   }
 
@@ -140,6 +143,10 @@ TEST(CommandLineTest, UsageErrorsAreTwo) {
       {"point", "1", "2", "--height", "--json"},
       {"point", "1", "2", "--rebuild=often"},
       {"point", "1", "2", "--json=0"},
+      {"point", "1", "2", "--atlas"},
+      {"point", "1", "2", "--atlas="},
+      {"point", "1", "2", "--atlas", "--json"},
+      {"poses", "apply", "1", "2", "--atlas", "a.db"},
       {"poses"},
   };
   for (const auto& arguments : wrong) {
@@ -199,6 +206,33 @@ TEST(CommandLineTest, ServerComesFromFlagThenEnvironmentThenDefault) {
   EXPECT_EQ(RunWith({"--server", "a:1", "point", "1", "2"}, {}, "example:9").recorded.server,
             (Endpoint{"a", 1}));
   EXPECT_EQ(RunWith({"point", "1", "2"}, {}, "junk").code, ExitCode::kUsage);
+}
+
+TEST(CommandLineTest, AnAtlasFileStandsForTheDaemon) {
+  EXPECT_EQ(RunWith({"point", "1", "2"}).recorded.atlas_file, std::nullopt);
+  const Outcome outcome = RunWith({"point", "1", "2", "--atlas", "a/b.db"}, {}, "junk");
+  EXPECT_EQ(outcome.code, ExitCode::kSuccess) << outcome.err;  // whatever ATLAS_SERVER is
+  EXPECT_EQ(outcome.recorded.atlas_file, "a/b.db");
+  EXPECT_EQ(RunWith({"point", "1", "2", "--atlas=a.db"}).recorded.atlas_file, "a.db");
+  EXPECT_NE(RunWith({"point", "--help"}).out.find("--atlas"), std::string::npos);
+  EXPECT_EQ(RunWith({"poses", "apply", "--help"}).out.find("--atlas"), std::string::npos);
+}
+
+TEST(CommandLineTest, AnAtlasFileAndADaemonExcludeEachOther) {
+  const std::vector<std::vector<std::string>> daemons = {
+      {"--server", "a:1"},     {"--server=a:1"},   {"--tls-ca", "x"},    {"--tls-name", "x"},
+      {"--tls-certificate=x"}, {"--tls-key", "x"}, {"--token-file", "x"}};
+  for (const auto& daemon : daemons) {
+    std::vector<std::string> arguments = {"point", "1", "2", "--atlas", "a.db"};
+    arguments.insert(arguments.end(), daemon.begin(), daemon.end());
+    const Outcome outcome = RunWith(arguments);
+    EXPECT_EQ(outcome.code, ExitCode::kUsage) << daemon.front();
+    EXPECT_EQ(outcome.recorded.runs, 0);
+    const std::string flag = daemon.front().substr(0, daemon.front().find('='));
+    EXPECT_NE(outcome.err.find(flag), std::string::npos) << outcome.err;
+  }
+  const Outcome before = RunWith({"--server", "a:1", "point", "1", "2", "--atlas", "a.db"});
+  EXPECT_EQ(before.code, ExitCode::kUsage);
 }
 
 TEST(CommandLineTest, CommandsOfTwoWords) {

@@ -1,0 +1,61 @@
+// An atlas file, the daemon's database or a copy of it, read without a daemon: one state of the
+// atlas for as long as it is open, whatever a daemon writes meanwhile. Never changed. One thread at
+// a time. docs/client.md, "Without a daemon".
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "client/map/map_source.h"
+#include "client/vehicle/tile_files.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+class StoreSnapshot;
+
+class AtlasFile final : public MapSource {
+ public:
+  // kNotFound: there is no such file, and none is made. kInvalidArgument: a directory, or no file.
+  // kInvalidData: not an atlas, or damaged. kUnsupported: of another schema version.
+  // kPermissionDenied: unreadable, or with a log beside it that cannot be read where it lies.
+  // kUnavailable: the disk fails, or somebody began to write to a file that nobody had open, then
+  // and in every later call; open it again.
+  static Result<AtlasFile> Open(const std::filesystem::path& file);
+
+  AtlasFile(const AtlasFile&) = delete;
+  AtlasFile& operator=(const AtlasFile&) = delete;
+  AtlasFile(AtlasFile&&) noexcept;
+  AtlasFile& operator=(AtlasFile&&) noexcept;
+  ~AtlasFile() override;
+
+  const MapProfile& profile() const override { return key_.profile; }
+  const AtlasKey& key() const { return key_; }
+  std::uint64_t revision() const;
+  // Tiles that show what they showed before the last changes: the daemon has not fused them again
+  // yet.
+  std::uint64_t dirty_tiles() const;
+
+  // In the order of the tiles' keys. kInvalidData names a damaged tile.
+  Status ReadLevel(std::uint8_t level,
+                   const std::optional<DiscArea>& disc,
+                   const OnTile& on_tile) override;
+  // nullopt: there is no such tile. kInvalidData: it is damaged; others may be read all the same.
+  Result<std::optional<TileBlob>> Read(const TileId& id);
+  // Calls back for every tile of `level` that the box touches, in the order of their keys. A
+  // failing callback, which may read tiles, ends it with its status.
+  Status List(std::uint8_t level,
+              const BoxArea& box,
+              const std::function<Status(const TileFacts&)>& on_tile);
+
+ private:
+  explicit AtlasFile(std::unique_ptr<StoreSnapshot> snapshot);
+
+  std::unique_ptr<StoreSnapshot> snapshot_;
+  AtlasKey key_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,47 @@
+// Where a store's tiles come from: a daemon (link_feed.h) or an atlas file (client/atlas_file).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "client/connection/sync_query.h"
+#include "client/vehicle/tile_store.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct AroundOptions {
+  std::uint8_t finest_level = 0;
+  SectionBits sections = kEverySection;  // contributors and surface among them
+  std::uint64_t budget_bytes = 0;        // of the replies; 0: none
+  // For connecting and for what the daemon sends; a link that goes silent holds a call up to the
+  // connection's request timeout longer.
+  std::chrono::milliseconds deadline{2'000};
+};
+
+struct StoreSyncReport {
+  std::uint64_t tiles = 0;
+  std::uint64_t deltas = 0;  // of these, as differences to what was held
+  std::uint64_t bytes = 0;   // of the replies' frames, or of a file's blobs
+  std::uint64_t requests = 0;
+  std::uint64_t revision = 0;  // the area is at least as new, if `is_complete`
+  bool is_complete = false;    // the store got all that the query wants
+};
+
+class TileFeed {
+ public:
+  TileFeed() = default;
+  TileFeed(const TileFeed&) = delete;
+  TileFeed& operator=(const TileFeed&) = delete;
+  virtual ~TileFeed() = default;
+
+  // Brings the store up to date in an area, coarse levels first, as far as budget and deadline
+  // allow. Each tile is in the store as soon as it came: after a failure the store is as good as it
+  // was, or better. kConflict: the feed is of another atlas. kUnavailable: there is nobody to ask
+  // now. Else the feed's own errors.
+  virtual Result<StoreSyncReport> Sync(TileStore& store,
+                                       const MapArea& area,
+                                       const AroundOptions& options) = 0;
+};
+
+}  // namespace atlas

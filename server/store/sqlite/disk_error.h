@@ -1,0 +1,15 @@
+// What the system says of a path, as the Status that callers act on.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/base/status.h"
+
+namespace atlas {
+
+// "WHAT PATH: REASON" for an errno. Forbidden: kPermissionDenied. Full: kResourceExhausted. Not
+// there: kNotFound. Something else under the name: kConflict. Everything else: kUnavailable.
+Status DiskError(const std::string& what, const std::filesystem::path& path, int error);
+
+}  // namespace atlas
