@@ -12,7 +12,9 @@ import subprocess
 import sys
 import tempfile
 
+import bench_follow
 import bench_load
+import bench_memory
 import bench_nginx
 import bench_serving
 import bench_updates
@@ -203,19 +205,22 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               "curbs": bench_curbs,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
-                                   **bench_load.BENCHMARKS}.items()}}
+                                   **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
+                                   **bench_memory.BENCHMARKS}.items()}}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, required=True)
     parser.add_argument("--nginx", default="nginx", help="for serving")
+    parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
     bench_nginx.PROGRAM = args.nginx
+    bench_memory.LONG = args.long
     for name in args.names or BENCHMARKS:
         BENCHMARKS[name](args.bin)
 

@@ -38,11 +38,20 @@ class Atlas:
         if certificate:
             flags += ("--tls-certificate", str(certificate.file), "--tls-key", str(certificate.key))
             self.client_flags = ["--tls-ca", certificate.file]
+        self.start(*flags)
+
+    def start(self, *flags):
         self.process = subprocess.Popen(
-            [bin_dir / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
+            [self.bin / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
              "--http", "127.0.0.1:0", "--log-level", "error", *flags], stdout=subprocess.PIPE, text=True)
         self.server, self.http = (self.process.stdout.readline().split()[1] for _ in range(2))
         self.port = self.server.rsplit(":")[-1]
+
+    def restart(self):
+        """Stops in order and starts again, with default settings."""
+        self.process.terminate()
+        self.process.wait()
+        self.start()
 
     def __enter__(self):
         return self

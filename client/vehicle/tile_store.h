@@ -29,6 +29,12 @@ class TileStore {
   // Reads the folder's names, no tile. Errors of a folder that cannot be made.
   static Result<TileStore> Open(AtlasKey atlas, const TileStoreOptions& options);
 
+  TileStore(const TileStore&) = delete;  // its orders point into themselves
+  TileStore& operator=(const TileStore&) = delete;
+  TileStore(TileStore&&) = default;
+  TileStore& operator=(TileStore&&) = default;
+  ~TileStore() = default;
+
   const AtlasKey& atlas() const { return atlas_; }
   std::size_t size() const { return tiles_.size(); }
   std::size_t memory_bytes() const { return memory_.bytes(); }

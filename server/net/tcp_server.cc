@@ -60,6 +60,12 @@ VisitPace::Options PaceFrom(const NetOptions& options) {
   return pace;
 }
 
+// Else the system keeps megabytes for a slow link, and is heard of again when a third of them left:
+// at 256 kbit/s longer than a peer may take nothing.
+void KeepLittleUnsent(tcp::socket& socket, int bytes) {
+  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &bytes, sizeof(bytes));
+}
+
 }  // namespace
 
 class TcpServer::Impl {
@@ -208,6 +214,7 @@ class TcpServer::Impl {
     error_code ignored;  // an option that speeds things up, no more
     socket.set_option(tcp::no_delay(true), ignored);
     NoticeDeath(socket);
+    KeepLittleUnsent(socket, options_.max_unsent_bytes);
     SslSession session;
     if (security_.tls != nullptr) {
       session = security_.tls->NewSession(socket.native_handle());

@@ -22,18 +22,21 @@ sockaddr_in Loopback(std::uint16_t port) {
 }
 
 // False when the giving side closed or the taking one is gone.
-bool PassOn(int from, int to, std::int64_t& bytes_left) {
-  std::array<char, 4096> chunk{};
+bool PassOn(int from, int to) {
+  std::array<std::uint8_t, 4096> chunk{};
   const ssize_t size = recv(from, chunk.data(), chunk.size(), 0);
-  if (size <= 0) return false;
-  const auto allowed = std::min<std::int64_t>(size, bytes_left);
-  bytes_left -= size;
-  return send(to, chunk.data(), static_cast<std::size_t>(allowed), MSG_NOSIGNAL) == size;
+  return size > 0 && send(to, chunk.data(), static_cast<std::size_t>(size), MSG_NOSIGNAL) == size;
+}
+
+// What the client sends next is answered by a reset, and it is told at once.
+void Reset(int socket) {
+  const linger now{1, 0};
+  setsockopt(socket, SOL_SOCKET, SO_LINGER, &now, sizeof(now));
 }
 
 }  // namespace
 
-CutProxy::CutProxy(const Endpoint& daemon, std::int64_t bytes_until_cut)
+CutProxy::CutProxy(const Endpoint& daemon, std::int64_t bytes_until_cut, Cut cut)
     : listener_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in address = Loopback(0);
   auto* generic = reinterpret_cast<sockaddr*>(&address);
@@ -43,29 +46,44 @@ CutProxy::CutProxy(const Endpoint& daemon, std::int64_t bytes_until_cut)
     throw std::runtime_error("no loopback port to listen on");
   }
   port_ = ntohs(address.sin_port);
-  thread_ =
-      std::thread([this, port = daemon.port, bytes_until_cut] { Run(port, bytes_until_cut); });
+  thread_ = std::thread(
+      [this, port = daemon.port, bytes_until_cut, cut] { Run(port, bytes_until_cut, cut); });
 }
 
 CutProxy::~CutProxy() {
   shutdown(listener_, SHUT_RDWR);
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
   close(listener_);
 }
 
-void CutProxy::Run(std::uint16_t daemon_port, std::int64_t bytes_left) const {
+const Bytes& CutProxy::Passed() {
+  if (thread_.joinable()) thread_.join();
+  return passed_;
+}
+
+bool CutProxy::PassBack(int from, int to, std::int64_t& bytes_left) {
+  std::array<std::uint8_t, 4096> chunk{};
+  const auto most = std::min<std::int64_t>(bytes_left, std::int64_t{chunk.size()});
+  const ssize_t size = recv(from, chunk.data(), static_cast<std::size_t>(most), 0);
+  if (size <= 0) return false;
+  passed_.insert(passed_.end(), chunk.begin(), chunk.begin() + size);
+  bytes_left -= size;
+  return send(to, chunk.data(), static_cast<std::size_t>(size), MSG_NOSIGNAL) == size;
+}
+
+void CutProxy::Run(std::uint16_t daemon_port, std::int64_t bytes_left, Cut cut) {
   const int client = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
   if (client < 0) return;
   const int daemon = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address = Loopback(daemon_port);
   bool is_open = connect(daemon, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
-  std::int64_t no_end = INT64_MAX;
   while (is_open && bytes_left > 0) {
     std::array<pollfd, 2> ends{pollfd{client, POLLIN, 0}, pollfd{daemon, POLLIN, 0}};
     is_open = poll(ends.data(), ends.size(), -1) > 0;
-    if (is_open && ends[0].revents != 0) is_open = PassOn(client, daemon, no_end);
-    if (is_open && ends[1].revents != 0) is_open = PassOn(daemon, client, bytes_left);
+    if (is_open && ends[0].revents != 0) is_open = PassOn(client, daemon);
+    if (is_open && ends[1].revents != 0) is_open = PassBack(daemon, client, bytes_left);
   }
+  if (cut == Cut::kReset) Reset(client);
   close(daemon);
   close(client);
 }

@@ -121,6 +121,19 @@ TEST_F(LimitTest, AReaderThatStopsFillsItsOwnQueueAndLosesNothing) {
   EXPECT_LT(ended, kQueries);
 }
 
+// What waits in the system is heard of again when a third of it left: with megabytes of it a slow
+// link looks like one that is gone.
+TEST_F(LimitTest, TheSystemKeepsLittleForAReaderThatStops) {
+  Serve();
+  UploadDrive(12);
+  Digest();
+  const auto peer = Connect(4'096);
+  const std::uint64_t before = server_->ReadFigures().sent_bytes;
+  const Bytes queries = PaddedQueries(3'000);
+  EXPECT_LT(peer->SendUntilStuck(queries, milliseconds(1'000)), queries.size());
+  EXPECT_LT(server_->ReadFigures().sent_bytes - before, 512u << 10);
+}
+
 TEST_F(LimitTest, AReaderThatNeverReadsAgainIsClosed) {
   net_.write_stall = kSoon;
   Serve();
