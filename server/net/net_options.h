@@ -23,7 +23,7 @@ struct NetOptions {
   std::uint32_t max_hello_bytes = 16u << 10;  // payload of a connection's first frame
   std::uint32_t max_frame_bytes = kMaxFrameBytes;
   std::size_t max_requests_in_flight = 64;  // a connection
-  std::size_t max_queued_bytes = 4u << 20;  // replies waiting for a slow reader, a connection
+  std::size_t max_queued_bytes = 1u << 20;  // replies waiting for a slow reader, a connection
   // Of these in the system's hands and not on their way: half of them take 16 s at 64 kbit/s.
   int max_unsent_bytes = 256 << 10;
   std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection

@@ -17,7 +17,7 @@ struct SqliteStoreOptions {
   std::optional<MapProfile> new_profile;
   std::array<std::uint8_t, 16> new_atlas_id{};
   int writer_cache_kib = 32 * 1024;
-  int reader_cache_kib = 4 * 1024;
+  int reader_cache_kib = 1024;  // each: what is read again, tiles, is kept above
   std::size_t tile_directory_bytes = std::size_t{16}
                                      << 20;  // which tiles there are (tile_directory.h)
   std::size_t max_readers = 16;              // connections; more threads wait for one
