@@ -11,8 +11,7 @@ import atlas_pb2
 from google.protobuf.message import DecodeError
 
 from roadatlas.changes import merge_events
-from roadatlas.errors import (BadMagic, BrokenReply, ConnectionLost, DeadlinePassed, RequestRefused, RoadAtlasError,
-                              TlsFailed)
+from roadatlas.errors import BrokenReply, ConnectionLost, DeadlinePassed, RequestRefused, RoadAtlasError, TlsFailed
 from roadatlas.framing import HEADER, MAX_HELLO_BYTES, MAX_PAYLOAD_BYTES, FrameReader, encode_frame
 from roadatlas.tls import Tls
 from roadatlas.transport import Transport
@@ -20,7 +19,6 @@ from roadatlas.transport import Transport
 MAX_IN_FLIGHT = 64  # requests that the daemon reads before the first of them is answered
 MAX_WAITING_EVENTS = 16  # of one watch; what comes beyond them is told in the last one
 _MORE_FOLLOW = ("tile", "sync_manifest", "watch_event")  # bodies that do not end a reply
-_TLS_ALERT = b"\x15\x03"
 
 
 class Connection:
@@ -28,6 +26,7 @@ class Connection:
 
     def __init__(self, host: str, port: int, timeout_s: float, tls: Tls | None = None) -> None:
         self._transport = Transport(host, port, timeout_s, tls)
+        self._was_heard = tls is not None
         self._reader = FrameReader()
         self._to_send = bytearray()
         self._arrived: dict[int, deque[atlas_pb2.Envelope]] = {}
@@ -111,11 +110,11 @@ class Connection:
     def _take(self, data: bytes | None) -> None:
         if data is None:
             return
-        if not self.bytes_received and data.startswith(_TLS_ALERT):
-            raise BadMagic("the daemon speaks TLS: connect with who vouches for it")
         if not data:
             self._reader.finish()
-            self._end = ConnectionLost("the daemon closed the connection")
+            self._end = ConnectionLost("the daemon closed the connection" if self._was_heard else
+                                       "the daemon closed the connection without a word: does it expect TLS?")
+        self._was_heard = True
         for payload in self._reader.feed(data):
             self.bytes_received += HEADER.size + len(payload)
             try:
