@@ -119,6 +119,16 @@ class GoldenFileTest(unittest.TestCase):
             with self.assertRaises(UselessDelta):
                 apply_delta(encode_tile_blob(other), DELTA, None)
 
+    def test_content_that_a_delta_does_not_promise(self):
+        header_bytes, entry_bytes, hash_at = 24, 18, 10
+        table_end = header_bytes + 4 * entry_bytes
+        for section in range(4):
+            head = bytearray(DELTA[:table_end])
+            head[header_bytes + section * entry_bytes + hash_at] ^= 1
+            head += struct.pack("<Q", xxhash.xxh64_intdigest(head))
+            with self.assertRaisesRegex(UselessDelta, f"section {section + 1} has another content"):
+                apply_delta(TILE, bytes(head) + DELTA[table_end + 8:], None)
+
     def test_no_damage_of_a_delta_makes_another_content(self):
         right = canonical_payload(apply_delta(TILE, DELTA, None))
         for bit in range(8 * len(DELTA)):
