@@ -47,7 +47,8 @@ def sync_area(client: AtlasClient, arguments: argparse.Namespace) -> None:
 def print_reply(reply: SyncReply) -> None:
     errors = [error for manifest in reply.manifests for error in manifest.errors_mm]
     for tile, error_mm in zip(reply.tiles, errors):
-        print(f"tile {name_of(tile.key)}  {len(tile.blob)} bytes  revision {tile.revision}  error {error_mm / 1000:g} m")
+        print(f"tile {name_of(tile.key)}  {len(tile.blob)} bytes  revision {tile.revision}  "
+              f"error {error_mm / 1000:g} m")
     print(f"{len(reply.tiles)} tiles, {reply.end.bytes} bytes, revision {reply.end.revision}"
           f"{', more to come' if reply.end.cursor else ''}")
 

@@ -43,7 +43,7 @@ class TileStore:
     def synchronize(self, client: AtlasClient, request: atlas_pb2.SyncRequest) -> Iterator[SyncReply]:
         """Asks until the store holds all that `request` wants, as the daemon has it; gives each reply once applied.
 
-        The held tiles, the cursor and `takes_deltas` of `request` are set here. A budget and a time bound each reply; stop when
+        The held tiles, cursor and `takes_deltas` of `request` are set here. A budget and a time bound each reply; stop when
         enough came. It ends too, with a cursor in the last reply, when these have no room for the next tile.
         """
         asked = atlas_pb2.SyncRequest()

@@ -16,7 +16,7 @@ class DeltaTest(SyncCase):
 
     def change(self, sequence=8, bump_mm=0):
         """One more keyframe, whose grid ends within the tiles."""
-        self.client.upload_keyframe(self.upload(sequence, 8 * sequence, radius_cells=RADIUS_CELLS // 3, bump_mm=bump_mm))
+        self.client.upload_keyframe(self.upload(sequence, 8 * sequence, "near", RADIUS_CELLS // 3, bump_mm))
         self.fuse()
 
     def bring_up_to_date(self, store, **fields):

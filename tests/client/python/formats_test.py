@@ -114,8 +114,9 @@ class GoldenFileTest(unittest.TestCase):
         with self.assertRaises(UselessDelta):
             apply_delta(TILE, DELTA, payload_hash ^ 1)
         tile = parse_tile_blob(TILE)
+        elsewhere = tile.place[:1] + struct.pack("<Q", tile.key + 1) + tile.place[9:]
         for other in (dataclasses.replace(tile, sections=tile.sections[:1] + tile.sections[2:]),
-                      dataclasses.replace(tile, place=tile.place[:1] + struct.pack("<Q", tile.key + 1) + tile.place[9:])):
+                      dataclasses.replace(tile, place=elsewhere)):
             with self.assertRaises(UselessDelta):
                 apply_delta(encode_tile_blob(other), DELTA, None)
 
