@@ -8,7 +8,8 @@ BUILD_PACKAGES=(
   libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev
   libssl-dev libpng-dev prometheus-cpp-dev
 )
-TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-protobuf python3-xxhash xz-utils)
+TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-protobuf python3-xxhash python3-zstandard
+  xz-utils)
 BENCH_PACKAGES=(libbenchmark-dev openssl python3-matplotlib)
 TIDY_PACKAGES=(clang-tidy)
 

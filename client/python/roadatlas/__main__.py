@@ -1,40 +1,26 @@
 """`python3 -m roadatlas`: looks at a daemon from the command line (docs/python.md)."""
 
 import argparse
-import os
-import pathlib
 import sys
+import time
 
 import atlas_pb2
 
+from roadatlas.changes import Changes
 from roadatlas.client import AtlasClient, SyncReply
-from roadatlas.errors import RoadAtlasError
+from roadatlas.command_line import connect, parse_arguments
+from roadatlas.errors import BadCredentials, RoadAtlasError
 from roadatlas.geometry import disc, tile_place
 from roadatlas.profile import parse_profile
 from roadatlas.tile_store import TileStore
 
-DEFAULT_SERVER = "127.0.0.1:7447"
+_LOOK_AGAIN_S = 60.0
 
 
-def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="roadatlas", description="Looks at a Road Atlas daemon.")
-    parser.add_argument("--server", metavar="HOST:PORT", default=os.environ.get("ATLAS_SERVER", DEFAULT_SERVER),
-                        help=f"the daemon [ATLAS_SERVER, else {DEFAULT_SERVER}]")
-    commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("status", help="what the atlas holds")
-    sync = commands.add_parser("sync", help="fetch the tiles of an area, coarse first")
-    sync.add_argument("--disc", nargs=3, type=float, required=True, metavar=("X", "Y", "R"), help="metres")
-    sync.add_argument("--out", type=pathlib.Path, required=True, metavar="DIR", help="a file LEVEL_X_Y.tile a tile")
-    sync.add_argument("--finest", type=int, default=0, metavar="LEVEL", help="the finest level wanted [0]")
-    sync.add_argument("--sections", type=int, nargs="+", default=[], metavar="ID",
-                      help="of docs/formats/tile.md [all]")
-    sync.add_argument("--budget", type=int, default=0, metavar="BYTES", help="of each reply [none]")
-    return parser.parse_args()
-
-
-def print_status(client: AtlasClient) -> None:
+def print_status(client: AtlasClient, _: argparse.Namespace) -> None:
     hello = client.hello
     print(f"protocol {hello.protocol_major}.{hello.protocol_minor}, atlas {hello.atlas_id.hex()}, epoch {hello.epoch}")
+    print(f"taken for {client.name or 'nobody in particular'}, role {client.role}")
     status = client.status()
     for field in status.DESCRIPTOR.fields:
         print(f"{field.name:16} {getattr(status, field.name)}")
@@ -61,27 +47,47 @@ def sync_area(client: AtlasClient, arguments: argparse.Namespace) -> None:
 def print_reply(reply: SyncReply) -> None:
     errors = [error for manifest in reply.manifests for error in manifest.errors_mm]
     for tile, error_mm in zip(reply.tiles, errors):
-        level, x, y = tile_place(tile.key)
-        print(f"tile {level}/{x}/{y}  {len(tile.blob)} bytes  revision {tile.revision}  error {error_mm / 1000:g} m")
+        print(f"tile {name_of(tile.key)}  {len(tile.blob)} bytes  revision {tile.revision}  "
+              f"error {error_mm / 1000:g} m")
     print(f"{len(reply.tiles)} tiles, {reply.end.bytes} bytes, revision {reply.end.revision}"
           f"{', more to come' if reply.end.cursor else ''}")
 
 
+def watch_area(client: AtlasClient, arguments: argparse.Namespace) -> None:
+    until = None if arguments.seconds is None else time.monotonic() + arguments.seconds
+    with client.watch(disc(*arguments.disc), finest_level=arguments.finest,
+                      interval_ms=round(1000 * arguments.interval)) as watch:
+        print(f"from revision {watch.since} on", flush=True)
+        while until is None or time.monotonic() < until:
+            changes = watch.next(_LOOK_AGAIN_S if until is None else max(0.0, until - time.monotonic()))
+            if changes is not None:
+                print_changes(changes)
+
+
+def print_changes(changes: Changes) -> None:
+    told = [f"changed {name_of(key)}" for key in changes.tiles] + [f"removed {name_of(key)}" for key in changes.removed]
+    told += [f"changed below {name_of(key)}" for key in changes.below] + ["changed anything"] * changes.anything
+    for line in told:
+        print(f"revision {changes.revision}: {line}", flush=True)
+
+
+def name_of(key: int) -> str:
+    return "/".join(map(str, tile_place(key)))
+
+
 def main() -> int:
     arguments = parse_arguments()
-    host, _, port = arguments.server.rpartition(":")
-    if not port.isdigit():
-        print(f"roadatlas: --server {arguments.server}: expected HOST:PORT", file=sys.stderr)
-        return 2
     try:
-        with AtlasClient(host, int(port)) as client:
-            if arguments.command == "status":
-                print_status(client)
-            else:
-                sync_area(client, arguments)
+        with connect(arguments) as client:
+            {"status": print_status, "sync": sync_area, "watch": watch_area}[arguments.command](client, arguments)
+    except BadCredentials as error:
+        print(f"roadatlas: {error}", file=sys.stderr)
+        return 2
     except (RoadAtlasError, OSError) as error:
         print(f"roadatlas: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        return 130
     return 0
 
 

@@ -1,8 +1,8 @@
 """Requests to a daemon and their replies (docs/protocol.md). Not for several threads at a time.
 
 Every method waits for its reply. To have several requests on their way, `submit` them and fetch each
-one's reply with `result`. All of them raise RequestRefused for an `Error`, DeadlinePassed, ConnectionLost
-and BrokenReply.
+one's reply with `result`. All of them raise RequestRefused for an `Error`, DeadlinePassed, ConnectionLost,
+BrokenReply and TlsFailed.
 """
 
 import dataclasses
@@ -14,15 +14,18 @@ from google.protobuf.message import Message
 
 from roadatlas.connection import Connection
 from roadatlas.errors import BrokenReply
+from roadatlas.tls import Tls
+from roadatlas.watch import Watch
 
 PROTOCOL_MAJOR = 1
-PROTOCOL_MINOR = 4
+PROTOCOL_MINOR = 6
 _FIELD_OF = {field.message_type.full_name: field.name
              for field in atlas_pb2.Envelope.DESCRIPTOR.oneofs_by_name["body"].fields}
 _REPLY_TO = {"hello": "hello_reply", "upload_keyframe": "upload_reply", "update_poses": "update_poses_reply",
              "change_session": "change_session_reply", "status_request": "status_reply",
              "sessions_request": "sessions_reply", "wait_request": "wait_reply", "digest_request": "digest_reply",
-             "compact_request": "compact_reply", "verify_request": "verify_reply"}  # those of one message
+             "compact_request": "compact_reply", "verify_request": "verify_reply",
+             "cancel_request": "cancel_reply"}  # those of one message
 
 
 @dataclasses.dataclass
@@ -60,16 +63,18 @@ class AtlasClient:
     """A connection after its handshake. `hello` is what the daemon said of itself."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 7447, *, client_name: str = "python",
-                 profile: bytes = b"", connect_timeout_s: float = 5.0, timeout_s: float = 30.0,
+                 profile: bytes = b"", tls: Tls | None = None, token: str = "",
+                 resume: tuple[str, str] | None = None, connect_timeout_s: float = 5.0, timeout_s: float = 30.0,
                  protocol_major: int = PROTOCOL_MAJOR) -> None:
-        """`timeout_s` bounds each request, on top of the time that the request itself allows the daemon."""
+        """`timeout_s` bounds each request, on top of the time that the request itself allows the daemon. `resume`: the
+        vehicle and session that are going to be uploaded, or gone on with."""
         self._timeout_s = timeout_s
         self._awaited: dict[int, str] = {}  # what answers each request that was submitted
-        self._connection = Connection(host, port, connect_timeout_s)
+        self._connection = Connection(host, port, connect_timeout_s, tls)
         try:
             self.hello: atlas_pb2.HelloReply = self._call(atlas_pb2.Hello(
                 protocol_major=protocol_major, protocol_minor=PROTOCOL_MINOR, client_name=client_name,
-                profile=profile))
+                profile=profile, token=token, resume=_session(resume)))
         except BaseException:
             self.close()
             raise
@@ -82,6 +87,21 @@ class AtlasClient:
 
     def close(self) -> None:
         self._connection.close()
+
+    @property
+    def name(self) -> str:
+        """Whom the daemon takes us for; empty: nobody in particular."""
+        return self.hello.name
+
+    @property
+    def role(self) -> str:
+        """What the daemon lets us do: "reader", "vehicle", "merge" or "admin"; empty before version 1.5."""
+        return self.hello.role
+
+    @property
+    def last_sequence(self) -> int | None:
+        """Of the session to be resumed, when the connection began; None: nothing of it is there."""
+        return self.hello.last_sequence if self.hello.HasField("last_sequence") else None
 
     @property
     def bytes_received(self) -> int:
@@ -162,11 +182,25 @@ class AtlasClient:
                     announced += len(envelope.sync_manifest.keys)
                 case "tile" if len(tiles) < announced:
                     _check_announced(envelope.tile, manifests[-1], len(tiles) - announced)
+                    if envelope.tile.base_hash and not request.takes_deltas:
+                        raise BrokenReply(f"tile {envelope.tile.key:#018x} came as a delta, which was not asked for")
                     tiles.append(envelope.tile)
                 case "sync_end" if manifests and len(tiles) == announced:
                     return _sync_reply(request, manifests, tiles, envelope.sync_end)
                 case other:
                     raise BrokenReply(f"{other} after {len(tiles)} of {announced} tiles that a sync announced")
+
+    def watch(self, area: atlas_pb2.Area, *, finest_level: int = 0, coarsest_level: int = 0,
+              interval_ms: int = 1000) -> Watch:
+        """Tells what changes in an area, at most once in an interval, until it is cancelled."""
+        deadline = self._deadline(0)
+        request_id = self._send(atlas_pb2.WatchRequest(area=area, finest_level=finest_level,
+                                                       coarsest_level=coarsest_level, interval_ms=interval_ms))
+        return Watch(self._connection, request_id, self._cancel, deadline)
+
+    def _cancel(self, request_id: int) -> bool:
+        """False: there was no watch under that id any more."""
+        return self._call(atlas_pb2.CancelRequest(request_id=request_id)).cancelled
 
     def _call(self, request: Message, timeout_ms: int = 0) -> Message:
         return self.result(self.submit(request), timeout_ms)
@@ -176,6 +210,10 @@ class AtlasClient:
 
     def _deadline(self, timeout_ms: int) -> float:
         return time.monotonic() + self._timeout_s + timeout_ms / 1000
+
+
+def _session(resume: tuple[str, str] | None) -> atlas_pb2.Hello.Session | None:
+    return atlas_pb2.Hello.Session(vehicle=resume[0], session=resume[1]) if resume else None
 
 
 def _field_of(request: Message) -> str:

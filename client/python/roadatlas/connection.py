@@ -1,37 +1,32 @@
 """One TCP connection: frames out, frames in, replies sorted by the request they answer. For one thread.
 
 Sending never waits for the daemon alone: what arrives meanwhile is read, so that pipelined requests
-cannot lock both sides. Replies wait here, without a limit of their own, until they are asked for.
+cannot lock both sides. Replies wait here, without a limit of their own, until they are asked for; events of
+a watch that are not fetched become one.
 """
 
-import selectors
-import socket
-import time
 from collections import deque
 
 import atlas_pb2
 from google.protobuf.message import DecodeError
 
-from roadatlas.errors import BrokenReply, ConnectionLost, DeadlinePassed, RequestRefused, RoadAtlasError
+from roadatlas.changes import merge_events
+from roadatlas.errors import BrokenReply, ConnectionLost, DeadlinePassed, RequestRefused, RoadAtlasError, TlsFailed
 from roadatlas.framing import HEADER, MAX_HELLO_BYTES, MAX_PAYLOAD_BYTES, FrameReader, encode_frame
+from roadatlas.tls import Tls
+from roadatlas.transport import Transport
 
 MAX_IN_FLIGHT = 64  # requests that the daemon reads before the first of them is answered
-_READ_BYTES = 1 << 16
-_MORE_FOLLOW = ("tile", "sync_manifest")  # bodies that do not end a reply
+MAX_WAITING_EVENTS = 16  # of one watch; what comes beyond them is told in the last one
+_MORE_FOLLOW = ("tile", "sync_manifest", "watch_event")  # bodies that do not end a reply
 
 
 class Connection:
     """Closed by `close`, or by leaving a `with` block."""
 
-    def __init__(self, host: str, port: int, timeout_s: float) -> None:
-        try:
-            self._socket = socket.create_connection((host, port), timeout=timeout_s)
-        except OSError as error:
-            raise ConnectionLost(f"{host}:{port}: {error}") from error
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.setblocking(False)
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._socket, selectors.EVENT_READ)
+    def __init__(self, host: str, port: int, timeout_s: float, tls: Tls | None = None) -> None:
+        self._transport = Transport(host, port, timeout_s, tls)
+        self._was_heard = tls is not None
         self._reader = FrameReader()
         self._to_send = bytearray()
         self._arrived: dict[int, deque[atlas_pb2.Envelope]] = {}
@@ -54,19 +49,26 @@ class Connection:
             while self._to_send and self._end is None:
                 self._exchange(deadline)
         except DeadlinePassed:
-            self._give_up(self._last_id)
+            self.forget(self._last_id)
             raise
         return self._last_id
 
     def receive(self, request_id: int, deadline: float) -> atlas_pb2.Envelope:
         """The next frame under that id. RequestRefused for an Error; after DeadlinePassed there are no more."""
+        envelope = self.poll(request_id, deadline)
+        if envelope is None:
+            self.forget(request_id)
+            raise DeadlinePassed("no answer in time")
+        return envelope
+
+    def poll(self, request_id: int, deadline: float) -> atlas_pb2.Envelope | None:
+        """As `receive`, but that nothing came until then means no more than that."""
         arrived = self._arrived[request_id]
         try:
             while not arrived:
                 self._exchange(deadline)
         except DeadlinePassed:
-            self._give_up(request_id)
-            raise
+            return None
         envelope = arrived.popleft()
         if is_last(envelope):
             del self._arrived[request_id]
@@ -74,47 +76,45 @@ class Connection:
             raise refusal(envelope)
         return envelope
 
-    def close(self) -> None:
-        self._selector.close()
-        self._socket.close()
-
-    def _give_up(self, request_id: int) -> None:
+    def forget(self, request_id: int) -> None:
         """What still comes for it is dropped."""
-        self._given_up.add(request_id)
-        del self._arrived[request_id]
+        self._arrived.pop(request_id, None)
+        if request_id in self._unanswered:
+            self._given_up.add(request_id)
+
+    def close(self) -> None:
+        self._transport.close()
 
     def _exchange(self, deadline: float) -> None:
         """Sends what can be sent and takes what has come; waits for either."""
         if self._end is not None:
             raise self._end
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._to_send else 0)
-        self._selector.modify(self._socket, events)
-        ready = self._selector.select(max(0.0, deadline - time.monotonic()))
-        if not ready:
+        may_read, may_send = self._transport.wait(bool(self._to_send), deadline)
+        if not may_read and not may_send:
             raise DeadlinePassed("no answer in time")
         try:
-            if ready[0][1] & selectors.EVENT_WRITE:
+            if may_send:
                 self._put()
-            if ready[0][1] & selectors.EVENT_READ:
-                self._take(self._socket.recv(_READ_BYTES))
-        except BlockingIOError:
-            pass
-        except OSError as error:
-            self._end = ConnectionLost(str(error))
-        except BrokenReply as error:
+            if may_read:
+                self._take(self._transport.receive())
+        except (ConnectionLost, TlsFailed, BrokenReply) as error:
             self._end = error
 
     def _put(self) -> None:
         """A daemon that reads no more may have said why: what it sent is still read."""
         try:
-            del self._to_send[:self._socket.send(self._to_send[:_READ_BYTES])]
-        except (BrokenPipeError, ConnectionResetError):
+            del self._to_send[:self._transport.send(self._to_send)]
+        except BrokenPipeError:
             self._to_send.clear()
 
-    def _take(self, data: bytes) -> None:
+    def _take(self, data: bytes | None) -> None:
+        if data is None:
+            return
         if not data:
             self._reader.finish()
-            self._end = ConnectionLost("the daemon closed the connection")
+            self._end = ConnectionLost("the daemon closed the connection" if self._was_heard else
+                                       "the daemon closed the connection without a word: does it expect TLS?")
+        self._was_heard = True
         for payload in self._reader.feed(data):
             self.bytes_received += HEADER.size + len(payload)
             try:
@@ -132,9 +132,16 @@ class Connection:
         if is_last(envelope):
             self._unanswered.remove(request_id)
         if request_id not in self._given_up:
-            self._arrived[request_id].append(envelope)
+            self._keep(envelope, self._arrived[request_id])
         elif is_last(envelope):
             self._given_up.remove(request_id)
+
+    @staticmethod
+    def _keep(envelope: atlas_pb2.Envelope, arrived: deque[atlas_pb2.Envelope]) -> None:
+        if len(arrived) >= MAX_WAITING_EVENTS and envelope.WhichOneof("body") == "watch_event":
+            merge_events(arrived[-1].watch_event, envelope.watch_event)
+        else:
+            arrived.append(envelope)
 
 
 def is_last(envelope: atlas_pb2.Envelope) -> bool:

@@ -42,6 +42,22 @@ class ConnectionLost(RoadAtlasError):
     """The daemon is not there, closed the connection, or the network broke."""
 
 
+class BadCredentials(RoadAtlasError):
+    """A certificate, key or token file that is of no use, or half of what it takes: a setting of ours."""
+
+
+class TlsFailed(RoadAtlasError):
+    """TLS could not begin, or was ended by the daemon: it fails again until a setting changes, here or there."""
+
+
+class UntrustedDaemon(TlsFailed):
+    """Its certificate has expired, or is from nobody that we trust, or names another daemon."""
+
+
+class CertificateRefused(TlsFailed):
+    """The daemon does not take the certificate that we showed."""
+
+
 class DeadlinePassed(RoadAtlasError):
     """The daemon did not answer in the time that this client allows."""
 
@@ -72,3 +88,7 @@ class FrameCut(FrameError):
 
 class BadTileBlob(BrokenReply):
     """A tile blob that breaks docs/formats/tile.md."""
+
+
+class UselessDelta(BadTileBlob):
+    """A delta that does not give the content that it should: damaged, or its base is not what is held."""

@@ -9,9 +9,10 @@ import atlas_pb2
 import xxhash
 
 from roadatlas.client import AtlasClient, SyncReply
-from roadatlas.errors import BadTileBlob
+from roadatlas.errors import BadTileBlob, UselessDelta
 from roadatlas.geometry import block_of, index_in_block
 from roadatlas.tile_blob import merge_tile_blobs, parse_tile_blob
+from roadatlas.tile_delta import CAN_APPLY, apply_delta
 
 ALL_SECTIONS: frozenset[int] = frozenset()
 MAX_HELD = 65_536  # tiles that one request may tell one by one; as many blocks
@@ -31,27 +32,32 @@ class StoredTile:
 class TileStore:
     """Tiles by key. Nothing of it depends on a daemon: it holds across restarts and between daemons."""
 
-    def __init__(self) -> None:
+    def __init__(self, takes_deltas: bool = CAN_APPLY) -> None:
+        """`takes_deltas`: changed tiles may come as deltas to what is held, which needs python3-zstandard."""
+        if takes_deltas and not CAN_APPLY:
+            raise ValueError("deltas need the package python3-zstandard")
+        self._takes_deltas = takes_deltas
         self.tiles: dict[int, StoredTile] = {}
         self._differing: set[int] = set()  # blocks whose tiles are told one by one
 
     def synchronize(self, client: AtlasClient, request: atlas_pb2.SyncRequest) -> Iterator[SyncReply]:
         """Asks until the store holds all that `request` wants, as the daemon has it; gives each reply once applied.
 
-        The held tiles and the cursor of `request` are set here. A budget and a time bound each reply; stop when
+        The held tiles, cursor and `takes_deltas` of `request` are set here. A budget and a time bound each reply; stop when
         enough came. It ends too, with a cursor in the last reply, when these have no room for the next tile.
         """
         asked = atlas_pb2.SyncRequest()
         asked.CopyFrom(request)
         asked.cursor = b""
+        asked.takes_deltas = self._takes_deltas
         while True:
             del asked.held[:]
             asked.held.extend(self.held())
             reply = client.sync(asked)
-            self.apply(asked, reply)
+            useless = self.apply(asked, reply)
             yield reply
-            if reply.differing_blocks:
-                asked.cursor = b""  # from the start, with the tiles of these blocks told one by one
+            if reply.differing_blocks or useless:
+                asked.cursor = b""  # from the start: tiles of these blocks told one by one, the useless not at all
             elif reply.end.cursor and reply.tiles:
                 asked.cursor = reply.end.cursor
             else:
@@ -59,14 +65,24 @@ class TileStore:
         if not reply.end.cursor:
             self._differing.clear()
 
-    def apply(self, request: atlas_pb2.SyncRequest, reply: SyncReply) -> None:
-        """Takes what came and drops what is no more. BadTileBlob, and nothing changed, for a damaged blob."""
+    def apply(self, request: atlas_pb2.SyncRequest, reply: SyncReply) -> list[int]:
+        """Takes what came and drops what is no more. BadTileBlob, and nothing changed, for a damaged blob.
+
+        Keys of tiles that came as deltas to what is not held any more: these are dropped, too. Ask again.
+        """
         wanted = frozenset(request.sections)
-        came = {tile.key: self._joined(tile, wanted) for tile in reply.tiles}
+        came: dict[int, StoredTile] = {}
+        useless: list[int] = []
+        for tile in reply.tiles:
+            try:
+                came[tile.key] = self._patched(tile, wanted) if tile.base_hash else self._joined(tile, wanted)
+            except UselessDelta:
+                useless.append(tile.key)
         self.tiles.update(came)
-        for key in reply.removed:
+        for key in [*reply.removed, *useless]:
             self.tiles.pop(key, None)
         self._differing.update(reply.differing_blocks)
+        return useless
 
     def held(self) -> list[atlas_pb2.Held]:
         """What is held, by the sections of it: in blocks, and one by one where a block was said to differ or is held
@@ -95,6 +111,14 @@ class TileStore:
     def _group(self, groups: dict[frozenset[int], atlas_pb2.Held], key: int) -> atlas_pb2.Held:
         sections = self.tiles[key].sections
         return groups.setdefault(sections, atlas_pb2.Held(sections=sorted(sections)))
+
+    def _patched(self, tile: atlas_pb2.TileMessage, wanted: frozenset[int]) -> StoredTile:
+        """The tile made of what is held of it, with the sections that are wanted and no others."""
+        held = self.tiles.get(tile.key)
+        if held is None or held.payload_hash != tile.base_hash:
+            raise UselessDelta(f"tile {tile.key:#018x} came as a delta to what is not held")
+        blob = apply_delta(held.blob, tile.blob, None if wanted else tile.payload_hash)
+        return StoredTile(tile.revision, tile.payload_hash, wanted, blob)
 
     def _joined(self, tile: atlas_pb2.TileMessage, wanted: frozenset[int]) -> StoredTile:
         """The tile with what is held of the same content."""

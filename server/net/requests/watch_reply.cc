@@ -5,7 +5,10 @@
 #include <memory>
 #include <utility>
 
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
 #include "server/net/requests/request_conversion.h"
 #include "server/net/requests/sync_conversion.h"
@@ -36,10 +39,21 @@ void EventToWire(const TileChanges& changes, wire::WatchEvent& event) {
   event.set_anything(changes.is_anything);
 }
 
-asio::awaitable<void> Pause(milliseconds time) {
+// Ends early when nobody waits for what comes then. Both tokens are of the connection's thread.
+asio::awaitable<void> Pause(milliseconds time,
+                            const std::stop_token& cancelled,
+                            const std::stop_token& peer_left) {
   const auto executor = co_await asio::this_coro::executor;
   asio::steady_timer timer(executor, time);
-  co_await timer.async_wait(asio::use_awaitable);
+  const auto end = [&timer] {
+    timer.cancel();
+  };
+  const std::stop_callback on_cancelled(cancelled, end);
+  const std::stop_callback on_left(peer_left, end);
+  if (!cancelled.stop_requested() && !peer_left.stop_requested()) {
+    boost::system::error_code ignored;  // the time is over, or it was ended
+    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+  }
 }
 
 }  // namespace
@@ -76,7 +90,7 @@ asio::awaitable<Status> SendWatch(AtlasService& service,
     if (!is_open) {
       break;
     }
-    co_await Pause(IntervalOf(message));
+    co_await Pause(IntervalOf(message), cancelled, peer_left);
     changes = (*watch)->Take();
     while (changes.empty() && !cancelled.stop_requested() && !peer_left.stop_requested()) {
       co_await wake_up->Wait();

@@ -2,6 +2,7 @@
 """`python3 -m roadatlas` as docs/python.md shows it."""
 
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
@@ -32,6 +33,24 @@ class CommandTest(AtlasCase):
         self.assertEqual(found, {"_".join(map(str, geometry.tile_place(key))) + ".tile": tile.blob
                                  for key, tile in self.map_now().items()})
         self.assertIn(f"{len(found)} tiles, ", done.stdout)
+
+    def test_watch_tells_what_changes(self):
+        watching = subprocess.Popen([sys.executable, "-B", "-m", "roadatlas", "watch", "--server", self.daemon.server,
+                                     "--disc", "0", "0", "50", "--interval", "0.05"], stdout=subprocess.PIPE,
+                                    stderr=subprocess.PIPE, text=True)
+        try:
+            self.assertEqual(watching.stdout.readline(), "from revision 0 on\n")
+            self.client.upload_keyframe(self.upload(0, 0))
+            self.assertRegex(watching.stdout.readline(), r"^revision \d+: changed \d+/-?\d+/-?\d+\n$")
+            watching.send_signal(signal.SIGINT)
+            self.assertEqual((watching.wait(60), watching.stderr.read()), (130, ""))
+        finally:
+            watching.kill()
+            watching.communicate()
+
+    def test_watch_ends_when_its_time_is_over(self):
+        done = self.run_command("watch", "--disc", 0, 0, 50, "--seconds", 0.2)
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "from revision 0 on\n", ""))
 
     def test_failures_say_why(self):
         out = self.enterContext(tempfile.TemporaryDirectory())

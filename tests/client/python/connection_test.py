@@ -128,9 +128,10 @@ class BrokenSyncTest(unittest.TestCase):
         manifest = {"sync_manifest": {"keys": [1], "revisions": [2], "payload_hashes": [3], "bytes": [1]}}
         tile = {"tile": {"key": 1, "revision": 2, "payload_hash": 3, "blob": b"x"}}
         other = {"tile": {"key": 1, "revision": 2, "payload_hash": 4, "blob": b"x"}}
+        delta = {"tile": {**tile["tile"], "base_hash": 5}}
         end = {"sync_end": {"tiles": 1}}
-        for bodies in ([tile], [end], [manifest, end], [manifest, other], [manifest, tile, tile],
-                       [manifest, manifest]):
+        for bodies in ([tile], [end], [manifest, end], [manifest, other], [manifest, delta],
+                       [manifest, tile, tile], [manifest, manifest]):
             with self.assertRaises(BrokenReply):
                 self.sync(bodies)
         self.assertEqual(len(self.sync([manifest, tile, end]).tiles), 1)

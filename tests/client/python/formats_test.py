@@ -7,14 +7,15 @@ import unittest
 
 import xxhash
 from keyframes import Cell, Keyframe, encode_body, with_checksum
-from roadatlas.errors import BadTileBlob
+from roadatlas.errors import BadTileBlob, UselessDelta
 from roadatlas.profile import parse_profile
 from roadatlas.tile_blob import encode_tile_blob, merge_tile_blobs, parse_tile_blob
+from roadatlas.tile_delta import apply_delta
 from support import ROOT
 from tile_payload import canonical_payload, decompress
 
-PROFILE, KEYFRAME, TILE = ((ROOT / "tests/golden" / name).read_bytes()
-                           for name in ("profile_v3.bin", "keyframe_v1.bin", "tile_v2.bin"))
+PROFILE, KEYFRAME, TILE, DELTA = ((ROOT / "tests/golden" / name).read_bytes() for name in
+                                  ("profile_v3.bin", "keyframe_v1.bin", "tile_v2.bin", "tile_delta_v2.bin"))
 KEYFRAME_HEADER = struct.Struct("<4sBQIH4iiII")
 
 
@@ -97,10 +98,55 @@ class GoldenFileTest(unittest.TestCase):
 
     def test_sections_of_two_tiles_do_not_make_one(self):
         tile = parse_tile_blob(TILE)
-        other = dataclasses.replace(tile, head=tile.head[:5] + struct.pack("<Q", tile.key + 1) + tile.head[13:])
+        other = dataclasses.replace(tile, place=tile.place[:1] + struct.pack("<Q", tile.key + 1) + tile.place[9:])
         self.assertEqual(merge_tile_blobs(TILE, TILE), TILE)
         with self.assertRaises(BadTileBlob):
             merge_tile_blobs(TILE, encode_tile_blob(other))
+
+    def test_delta(self):
+        """It is to the golden tile; a few layers were seen once more, and nothing else changed."""
+        blob = apply_delta(TILE, DELTA, None)
+        before, after = sections_of(TILE), sections_of(blob)
+        self.assertEqual({section_id for section_id in before if before[section_id] != after.get(section_id)}, {2})
+        self.assertEqual(before.keys(), after.keys())
+        payload_hash = xxhash.xxh64_intdigest(canonical_payload(blob))
+        self.assertEqual(apply_delta(TILE, DELTA, payload_hash), blob)
+        with self.assertRaises(UselessDelta):
+            apply_delta(TILE, DELTA, payload_hash ^ 1)
+        tile = parse_tile_blob(TILE)
+        elsewhere = tile.place[:1] + struct.pack("<Q", tile.key + 1) + tile.place[9:]
+        for other in (dataclasses.replace(tile, sections=tile.sections[:1] + tile.sections[2:]),
+                      dataclasses.replace(tile, place=elsewhere)):
+            with self.assertRaises(UselessDelta):
+                apply_delta(encode_tile_blob(other), DELTA, None)
+
+    def test_content_that_a_delta_does_not_promise(self):
+        header_bytes, entry_bytes, hash_at = 24, 18, 10
+        table_end = header_bytes + 4 * entry_bytes
+        for section in range(4):
+            head = bytearray(DELTA[:table_end])
+            head[header_bytes + section * entry_bytes + hash_at] ^= 1
+            head += struct.pack("<Q", xxhash.xxh64_intdigest(head))
+            with self.assertRaisesRegex(UselessDelta, f"section {section + 1} has another content"):
+                apply_delta(TILE, bytes(head) + DELTA[table_end + 8:], None)
+
+    def test_no_damage_of_a_delta_makes_another_content(self):
+        right = canonical_payload(apply_delta(TILE, DELTA, None))
+        for bit in range(8 * len(DELTA)):
+            damaged = bytearray(DELTA)
+            damaged[bit // 8] ^= 1 << bit % 8
+            try:
+                self.assertEqual(canonical_payload(apply_delta(TILE, bytes(damaged), None)), right)
+            except UselessDelta:
+                pass
+        for size in range(len(DELTA)):
+            with self.assertRaises(UselessDelta):
+                apply_delta(TILE, DELTA[:size], None)
+
+
+def sections_of(blob):
+    return {section.id: decompress(section.data, section.uncompressed_bytes)
+            for section in parse_tile_blob(blob).sections}
 
 
 if __name__ == "__main__":

@@ -152,6 +152,31 @@ TEST_F(WatchTest, EndsWhenItIsCancelled) {
   EXPECT_TRUE(peer->Receive()->has_watch_event()) << "the id is free again";
 }
 
+TEST_F(WatchTest, ALongIntervalHoldsNoEndUp) {
+  net_.max_watches = 1;
+  Serve();
+  wire::Envelope watch = WatchOf(5);
+  watch.mutable_watch_request()->set_interval_ms(60'000);
+  for (int i = 0; i < 3; ++i) {  // one place: each must be given back
+    const auto peer = Connect();
+    peer->Send(watch);
+    ASSERT_TRUE(peer->Receive()->has_watch_event());
+    peer->Send(CancelOf(6, 5));
+    std::set<std::uint64_t> answered;
+    for (int replies = 0; replies < 2; ++replies) {
+      const auto reply = peer->Receive();
+      ASSERT_TRUE(reply.has_value());
+      answered.insert(reply->request_id());
+    }
+    EXPECT_EQ(answered, (std::set<std::uint64_t>{5, 6}));
+  }
+  const auto peer = Connect();
+  peer->Send(watch);
+  ASSERT_TRUE(peer->Receive()->has_watch_event());
+  server_->Stop();
+  EXPECT_TRUE(HasDrained());
+}
+
 TEST_F(WatchTest, EndsWithItsConnectionAndWithTheDaemon) {
   net_.max_watches = 1;
   Serve();

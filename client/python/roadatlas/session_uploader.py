@@ -1,0 +1,120 @@
+"""Uploads a session, and goes on behind what the daemon has when the connection broke (docs/protocol.md)."""
+
+import dataclasses
+import random
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+
+import atlas_pb2
+
+from roadatlas.client import AtlasClient
+from roadatlas.errors import ConnectionLost, DeadlinePassed, FrameCut, RequestRefused, RoadAtlasError
+
+ON_THEIR_WAY = 32  # keyframes sent and not answered
+_LONGEST_PAUSE_S = 30.0
+
+
+@dataclasses.dataclass
+class UploadReport:
+    """Sequence numbers: acknowledged in this call, there already as the daemon says, refused for good and why."""
+
+    acknowledged: list[int] = dataclasses.field(default_factory=list)
+    there_already: list[int] = dataclasses.field(default_factory=list)
+    refused: dict[int, RequestRefused] = dataclasses.field(default_factory=dict)
+
+
+class SessionUploader:
+    """Connects for itself, and again after a failure that may pass."""
+
+    def __init__(self, connect: Callable[..., AtlasClient], vehicle: str, session: str, *, attempts: int = 8,
+                 first_pause_s: float = 0.5) -> None:
+        """`connect` makes a client and takes `resume`: functools.partial(AtlasClient, host, port). Gives up when so
+        many `attempts` in a row brought nothing forward; the pause between these doubles."""
+        self._connect = connect
+        self._vehicle = vehicle
+        self._session = session
+        self._attempts = attempts
+        self._first_pause_s = first_pause_s
+
+    def upload(self, uploads: Iterable[atlas_pb2.UploadKeyframe]) -> UploadReport:
+        """All of them, by sequence number. Raises why it gave up; what is on disk is not sent by the next call."""
+        work = _Work(uploads, self._vehicle, self._session)
+        failures = 0
+        while work.waiting:
+            before = len(work.waiting)
+            failure = self._attempt(work)
+            if not work.waiting:
+                break
+            failures = 0 if len(work.waiting) < before else failures + 1
+            if failures >= self._attempts:
+                raise failure
+            time.sleep(self._pause_s(failures, failure))
+        return work.report
+
+    def _attempt(self, work: "_Work") -> RoadAtlasError | None:
+        """Why something is left, if it may pass."""
+        try:
+            with self._connect(resume=(self._vehicle, self._session)) as client:
+                work.skip(client.last_sequence)
+                work.send(client)
+        except RequestRefused as error:
+            if not error.retry:
+                raise
+            return error
+        except (ConnectionLost, DeadlinePassed, FrameCut) as error:
+            return error
+        return next(iter(work.postponed.values()), None)
+
+    def _pause_s(self, failures: int, failure: RoadAtlasError) -> float:
+        asked_s = failure.retry_after_ms / 1000 if isinstance(failure, RequestRefused) else 0.0
+        ours_s = random.uniform(0.5, 1) * min(self._first_pause_s * 2**failures, _LONGEST_PAUSE_S)
+        return max(asked_s, ours_s)
+
+
+class _Work:
+    """What is left, by rising sequence number. `postponed`: refused for now; the daemon may have what is behind them,
+    so that its last sequence number says nothing about these."""
+
+    def __init__(self, uploads: Iterable[atlas_pb2.UploadKeyframe], vehicle: str, session: str) -> None:
+        self.waiting: dict[int, atlas_pb2.UploadKeyframe] = {}
+        self.postponed: dict[int, RequestRefused] = {}
+        self.report = UploadReport()
+        for upload in sorted(uploads, key=lambda upload: upload.key.sequence):
+            if (upload.key.vehicle, upload.key.session) != (vehicle, session) or upload.key.sequence in self.waiting:
+                raise ValueError(f"keyframe {upload.key.vehicle}/{upload.key.session}/{upload.key.sequence} comes "
+                                 f"twice or is not of {vehicle}/{session}")
+            self.waiting[upload.key.sequence] = upload
+
+    def skip(self, last_sequence: int | None) -> None:
+        there = [] if last_sequence is None else [sequence for sequence in self.waiting if sequence <= last_sequence
+                                                  and sequence not in self.postponed]
+        for sequence in there:
+            del self.waiting[sequence]
+        self.report.there_already += there
+
+    def send(self, client: AtlasClient) -> None:
+        on_their_way: deque[tuple[int, int]] = deque()
+        try:
+            for sequence, upload in list(self.waiting.items()):
+                on_their_way.append((sequence, client.submit(upload)))
+                if len(on_their_way) >= ON_THEIR_WAY:
+                    self._take_reply(client, *on_their_way.popleft())
+        finally:  # what was answered before the connection broke counts
+            while on_their_way:
+                self._take_reply(client, *on_their_way.popleft())
+
+    def _take_reply(self, client: AtlasClient, sequence: int, request_id: int) -> None:
+        try:
+            reply = client.result(request_id)
+        except RequestRefused as refusal:
+            if refusal.request_id == 0:
+                raise
+            if refusal.retry:
+                self.postponed[sequence] = refusal
+                return
+            self.report.refused[sequence] = refusal
+        else:
+            (self.report.there_already if reply.duplicate else self.report.acknowledged).append(sequence)
+        del self.waiting[sequence]
+        self.postponed.pop(sequence, None)

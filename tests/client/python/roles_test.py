@@ -1,0 +1,77 @@
+#!/usr/bin/python3
+"""Who may ask for what, as docs/protocol.md has it. A refusal leaves the connection as it was."""
+
+import signal
+import unittest
+
+import atlas_pb2
+from fleet import FleetCase, keyframe_of
+from roadatlas import Code, RequestRefused, geometry
+from roadatlas.errors import ConnectionLost
+from support import pose_at
+
+RETRACT = atlas_pb2.ChangeSession.RETRACT
+
+
+class RolesTest(FleetCase):
+
+    def setUp(self):
+        super().setUp()
+        self.car, self.merge, self.reader = (self.connect(self.tls(who)) for who in ("car.7", "aligner", "reader"))
+        self.admin = self.connect(self.tls(), token=self.token())
+
+    def refused(self, client, call, *args):
+        with self.assertRaisesRegex(RequestRefused, client.name) as caught:
+            call(*args)
+        self.assertEqual((caught.exception.code, caught.exception.retry), (Code.PERMISSION_DENIED, False))
+        self.assertEqual(client.status().keyframes, self.admin.status().keyframes)
+
+    def test_uploads(self):
+        for client, vehicle in ((self.car, "car.8"), (self.merge, "aligner"), (self.reader, "reader")):
+            self.refused(client, client.upload_keyframe, keyframe_of(vehicle, client))
+        self.assertEqual(self.admin.status().keyframes, 0)
+        self.car.upload_keyframe(keyframe_of("car.7", self.car))
+        self.admin.upload_keyframe(keyframe_of("car.8", self.admin))
+        self.assertEqual(self.reader.status().keyframes, 2)
+
+    def test_poses(self):
+        for vehicle in ("car.7", "car.8"):
+            self.admin.upload_keyframe(keyframe_of(vehicle, self.admin))
+        other, own = ([atlas_pb2.PoseUpdate(key=keyframe_of(vehicle, self.car).key, pose=pose_at(2))]
+                      for vehicle in ("car.8", "car.7"))
+        self.refused(self.car, self.car.update_poses, other)
+        self.refused(self.car, self.car.update_poses, own + other)
+        self.refused(self.reader, self.reader.update_poses, own)
+        self.assertEqual(self.car.update_poses(own).updated, 1)
+        self.assertEqual(self.merge.update_poses(other).updated, 1)
+
+    def test_sessions_and_verifications(self):
+        self.car.upload_keyframe(keyframe_of("car.7", self.car))
+        verify = atlas_pb2.VerifyRequest(timeout_ms=60_000)
+        for client in (self.car, self.reader):
+            self.refused(client, client.change_session, "car.7", "s", RETRACT)
+            self.refused(client, lambda client=client: client.result(client.submit(verify), 60_000))
+        self.refused(self.merge, self.merge.change_session, "car.7", "s", RETRACT)
+        self.assertEqual(self.merge.result(self.merge.submit(verify), 60_000).damaged, 0)
+        self.assertTrue(self.admin.change_session("car.7", "s", RETRACT).changed)
+
+    def test_everybody_reads_and_watches(self):
+        for client in (self.car, self.merge, self.reader, self.admin):
+            client.sync(atlas_pb2.SyncRequest(area=geometry.disc(0, 0, 50)))
+            client.watch(geometry.disc(0, 0, 50)).cancel()
+
+    def test_token_that_is_taken_back_ends_what_is_open(self):
+        watch = self.admin.watch(geometry.disc(0, 0, 50))
+        (self.folder / "tokens").rename(self.folder / "tokens.before")
+        self.addCleanup(lambda: (self.folder / "tokens.before").rename(self.folder / "tokens"))
+        (self.folder / "tokens").write_text("# nobody\n", encoding="ascii")
+        self.daemon.process.send_signal(signal.SIGHUP)
+        with self.assertRaises((ConnectionLost, RequestRefused)):
+            self.assertIsNone(watch.next(30))
+        with self.assertRaises((ConnectionLost, RequestRefused)):
+            self.admin.status()
+        self.assertEqual(self.car.status().keyframes, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
