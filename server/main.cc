@@ -1,16 +1,12 @@
 // atlasd: opens the store, starts fusion, serves until it is told to stop.
 
-#include <algorithm>
-#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <memory>
 #include <optional>
-#include <random>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -19,14 +15,15 @@
 
 #include "core/base/str_cat.h"
 #include "server/base/log_format.h"
+#include "server/base/open_files.h"
 #include "server/config/daemon_command.h"
 #include "server/config/live_config.h"
+#include "server/daemon_parts.h"
 #include "server/hangup_watch.h"
 #include "server/net/tcp_server.h"
 #include "server/operations_port.h"
 #include "server/service/atlas_service.h"
 #include "server/service/process_memory.h"
-#include "server/store/sqlite/sqlite_store.h"
 
 namespace atlas {
 namespace {
@@ -62,101 +59,6 @@ std::int64_t NowMs() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
-}
-
-std::array<std::uint8_t, 16> RandomId() {
-  std::random_device random;
-  std::array<std::uint8_t, 16> id{};
-  for (std::uint8_t& byte : id) {
-    byte = static_cast<std::uint8_t>(random());
-  }
-  return id;
-}
-
-Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
-  const Result<MapProfile> profile = config.NewProfile();
-  if (!profile) {
-    return Error(profile.error());
-  }
-  SqliteStoreOptions options;
-  options.directory = config.data;
-  options.new_profile = *profile;
-  options.new_atlas_id = RandomId();
-  Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
-  if (store) {
-    if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  return store;
-}
-
-unsigned WorkersFrom(const DaemonConfig& config) {
-  if (!config.is_fusing) {
-    return 0;
-  }
-  return config.workers > 0 ? static_cast<unsigned>(config.workers)
-                            : std::max(1U, std::thread::hardware_concurrency());
-}
-
-ServiceOptions ServiceFrom(const DaemonConfig& config) {
-  ServiceOptions options;
-  options.fusion.workers = WorkersFrom(config);
-  options.fusion.nice = config.fusion_nice;
-  options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
-  options.fusion.building.surveys =
-      SurveyCacheLimits::OfTotal(static_cast<std::size_t>(config.survey_mib) << 20);
-  options.fusion.building.survey_files.directory = config.data / "surveys";
-  options.fusion.building.survey_files.max_bytes = static_cast<std::size_t>(config.survey_disk_mib)
-                                                   << 20;
-  options.scratch_directory = config.data;
-  return options;
-}
-
-NameLimits NameLimitsFrom(const DaemonConfig& config) {
-  NameLimits limits;
-  limits.connections = static_cast<std::size_t>(config.name_connections);
-  limits.held_bytes = static_cast<std::size_t>(config.name_held_mib) << 20;
-  limits.requests_per_s = config.name_requests_per_s;
-  limits.bytes_per_s = config.name_mib_per_s * double{1u << 20};
-  return limits;
-}
-
-NetOptions NetFrom(const DaemonConfig& config) {
-  NetOptions options;
-  options.threads = config.network_threads > 0
-                        ? config.network_threads
-                        : std::max(1, static_cast<int>(std::thread::hardware_concurrency() / 4));
-  options.of_name = NameLimitsFrom(config);
-  options.tile_frame_bytes = static_cast<std::size_t>(config.reply_mib) << 20;
-  return options;
-}
-
-Result<ServerSecurity> SecurityFrom(const DaemonConfig& config) {
-  const std::optional<Role> anonymous = RoleByName(config.AnonymousRole());
-  if (!anonymous) {
-    return Error(StatusCode::kInvalidArgument,
-                 StrCat("access.anonymous is '", config.AnonymousRole(),
-                        "', expected none, reader, vehicle, merge or admin"));
-  }
-  TokenList tokens;
-  if (!config.tokens.empty()) {
-    Result<TokenList> read = TokenList::Read(config.tokens);
-    if (!read) {
-      return Error(read.error());
-    }
-    tokens = *std::move(read);
-  }
-  ServerSecurity security;
-  security.access = std::make_shared<const AccessControl>(std::move(tokens), *anonymous);
-  if (!config.tls_certificate.empty()) {
-    auto tls = TlsContext::Load({config.tls_certificate, config.tls_key, config.tls_client_ca});
-    if (!tls) {
-      return Error(tls.error());
-    }
-    security.tls = *std::move(tls);
-  }
-  return security;
 }
 
 void Log(LogLevel level, const std::string& message) {
@@ -242,8 +144,22 @@ LiveConfig::Prepare PrepareNameLimits(TcpServer& server) {
   };
 }
 
+// A connection is a file, and the store has some.
+void AllowConnections(const NetOptions& options) {
+  constexpr std::size_t kOtherFiles = 256;
+  const std::size_t wanted = options.max_connections + kOtherFiles;
+  const std::size_t allowed = AllowOpenFiles(wanted);
+  if (allowed < wanted) {
+    spdlog::warn(
+        "the system allows {} open files: {} are needed for {} connections; raise the "
+        "limit (ulimit -n, LimitNOFILE)",
+        allowed, wanted, options.max_connections);
+  }
+}
+
 int Serve(LiveConfig& live) {
   const DaemonConfig config = live.config();
+  AllowConnections(NetFrom(config));
   Result<ServerSecurity> security = SecurityFrom(config);
   if (!security) {
     return Fail(security.error());

@@ -1,6 +1,4 @@
 // Where settings come from, which goes before which, and what a mistake says.
-#include "server/config/daemon_command.h"
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -9,6 +7,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "server/config/daemon_command.h"
 
 namespace atlas {
 namespace {

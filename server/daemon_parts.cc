@@ -1,0 +1,114 @@
+#include "server/daemon_parts.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <thread>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace atlas {
+namespace {
+
+std::array<std::uint8_t, 16> RandomId() {
+  std::random_device random;
+  std::array<std::uint8_t, 16> id{};
+  for (std::uint8_t& byte : id) {
+    byte = static_cast<std::uint8_t>(random());
+  }
+  return id;
+}
+
+unsigned WorkersFrom(const DaemonConfig& config) {
+  if (!config.is_fusing) {
+    return 0;
+  }
+  return config.workers > 0 ? static_cast<unsigned>(config.workers)
+                            : std::max(1U, std::thread::hardware_concurrency());
+}
+
+}  // namespace
+
+Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
+  const Result<MapProfile> profile = config.NewProfile();
+  if (!profile) {
+    return Error(profile.error());
+  }
+  SqliteStoreOptions options;
+  options.directory = config.data;
+  options.new_profile = *profile;
+  options.new_atlas_id = RandomId();
+  Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
+  if (store) {
+    if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return store;
+}
+
+ServiceOptions ServiceFrom(const DaemonConfig& config) {
+  ServiceOptions options;
+  options.fusion.workers = WorkersFrom(config);
+  options.fusion.nice = config.fusion_nice;
+  options.fusion.building.keyframe_bytes = static_cast<std::size_t>(config.cache_mib) << 20;
+  options.fusion.building.surveys =
+      SurveyCacheLimits::OfTotal(static_cast<std::size_t>(config.survey_mib) << 20);
+  options.fusion.building.survey_files.directory = config.data / "surveys";
+  options.fusion.building.survey_files.max_bytes = static_cast<std::size_t>(config.survey_disk_mib)
+                                                   << 20;
+  options.scratch_directory = config.data;
+  return options;
+}
+
+NameLimits NameLimitsFrom(const DaemonConfig& config) {
+  NameLimits limits;
+  limits.connections = static_cast<std::size_t>(config.name_connections);
+  limits.held_bytes = static_cast<std::size_t>(config.name_held_mib) << 20;
+  limits.requests_per_s = config.name_requests_per_s;
+  limits.bytes_per_s = config.name_mib_per_s * double{1u << 20};
+  return limits;
+}
+
+NetOptions NetFrom(const DaemonConfig& config) {
+  NetOptions options;
+  options.threads = config.network_threads > 0
+                        ? config.network_threads
+                        : std::max(1, static_cast<int>(std::thread::hardware_concurrency() / 4));
+  options.of_name = NameLimitsFrom(config);
+  options.tile_frame_bytes = static_cast<std::size_t>(config.reply_mib) << 20;
+  return options;
+}
+
+Result<ServerSecurity> SecurityFrom(const DaemonConfig& config) {
+  const std::optional<Role> anonymous = RoleByName(config.AnonymousRole());
+  if (!anonymous) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("access.anonymous is '", config.AnonymousRole(),
+                        "', expected none, reader, vehicle, merge or admin"));
+  }
+  TokenList tokens;
+  if (!config.tokens.empty()) {
+    Result<TokenList> read = TokenList::Read(config.tokens);
+    if (!read) {
+      return Error(read.error());
+    }
+    tokens = *std::move(read);
+  }
+  ServerSecurity security;
+  security.access = std::make_shared<const AccessControl>(std::move(tokens), *anonymous);
+  if (!config.tls_certificate.empty()) {
+    auto tls = TlsContext::Load({config.tls_certificate, config.tls_key, config.tls_client_ca});
+    if (!tls) {
+      return Error(tls.error());
+    }
+    security.tls = *std::move(tls);
+  }
+  return security;
+}
+
+}  // namespace atlas
