@@ -4,6 +4,7 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/resource.h>
 
 namespace atlas {
@@ -22,6 +23,16 @@ TEST(ThreadPriorityTest, OneThreadStandsBackAndTheOthersDoNot) {
   }).join();
   EXPECT_EQ(inside, std::min(before + 2, 19));
   EXPECT_EQ(NiceOfThisThread(), before);
+}
+
+TEST(ThreadPriorityTest, TheNicestGetsWhatNobodyElseWants) {
+  int policy = SCHED_OTHER;
+  std::thread([&policy] {
+    EXPECT_TRUE(YieldToOthers(19));
+    policy = ::sched_getscheduler(0);
+  }).join();
+  EXPECT_EQ(policy, SCHED_IDLE);
+  EXPECT_EQ(::sched_getscheduler(0), SCHED_OTHER);
 }
 
 }  // namespace
