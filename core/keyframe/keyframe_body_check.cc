@@ -8,6 +8,8 @@ namespace atlas {
 namespace {
 
 constexpr std::uint64_t kLowestBits = 0x1111'1111'1111'1111;  // of each nibble
+constexpr std::uint64_t kLowNibbles = 0x0F0F'0F0F'0F0F'0F0F;
+constexpr std::uint64_t kEachByte = 0x0101'0101'0101'0101;
 constexpr std::size_t kWordBytes = sizeof(std::uint64_t);
 constexpr int kMaxColumnNibbles = 16;
 constexpr int kAltitudePlanes = 2;
@@ -25,6 +27,12 @@ std::uint64_t NonZeroNibbles(std::uint64_t word) {
   return (pairs | (pairs >> 2u)) & kLowestBits;
 }
 
+// Ones among the lowest bits of each nibble, of which alone `bits` has any.
+std::size_t CountNibbles(std::uint64_t bits) {
+  const std::uint64_t by_byte = (bits & kLowNibbles) + ((bits >> 4u) & kLowNibbles);
+  return by_byte * kEachByte >> 56u;
+}
+
 bool HasCleanPadding(ByteSpan nibbles, std::size_t count) {
   return count % 2 == 0 || (nibbles.back() >> 4u) == 0;
 }
@@ -37,7 +45,7 @@ bool CountSeen(ByteSpan states, std::size_t& seen) {
     const std::uint64_t is_seen = (word | (word >> 1u)) & kLowestBits;
     const std::uint64_t has_occupancy = ((word >> 2u) | (word >> 3u)) & kLowestBits;
     wrong |= has_occupancy & ~is_seen;
-    seen += static_cast<std::size_t>(std::popcount(is_seen));
+    seen += CountNibbles(is_seen);
   }
   return wrong == 0;
 }
@@ -67,7 +75,7 @@ bool AreColumns(ByteSpan planes, std::size_t count, std::size_t nibbles) {
       any |= word;
       last |= k + 1 == nibbles ? word : 0;
     }
-    filled += static_cast<std::size_t>(std::popcount(NonZeroNibbles(any)));
+    filled += CountNibbles(NonZeroNibbles(any));
   }
   return filled == count && (last != 0) == (nibbles > 0);
 }

@@ -18,13 +18,12 @@ TileBlock TileDirectory::Find(std::uint64_t block) {
 
 std::uint64_t TileDirectory::Version(std::uint64_t block) const {
   const std::lock_guard lock(mutex_);
-  return SlotOf(block).version;
+  return versions_[SlotOf(block)];
 }
 
 void TileDirectory::Insert(std::uint64_t block, std::uint64_t version, TileBlock tiles) {
   const std::lock_guard lock(mutex_);
-  const Slot& slot = SlotOf(block);
-  if (slot.version != version || slot.changing > 0) {
+  if (versions_[SlotOf(block)] != version) {
     return;
   }
   const std::size_t bytes = kBlockBytes + tiles->capacity() * sizeof(TileSummary);
@@ -33,20 +32,11 @@ void TileDirectory::Insert(std::uint64_t block, std::uint64_t version, TileBlock
   }
 }
 
-void TileDirectory::BeginChange(const TileId& id) {
+void TileDirectory::Forget(const TileId& id) {
   const std::uint64_t block = TileBlockOf(id.Key());
   const std::lock_guard lock(mutex_);
-  Slot& slot = SlotOf(block);
-  ++slot.version;
-  ++slot.changing;
+  ++versions_[SlotOf(block)];
   blocks_.Take(block);
-}
-
-void TileDirectory::EndChange(const TileId& id) {
-  const std::lock_guard lock(mutex_);
-  Slot& slot = SlotOf(TileBlockOf(id.Key()));
-  ++slot.version;
-  --slot.changing;
 }
 
 std::size_t TileDirectory::bytes() const {

@@ -1,9 +1,8 @@
 // Which tiles there are, as far as it was asked for lately: so that a vehicle that asks what is new
 // does not ask the disk. Disposable, bounded by bytes, thread-safe.
 //
-// It never tells less than what a reader of the store can see: whoever changes a tile calls
-// BeginChange() before that can be seen and EndChange() once it can, or never will; in between, and
-// where a block was read before, nothing of its block is kept.
+// It never tells less than what anybody was told of: whoever changes a tile calls Forget() once the
+// change can be seen, and before a word of it goes out. What was read before is not kept then.
 #pragma once
 
 #include <array>
@@ -24,28 +23,24 @@ class TileDirectory {
   TileBlock Find(std::uint64_t block);
   // To be called before the block is read from the store, for Insert().
   std::uint64_t Version(std::uint64_t block) const;
-  // Keeps it, unless one of its tiles changed since then, or is about to.
+  // Keeps it, unless one of its tiles changed since then.
   void Insert(std::uint64_t block, std::uint64_t version, TileBlock tiles);
 
-  void BeginChange(const TileId& id);
-  void EndChange(const TileId& id);
+  // The block of a tile that changed.
+  void Forget(const TileId& id);
 
   std::size_t bytes() const;
 
  private:
-  // Of all blocks that fall into it; one that changes too often only costs time.
-  struct Slot {
-    std::uint64_t version = 0;
-    std::uint32_t changing = 0;
-  };
+  // Of all blocks that fall into it: that another one changed only costs time.
+  static std::size_t SlotOf(std::uint64_t block) { return block % kSlots; }
 
-  Slot& SlotOf(std::uint64_t block) { return slots_[block % slots_.size()]; }
-  const Slot& SlotOf(std::uint64_t block) const { return slots_[block % slots_.size()]; }
+  static constexpr std::size_t kSlots = 1021;  // a prime: neighbours do not share one
 
   const std::size_t max_bytes_;
   mutable std::mutex mutex_;
   LruList<TileBlock> blocks_;
-  std::array<Slot, 1021> slots_{};  // a prime: neighbours do not share one
+  std::array<std::uint64_t, kSlots> versions_{};
 };
 
 }  // namespace atlas

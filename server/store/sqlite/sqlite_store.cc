@@ -85,14 +85,14 @@ class SqliteStore final : public AtlasStore {
   void FinishTile(FinishedTile tile, Done<FinishResult> done) override {
     const std::uint8_t levels = identity_.profile.levels;
     const TileId id = tile.claim.id;
-    tiles_.BeginChange(id);
-    Done<FinishResult> finish = [this, id, done = std::move(done)](Result<FinishResult> result) {
-      tiles_.EndChange(id);
-      done(std::move(result));
+    WriteQueue::Operation operation = MakeWrite<FinishResult>(
+        std::move(done), [levels, t = std::move(tile)](Connection& connection) {
+          return FinishTileInStore(connection, t, levels);
+        });
+    operation.settle = [this, id] {
+      tiles_.Forget(id);
     };
-    Write<FinishResult>(std::move(finish), [levels, t = std::move(tile)](Connection& connection) {
-      return FinishTileInStore(connection, t, levels);
-    });
+    writes_.Submit(std::move(operation));
   }
   void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) override {
     Write<bool>(std::move(done), [retry_at_ms, c = std::move(claim)](Connection& connection) {

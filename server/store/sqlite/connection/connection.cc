@@ -11,18 +11,19 @@
 namespace atlas {
 namespace {
 
+// Without locks of its own: a connection is for one thread at a time.
 int OpenFlags(DatabaseOptions::Mode mode) {
   switch (mode) {
     case DatabaseOptions::Mode::kCreate:
-      return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
+      return SQLite::OPEN_NOMUTEX | SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
     case DatabaseOptions::Mode::kReadWrite:
-      return SQLite::OPEN_READWRITE;
+      return SQLite::OPEN_NOMUTEX | SQLite::OPEN_READWRITE;
     case DatabaseOptions::Mode::kUntouched:
-      return SQLite::OPEN_READONLY | SQLite::OPEN_URI;
+      return SQLite::OPEN_NOMUTEX | SQLite::OPEN_READONLY | SQLite::OPEN_URI;
     case DatabaseOptions::Mode::kReadOnly:
       break;
   }
-  return SQLite::OPEN_READONLY;
+  return SQLite::OPEN_NOMUTEX | SQLite::OPEN_READONLY;
 }
 
 // The file as a URI that says that nobody changes it.

@@ -89,11 +89,20 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
   std::vector<Status> results(group.size());
   Status transaction = RunInTransaction(group, results);
   if (!transaction.ok()) {
+    Settle(group);  // whether a commit that failed wrote something is not known
     std::fill(results.begin(), results.end(), transaction);
   }
   for (std::size_t i = 0; i < group.size(); ++i) {
     NoteRefusal(results[i]);
     group[i].finish(results[i]);
+  }
+}
+
+void WriteQueue::Settle(const std::vector<Operation>& group) {
+  for (const Operation& operation : group) {
+    if (operation.settle) {
+      operation.settle();
+    }
   }
 }
 
@@ -136,6 +145,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     if (connection_->total_changes() != changes_before) {
       commits_.Add(std::chrono::steady_clock::now() - begin);
     }
+    Settle(group);
     revision_.store(revision);
     return {};
   } catch (const std::exception& error) {

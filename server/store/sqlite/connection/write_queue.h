@@ -35,6 +35,9 @@ class WriteQueue {
   struct Operation {
     std::function<Status(Connection&)> run;     // in a savepoint
     std::function<void(const Status&)> finish;  // after the commit; must not block
+    // Before that: once all can see what it wrote, or it is certain that nobody will, and before
+    // the revision tells of it; must not block, nor throw. May be empty.
+    std::function<void()> settle = {};
   };
 
   WriteQueue(std::unique_ptr<Connection> connection, const Options& options);
@@ -59,6 +62,7 @@ class WriteQueue {
   void Loop();
   std::vector<Operation> TakeGroup();
   void RunGroup(std::vector<Operation>& group);
+  static void Settle(const std::vector<Operation>& group);
   Status RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results);
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
