@@ -30,7 +30,7 @@ struct DaemonConfig {
   std::uint16_t port = 7447;
   int workers = 0;             // fusion threads; 0: one a core
   bool is_fusing = true;       // else dirty tiles wait for a daemon that does
-  int fusion_nice = 19;        // how far fusion threads stand back behind the others
+  int fusion_nice = 10;        // how far fusion threads stand back behind the others
   int network_threads = 0;     // that run connections; 0: one for every four cores
   int cache_mib = 128;         // decoded keyframes, all workers together
   int survey_mib = 1024;       // what tiles keep from one fusion to the next
