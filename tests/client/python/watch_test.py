@@ -22,10 +22,12 @@ FAR_AWAY = geometry.disc(5000, 0, 100)
 class WatchTest(AtlasCase):
 
     def told(self, watch, client=None):
-        """All that a watch tells until nothing is dirty and it is silent."""
+        """All that a watch tells until nothing is dirty and it is silent: for longer where it has not told the last
+        change, which may lie outside of its area or be late on a busy machine."""
         (client or self.client).wait(120_000)
+        goal = max(self.revisions().values(), default=0)
         changed, removed, revision = {}, set(), 0
-        while (changes := watch.next(1.0)) is not None:
+        while (changes := watch.next(1.0) or (watch.next(3.0) if revision < goal else None)) is not None:
             self.assertFalse(changes.below or changes.anything)
             self.assertTrue(changes.tiles or changes.removed)
             self.assertGreaterEqual(changes.revision, revision)
@@ -96,6 +98,7 @@ class WatchTest(AtlasCase):
         self.assertEqual(hashes(store.tiles), hashes(self.map_now()))
 
     def test_interval(self):
+        began = time.monotonic()
         with self.client.watch(EVERYWHERE, interval_ms=1500) as watch:
             for i in range(3):
                 self.client.upload_keyframe(self.upload(i, 8 * i))
@@ -104,8 +107,9 @@ class WatchTest(AtlasCase):
             while watch.next(3.0) is not None:
                 came.append(time.monotonic())
             self.assertTrue(came)
-            for earlier, later in zip(came, came[1:]):
-                self.assertGreater(later - earlier, 1.2)
+            # On a busy machine one is seen late, which makes none come earlier.
+            for count, seen in enumerate(came, start=1):
+                self.assertGreater(seen - began, 1.5 * count - 0.1)
 
     def test_what_makes_no_sense(self):
         self.refused(Code.INVALID_ARGUMENT, self.client.watch, atlas_pb2.Area())
