@@ -66,7 +66,7 @@ Result<Bytes> DecompressAgainst(ByteSpan prefix, ByteSpan frame, std::size_t exp
   if (ZSTD_findFrameCompressedSize(frame.data(), frame.size()) != frame.size()) {
     return Error(StatusCode::kInvalidData, "compressed block is truncated or has trailing bytes");
   }
-  // Making one takes as long as a tenth of a keyframe; it holds 160 KB.
+  // One a thread: to be made for each frame it is too large.
   thread_local const Decompressor context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   ZSTD_DCtx_reset(context.get(), ZSTD_reset_session_only);
   ZSTD_DCtx_refPrefix(context.get(), prefix.data(), prefix.size());

@@ -1,6 +1,5 @@
 #include "core/tile/raw_container.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "core/base/hash.h"
@@ -89,12 +88,6 @@ Status Read(ByteSpan blob, std::uint32_t magic, RawContainer& container) {
 }
 
 }  // namespace
-
-const RawSection* RawContainer::Find(std::uint16_t id) const {
-  const auto found = std::find_if(sections.begin(), sections.end(),
-                                  [id](const RawSection& section) { return section.id == id; });
-  return found == sections.end() ? nullptr : &*found;
-}
 
 Result<RawContainer> ReadRaw(ByteSpan blob, std::uint32_t magic) {
   RawContainer container;

@@ -26,8 +26,6 @@ struct RawContainer {
   std::uint64_t profile_hash = 0;
   std::uint8_t preset = 0;
   std::vector<RawSection> sections;  // ids rising
-
-  const RawSection* Find(std::uint16_t id) const;
 };
 
 // Verifies the header. kUnsupported on another version, kInvalidData otherwise. The blob outlives
