@@ -161,8 +161,9 @@ TEST(KeyframeCodecTest, ACheckTakesExactlyWhatIsDecoded) {
       (is_valid ? taken : refused) += 1;
     }
   }
-  EXPECT_GT(taken, 1'000u);
-  EXPECT_GT(refused, 1'000u);
+  const std::size_t few = (taken + refused) / 8;
+  EXPECT_GT(taken, few);
+  EXPECT_GT(refused, few);
 }
 
 TEST(KeyframeCodecTest, ACheckOfABlobSaysWhatDecodingSays) {
