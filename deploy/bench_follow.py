@@ -1,5 +1,5 @@
-"""The benchmark of deploy/bench.sh on what travels to a vehicle: along a drive, with and without a map of before, and
-the first map over a slow link. Docs/results.md, "Serving"."""
+"""The benchmark of deploy/bench.sh on what travels to a vehicle: along a drive, with and without a map of before,
+the first map over a slow link, and what changed since. Docs/results.md, "Serving"."""
 
 import pathlib
 import statistics
@@ -9,6 +9,8 @@ import tempfile
 from bench_daemon import Atlas, rows_of
 
 EVERY_M = 1  # between keyframes
+# What another vehicle uploads that drives the same way: its scans.
+UPDATES = {"one_keyframe": "1000:1001", "20_m": "1500:1520", "200_m": "2000:2200"}
 PLACES = 8  # of the drive, for the first map
 IMAGE = pathlib.Path(__file__).parent.parent / "docs/images/follow.png"
 
@@ -47,6 +49,11 @@ def emit_first(firsts, near, emit):
         emit_times(f"first_map.level_{level}", [first["complete_s"][level] for first in firsts], "none", None)
 
 
+def emit_update(name, keyframes, row, emit):
+    emit(f"follow.{name}.bytes", row["bytes"], f"bytes for {keyframes} keyframes, {row['deltas']} of {row['tiles']} tiles "
+         "as differences", "the same tiles whole", row["whole_bytes"])
+
+
 def draw(runs, path):
     import matplotlib
     matplotlib.use("Agg")
@@ -72,13 +79,17 @@ def draw(runs, path):
     figure.savefig(path, dpi=110)
 
 
+def simulate(bin_dir, trajectory, folder, seed=0):
+    subprocess.run([bin_dir / "atlas", "simulate", "city", "--trajectory", trajectory, "--every", str(EVERY_M),
+                    "--seed", str(seed), "-o", folder], check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
 def bench_follow(bin_dir, emit, drive):
     """A simulated city along KITTI's odometry drive 00, 3.7 km; draws docs/images/follow.png."""
     trajectory = drive("kitti_trajectories") / "00.txt"
     with tempfile.TemporaryDirectory() as work, Atlas(bin_dir) as atlas:
-        city = pathlib.Path(work) / "city"
-        subprocess.run([bin_dir / "atlas", "simulate", "city", "--trajectory", trajectory, "--every", str(EVERY_M),
-                        "-o", city], check=True, stdout=subprocess.DEVNULL)
+        city = simulate(bin_dir, trajectory, pathlib.Path(work) / "city")
         emit("follow.metres", atlas.run("ingest", city)["metres"], "m", "asked", 3700)
         atlas.run("wait")
         bench, poses = bin_dir / "follow_bench", city / "poses.txt"
@@ -88,6 +99,12 @@ def bench_follow(bin_dir, emit, drive):
         emit_totals(runs, emit)
         draw(runs, IMAGE)
         emit_first(*(list(rows_of(bench, name, atlas.server, poses, PLACES)) for name in ("first", "near")), emit)
+        again = simulate(bin_dir, trajectory, pathlib.Path(work) / "again", seed=2)
+        for name, scans in UPDATES.items():
+            keyframes = atlas.run("ingest", again, "--range", scans, "--session", name)["keyframes"]
+            atlas.run("wait")
+            row, = rows_of(bench, "update", atlas.server, poses, held)
+            emit_update(name, keyframes, row, emit)
 
 
 BENCHMARKS = {"follow": bench_follow}

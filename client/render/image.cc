@@ -2,26 +2,15 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <system_error>
 
 #include <png.h>
 
-#include "core/base/str_cat.h"
+#include "core/base/disk_error.h"
 
 namespace atlas {
 namespace {
 
 static_assert(sizeof(Rgb) == 3);
-
-Status SystemError(const std::filesystem::path& path, int error) {
-  StatusCode code = StatusCode::kInternal;
-  if (error == ENOENT || error == ENOTDIR) code = StatusCode::kNotFound;
-  if (error == EACCES || error == EPERM || error == EROFS) code = StatusCode::kPermissionDenied;
-  if (error == EISDIR) code = StatusCode::kConflict;
-  if (error == ENOSPC || error == EDQUOT) code = StatusCode::kResourceExhausted;
-  return {code,
-          StrCat("cannot write ", path.string(), ": ", std::generic_category().message(error))};
-}
 
 // errno of the first call that failed, 0 if all went well.
 int WriteTo(const Image& image, const std::filesystem::path& path) {
@@ -54,7 +43,7 @@ Status WritePng(const Image& image, const std::filesystem::path& path) {
   }
   if (failed == 0) return {};
   std::filesystem::remove(partial, error);
-  return SystemError(path, failed);
+  return DiskError("cannot write", path, failed);
 }
 
 }  // namespace atlas

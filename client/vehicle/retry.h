@@ -8,8 +8,7 @@ namespace atlas {
 // A closed or silent peer, a full disk or a limit at the other end, a mistake of its. Never:
 // another profile, an unknown version, a missing permission, content that is refused.
 inline bool MaySucceedLater(StatusCode code) {
-  return code == StatusCode::kUnavailable || code == StatusCode::kTimeout ||
-         code == StatusCode::kResourceExhausted || code == StatusCode::kInternal;
+  return IsTemporary(code) || code == StatusCode::kInternal;
 }
 
 }  // namespace atlas

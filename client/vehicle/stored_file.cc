@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/base/disk_error.h"
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
 
@@ -16,14 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kChecksumBytes = 8;
-
-Status SystemError(const char* what, const fs::path& path, int error) {
-  StatusCode code = StatusCode::kUnavailable;
-  if (error == ENOENT) code = StatusCode::kNotFound;
-  if (error == EACCES || error == EPERM || error == EROFS) code = StatusCode::kPermissionDenied;
-  if (error == ENOSPC || error == EDQUOT) code = StatusCode::kResourceExhausted;
-  return {code, StrCat(what, ' ', path.string(), ": ", std::generic_category().message(error))};
-}
 
 class OpenFile {
  public:
@@ -75,20 +68,20 @@ Status StoreFile(const fs::path& path, ByteSpan bytes, Durability durability) {
   if (error == 0 && rename(partial.c_str(), path.c_str()) != 0) error = errno;
   if (error != 0) {
     unlink(partial.c_str());
-    return SystemError("cannot write", path, error);
+    return DiskError("cannot write", path, error);
   }
   if (durability == Durability::kWhole) return {};
   error = SyncFolder(path.parent_path());
   if (error == 0) return {};
   unlink(path.c_str());
-  return SystemError("cannot write", path, error);
+  return DiskError("cannot write", path, error);
 }
 
 Result<Bytes> LoadFile(const fs::path& path, std::uint64_t max_bytes) {
   const OpenFile file(path, O_RDONLY);
   struct stat facts {};
   if (file.fd() < 0 || fstat(file.fd(), &facts) != 0) {
-    return Error(SystemError("cannot read", path, errno));
+    return Error(DiskError("cannot read", path, errno));
   }
   const auto size = static_cast<std::uint64_t>(facts.st_size);
   if (size > max_bytes) {
@@ -100,7 +93,7 @@ Result<Bytes> LoadFile(const fs::path& path, std::uint64_t max_bytes) {
   while (done < bytes.size()) {
     const ssize_t got = read(file.fd(), bytes.data() + done, bytes.size() - done);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return Error(SystemError("cannot read", path, errno));
+    if (got < 0) return Error(DiskError("cannot read", path, errno));
     if (got == 0) break;  // it was cut meanwhile
     done += static_cast<std::size_t>(got);
   }
@@ -111,18 +104,18 @@ Result<Bytes> LoadFile(const fs::path& path, std::uint64_t max_bytes) {
 Status MakeFolder(const fs::path& folder) {
   std::error_code error;
   const bool is_new = fs::create_directories(folder, error);
-  if (error) return SystemError("cannot make folder", folder, error.value());
+  if (error) return DiskError("cannot make folder", folder, error.value());
   if (!is_new) return {};
   const fs::path parent = fs::absolute(folder).lexically_normal().parent_path();
   const int failed = SyncFolder(parent);
-  return failed == 0 ? Status() : SystemError("cannot make folder", folder, failed);
+  return failed == 0 ? Status() : DiskError("cannot make folder", folder, failed);
 }
 
 Status MoveFile(const fs::path& from, const fs::path& to) {
-  if (rename(from.c_str(), to.c_str()) != 0) return SystemError("cannot move", from, errno);
+  if (rename(from.c_str(), to.c_str()) != 0) return DiskError("cannot move", from, errno);
   int error = SyncFolder(to.parent_path());
   if (error == 0) error = SyncFolder(from.parent_path());
-  return error == 0 ? Status() : SystemError("cannot move", from, error);
+  return error == 0 ? Status() : DiskError("cannot move", from, error);
 }
 
 Bytes WithChecksum(Bytes bytes) {

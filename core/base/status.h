@@ -25,6 +25,12 @@ enum class StatusCode : int {
   kInternal = 10,          // a promise of this program is broken
 };
 
+// It may go away by itself: what is refused so may be sent again (docs/protocol.md, "Errors").
+constexpr bool IsTemporary(StatusCode code) {
+  return code == StatusCode::kUnavailable || code == StatusCode::kTimeout ||
+         code == StatusCode::kResourceExhausted;
+}
+
 // The code's name in snake case, as printed in JSON errors: "invalid_data".
 std::string_view StatusCodeName(StatusCode code);
 

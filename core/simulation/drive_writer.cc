@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -21,29 +22,6 @@ namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little, "scans are little-endian float32");
 static_assert(sizeof(SimulatedPoint) == 16, "a point in velodyne/*.bin is four float32");
 
-StatusCode CodeOfErrno(int error) {
-  switch (error) {
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return StatusCode::kPermissionDenied;
-    case ENOSPC:
-    case EDQUOT:
-    case EFBIG:
-      return StatusCode::kResourceExhausted;
-    case ENOENT:
-    case ENOTDIR:
-      return StatusCode::kNotFound;
-    default:
-      return StatusCode::kUnavailable;
-  }
-}
-
-Status SystemError(const char* what, const fs::path& path, int error) {
-  return Status(CodeOfErrno(error),
-                StrCat(what, " ", path.string(), ": ", std::generic_category().message(error)));
-}
-
 struct FileCloser {
   void operator()(std::FILE* file) const { static_cast<void>(std::fclose(file)); }
 };
@@ -51,13 +29,13 @@ struct FileCloser {
 Status WriteFile(const fs::path& path, const void* bytes, std::size_t size) {
   std::unique_ptr<std::FILE, FileCloser> file(std::fopen(path.c_str(), "wb"));
   if (!file) {
-    return SystemError("cannot create", path, errno);
+    return DiskError("cannot create", path, errno);
   }
   if (size > 0 && std::fwrite(bytes, 1, size, file.get()) != size) {
-    return SystemError("cannot write", path, errno);
+    return DiskError("cannot write", path, errno);
   }
   if (std::fclose(file.release()) != 0) {
-    return SystemError("cannot write", path, errno);
+    return DiskError("cannot write", path, errno);
   }
   return {};
 }
@@ -124,7 +102,7 @@ Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
 Status MakeFolder(const fs::path& path) {
   std::error_code error;
   fs::create_directories(path, error);
-  return error ? SystemError("cannot create folder", path, error.value()) : Status();
+  return error ? DiskError("cannot create folder", path, error.value()) : Status();
 }
 
 Status WriteInto(const SimulatedDrive& drive,
@@ -153,12 +131,12 @@ Status CheckTarget(const fs::path& folder) {
     return {};
   }
   if (error) {
-    return SystemError("cannot look at", folder, error.value());
+    return DiskError("cannot look at", folder, error.value());
   }
   const bool is_empty_folder =
       status.type() == fs::file_type::directory && fs::is_empty(folder, error);
   if (error) {
-    return SystemError("cannot look into", folder, error.value());
+    return DiskError("cannot look into", folder, error.value());
   }
   return is_empty_folder ? Status()
                          : Status(StatusCode::kConflict,
@@ -178,11 +156,11 @@ Status WriteDrive(const SimulatedDrive& drive,
   partial += ".partial";
   std::error_code error;
   fs::remove_all(partial, error);
-  Status status = error ? SystemError("cannot remove", partial, error.value())
+  Status status = error ? DiskError("cannot remove", partial, error.value())
                         : WriteInto(drive, partial, progress);
   if (status.ok()) {
     fs::rename(partial, target, error);
-    status = error ? SystemError("cannot create folder", target, error.value()) : Status();
+    status = error ? DiskError("cannot create folder", target, error.value()) : Status();
   }
   if (!status.ok()) {
     fs::remove_all(partial, error);  // the first error is the one to tell

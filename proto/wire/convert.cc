@@ -7,15 +7,10 @@ namespace {
 
 // How long to wait before the same request may succeed; 0: do not retry.
 std::uint32_t RetryAfterMs(StatusCode code) {
-  switch (code) {
-    case StatusCode::kUnavailable:
-    case StatusCode::kTimeout:
-      return 1'000;
-    case StatusCode::kResourceExhausted:  // someone must make room first
-      return 5'000;
-    default:
-      return 0;
+  if (!IsTemporary(code)) {
+    return 0;
   }
+  return code == StatusCode::kResourceExhausted ? 5'000 : 1'000;  // someone must make room first
 }
 
 }  // namespace
@@ -82,7 +77,7 @@ wire::Error ErrorToWire(const Status& status) {
   message.set_code(static_cast<int>(status.code()));
   message.set_message(status.message());
   message.set_retry_after_ms(RetryAfterMs(status.code()));
-  message.set_retry(message.retry_after_ms() != 0);
+  message.set_retry(IsTemporary(status.code()));
   return message;
 }
 

@@ -15,16 +15,14 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <netinet/tcp.h>
-#include <poll.h>
 #include <spdlog/spdlog.h>
-#include <sys/socket.h>
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
 #include "server/net/connection/byte_budget.h"
 #include "server/net/connection/net_thread.h"
 #include "server/net/connection/visit_pace.h"
+#include "server/net/peer_socket.h"
 #include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
 
@@ -35,22 +33,6 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-// A vehicle that lost its link says nothing: after two minutes without an answer it is gone.
-void NoticeDeath(tcp::socket& socket) {
-  error_code ignored;  // of options that fail: then it is noticed when something is sent
-  socket.set_option(tcp::socket::keep_alive(true), ignored);
-  for (const auto& [option, value] :
-       {std::pair(TCP_KEEPIDLE, 60), std::pair(TCP_KEEPINTVL, 15), std::pair(TCP_KEEPCNT, 4)}) {
-    ::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof(value));
-  }
-}
-
-// It was reset while it waited for its turn.
-bool IsGone(tcp::socket& socket) {
-  pollfd state{socket.native_handle(), 0, 0};
-  return ::poll(&state, 1, 0) > 0;
-}
-
 // How soon to look again whether the threads have begun what they were given.
 constexpr std::chrono::milliseconds kArrivalPause{1};
 
@@ -58,12 +40,6 @@ VisitPace::Options PaceFrom(const NetOptions& options) {
   VisitPace::Options pace;
   pace.short_visits_per_s = options.short_visits_per_s;
   return pace;
-}
-
-// Else the system keeps megabytes for a slow link, and is heard of again when a third of them left:
-// at 256 kbit/s longer than a peer may take nothing.
-void KeepLittleUnsent(tcp::socket& socket, int bytes) {
-  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &bytes, sizeof(bytes));
 }
 
 }  // namespace
@@ -211,10 +187,7 @@ class TcpServer::Impl {
       return;
     }
     place = pace_.Begin(std::move(place), std::chrono::steady_clock::now());
-    error_code ignored;  // an option that speeds things up, no more
-    socket.set_option(tcp::no_delay(true), ignored);
-    NoticeDeath(socket);
-    KeepLittleUnsent(socket, options_.max_unsent_bytes);
+    PreparePeerSocket(socket, options_.max_unsent_bytes);
     SslSession session;
     if (security_.tls != nullptr) {
       session = security_.tls->NewSession(socket.native_handle());

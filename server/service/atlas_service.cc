@@ -11,17 +11,6 @@
 namespace atlas {
 namespace {
 
-std::chrono::steady_clock::time_point DeadlineOf(const Patience& patience) {
-  return std::chrono::steady_clock::now() + patience.timeout;
-}
-
-// What is found between two uploads is looked for again so often.
-constexpr int kCompactionAttempts = 3;
-
-bool IsClean(const DirtyState& state) {
-  return state.dirty_tiles == 0;
-}
-
 // Calls `done` with the result after waking whoever waits for changes.
 template <typename T>
 AtlasStore::Done<T> Notifying(ChangeSignal& changes, AtlasStore::Done<T> done) {
@@ -48,6 +37,8 @@ AtlasService::AtlasService(AtlasStore& store,
           log_,
           [this](const TileId& id, std::uint64_t revision) { watches_.Publish(id, revision); },
           options.fusion),
+      wait_(store, changes_, fusion_.damage()),
+      whole_(store, changes_, wait_),
       past_(store, options.past_cache_bytes, options.scratch_directory) {}
 
 AtlasService::~AtlasService() {
@@ -123,97 +114,10 @@ Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
   return batch;
 }
 
-Status AtlasService::CheckRunning(const std::stop_token& stop) const {
-  if (changes_.is_closed()) {
-    return Status(StatusCode::kUnavailable, "the daemon is shutting down");
-  }
-  if (stop.stop_requested()) {
-    return Status(StatusCode::kUnavailable, "the peer is gone");
-  }
-  return {};
-}
-
-// Every mark that is left was tried since it was set, and damage was why it failed.
-bool AtlasService::IsStuck(const DirtyState& state) const {
-  return state.dirty_tiles != 0 && state.failed_tiles == state.dirty_tiles &&
-         fusion_.damage().size() >= state.dirty_tiles;
-}
-
-Result<AtlasService::WaitEnd> AtlasService::WaitFor(
-    const std::function<bool(const DirtyState&)>& is_done,
-    TimePoint deadline,
-    const std::stop_token& stop,
-    DirtyState& state) {
-  while (true) {
-    const std::uint64_t seen = changes_.version();
-    const auto read = store_.ReadDirtyState();
-    if (!read) {
-      return Error(read.error());
-    }
-    state = *read;
-    if (is_done(state)) {
-      return WaitEnd::kDone;
-    }
-    if (IsStuck(state)) {
-      return WaitEnd::kDamaged;
-    }
-    if (!changes_.WaitPast(seen, deadline, stop)) {
-      if (Status status = CheckRunning(stop); !status.ok()) {
-        return Error(std::move(status));
-      }
-      return WaitEnd::kTimedOut;
-    }
-  }
-}
-
-Result<WaitOutcome> AtlasService::WaitUntilClean(const Patience& patience) {
-  DirtyState state;
-  const auto end = WaitFor(&IsClean, DeadlineOf(patience), patience.stop, state);
-  if (!end) {
-    return Error(end.error());
-  }
-  WaitOutcome outcome{state.revision, state.dirty_tiles, *end == WaitEnd::kTimedOut, {}};
-  if (*end == WaitEnd::kDamaged) {
-    outcome.damage = fusion_.damage().Summary();
-  }
-  return outcome;
-}
-
-Status AtlasService::WaitForRevision(std::uint64_t revision, const Patience& patience) {
-  if (const std::uint64_t current = store_.revision(); revision > current) {
-    return Status(StatusCode::kInvalidArgument,
-                  StrCat("cannot wait for revision ", revision, ", the atlas is at ", current));
-  }
-  DirtyState state;
-  const auto end = WaitFor(
-      [revision](const DirtyState& s) { return s.dirty_tiles == 0 || s.oldest_since > revision; },
-      DeadlineOf(patience), patience.stop, state);
-  if (!end) {
-    return end.error();
-  }
-  if (*end == WaitEnd::kDamaged) {
-    return fusion_.damage().Summary();
-  }
-  if (*end == WaitEnd::kTimedOut) {
-    return Status(StatusCode::kTimeout, StrCat("tiles do not reflect revision ", revision,
-                                               " yet: ", state.dirty_tiles, " are to be fused"));
-  }
-  return {};
-}
-
-std::function<Status()> AtlasService::CheckFor(const Patience& patience,
-                                               std::string too_late) const {
-  return [this, deadline = DeadlineOf(patience), stop = patience.stop,
-          too_late = std::move(too_late)] {
-    ATLAS_RETURN_IF_ERROR(CheckRunning(stop));
-    return std::chrono::steady_clock::now() < deadline ? Status()
-                                                       : Status(StatusCode::kTimeout, too_late);
-  };
-}
-
 std::function<Status()> AtlasService::CheckPast(std::uint64_t revision,
                                                 const Patience& patience) const {
-  return CheckFor(patience, StrCat("the atlas of revision ", revision, " was not fused in time"));
+  return wait_.Check(FusionWait::Limit(patience),
+                     StrCat("the atlas of revision ", revision, " was not fused in time"));
 }
 
 Result<RegionQuery> AtlasService::Query(const RegionRequest& request,
@@ -286,121 +190,8 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
                        ResidentBytes()};
 }
 
-Result<AtlasService::WaitEnd> AtlasService::WaitForWorkers(TimePoint deadline,
-                                                           const std::stop_token& stop,
-                                                           DirtyState& state) {
-  auto end = WaitFor(&IsClean, deadline, stop, state);
-  if (end && *end == WaitEnd::kTimedOut) {
-    return Error(StatusCode::kTimeout,
-                 StrCat("the atlas is not clean: ", state.dirty_tiles, " tiles are to be fused"));
-  }
-  return end;
-}
-
-Result<AtlasDigest> AtlasService::Digest(const Patience& patience) {
-  const TimePoint deadline = DeadlineOf(patience);
-  const auto check_stop = CheckFor(patience, "the digest was not computed in time");
-  while (true) {
-    DirtyState before;
-    const auto end = WaitForWorkers(deadline, patience.stop, before);
-    if (!end) {
-      return Error(end.error());
-    }
-    if (*end == WaitEnd::kDamaged) {
-      return Error(fusion_.damage().Summary());
-    }
-    auto digest = ComputeDigest(store_, check_stop);
-    if (!digest) {
-      return Error(digest.error());
-    }
-    const auto after = store_.ReadDirtyState();
-    if (!after) {
-      return Error(after.error());
-    }
-    if (after->revision == before.revision) {
-      digest->revision = before.revision;
-      return digest;
-    }
-    if (std::chrono::steady_clock::now() >= deadline) {
-      return Error(StatusCode::kTimeout, "the atlas changes while its digest is computed");
-    }
-  }
-}
-
 Result<AtlasDigest> AtlasService::DigestAt(std::uint64_t revision, const Patience& patience) {
   return past_.Digest(revision, CheckPast(revision, patience));
-}
-
-Result<VerifyReport> AtlasService::Verify(bool rebuild, const Patience& patience) {
-  const TimePoint deadline = DeadlineOf(patience);
-  const auto check_stop = CheckFor(patience, "the atlas was not verified in time");
-  while (true) {
-    DirtyState clean;
-    if (rebuild) {
-      const auto end = WaitForWorkers(deadline, patience.stop, clean);
-      if (!end) {
-        return Error(end.error());
-      }
-    }
-    const auto before = store_.ReadCounts();
-    if (!before) {
-      return Error(before.error());
-    }
-    AtlasVerifier::Options options;
-    options.rebuild = rebuild;
-    options.check_stop = check_stop;
-    auto report = AtlasVerifier(store_, options).Run();
-    if (!report) {
-      return Error(report.error());
-    }
-    const auto after = store_.ReadCounts();
-    if (!after) {
-      return Error(after.error());
-    }
-    report->revision = after->revision;
-    // A tile that changed between being read and being rebuilt is no mismatch, and a keyframe that
-    // was dropped since it was listed no damage: look again.
-    const bool is_in_doubt =
-        (rebuild && report->mismatched > 0 && after->revision != clean.revision) ||
-        (report->damaged > 0 && after->compacted != before->compacted);
-    if (!is_in_doubt) {
-      return report;
-    }
-    if (std::chrono::steady_clock::now() >= deadline) {
-      return Error(StatusCode::kTimeout, "the atlas changes while it is verified");
-    }
-  }
-}
-
-Result<CompactionReport> AtlasService::Compact(const CompactionRequest& request,
-                                               const Patience& patience) {
-  if (Status status = CheckCompaction(request, identity().profile); !status.ok()) {
-    return Error(std::move(status));
-  }
-  const TimePoint deadline = DeadlineOf(patience);
-  const auto check_stop = [&] {
-    ATLAS_RETURN_IF_ERROR(CheckRunning(patience.stop));
-    return std::chrono::steady_clock::now() < deadline
-               ? Status()
-               : Status(StatusCode::kTimeout, "the atlas was not compacted in time");
-  };
-  for (int attempt = 0; attempt < kCompactionAttempts; ++attempt) {
-    DirtyState clean;
-    const auto end = WaitForWorkers(deadline, patience.stop, clean);
-    if (!end) {
-      return Error(end.error());
-    }
-    if (*end == WaitEnd::kDamaged) {
-      return Error(fusion_.damage().Summary());
-    }
-    auto report = CompactAt(store_, clean.revision, request, check_stop);
-    if (report || report.error().code() != StatusCode::kConflict) {
-      changes_.Notify();
-      return report;
-    }
-  }
-  return Error(StatusCode::kUnavailable,
-               "the atlas keeps changing: try again while nothing is uploaded");
 }
 
 }  // namespace atlas

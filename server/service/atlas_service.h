@@ -3,26 +3,23 @@
 // when the service stops.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "core/base/status.h"
 #include "server/service/change_signal.h"
-#include "server/service/compaction/compact_atlas.h"
 #include "server/service/fusion/fusion_scheduler.h"
+#include "server/service/fusion_wait.h"
 #include "server/service/history/past_atlas.h"
 #include "server/service/log_sink.h"
 #include "server/service/region/region_query.h"
 #include "server/service/sync/sync_plan.h"
 #include "server/service/upload_check.h"
-#include "server/service/verification/atlas_digest.h"
-#include "server/service/verification/atlas_verify.h"
 #include "server/service/watch/watch_hub.h"
+#include "server/service/whole_atlas.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {
@@ -35,14 +32,6 @@ struct PoseBatchRequest {
   std::vector<Update> updates;
   std::string author;
   std::uint64_t if_revision = 0;
-};
-
-struct WaitOutcome {
-  std::uint64_t revision = 0;
-  std::uint64_t dirty_tiles = 0;
-  bool is_timed_out = false;
-  // kInvalidData when the tiles that are left cannot be fused: names what is damaged.
-  Status damage;
 };
 
 struct ServiceStatus {
@@ -60,12 +49,6 @@ struct ServiceOptions {
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
-};
-
-// How long a call may wait, and what ends it earlier.
-struct Patience {
-  std::chrono::milliseconds timeout{0};
-  std::stop_token stop;
 };
 
 class AtlasService {
@@ -87,12 +70,13 @@ class AtlasService {
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
   void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
 
-  // Until nothing is dirty but what damage keeps from being fused.
-  Result<WaitOutcome> WaitUntilClean(const Patience& patience);
-  // Until the tiles reflect every change up to `revision`. kTimeout if they do not in time,
-  // kInvalidData if damage keeps them from it, kInvalidArgument when the atlas has no such revision
-  // yet.
-  Status WaitForRevision(std::uint64_t revision, const Patience& patience);
+  // fusion_wait.h
+  Result<WaitOutcome> WaitUntilClean(const Patience& patience) {
+    return wait_.UntilClean(FusionWait::Limit(patience));
+  }
+  Status WaitForRevision(std::uint64_t revision, const Patience& patience) {
+    return wait_.ForRevision(revision, FusionWait::Limit(patience));
+  }
 
   // A query of an earlier revision fuses what it sends: `patience` bounds all of it, kTimeout.
   Result<RegionQuery> Query(const RegionRequest& request,
@@ -119,20 +103,16 @@ class AtlasService {
   // Of the last change on disk; never blocks.
   std::uint64_t revision() const { return store_.revision(); }
 
-  // Of a clean atlas that did not change meanwhile; kTimeout if that takes longer, kInvalidData if
-  // damage keeps it from becoming clean.
-  Result<AtlasDigest> Digest(const Patience& patience);
+  // whole_atlas.h
+  Result<AtlasDigest> Digest(const Patience& patience) { return whole_.Digest(patience); }
+  Result<VerifyReport> Verify(bool rebuild, const Patience& patience) {
+    return whole_.Verify(rebuild, patience);
+  }
+  Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience) {
+    return whole_.Compact(request, patience);
+  }
   // Of the atlas as of an earlier revision, fused again; kTimeout if that takes longer.
   Result<AtlasDigest> DigestAt(std::uint64_t revision, const Patience& patience);
-  // `rebuild` waits like WaitUntilClean and reports what is damaged; a plain check does not wait.
-  // kTimeout if all of it takes longer.
-  Result<VerifyReport> Verify(bool rebuild, const Patience& patience);
-
-  // Drops the keyframes that matter nowhere any more (preset bounded), once no tile is dirty; the
-  // tiles stay as they are. `patience` bounds all of it: kTimeout. kUnavailable when uploads do not
-  // let it finish, kInvalidData names what is damaged; errors of the request as CheckCompaction.
-  // Without success everything is as it was.
-  Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience);
 
   // Ends every wait, verification and digest, now and from now on, with kUnavailable. The workers
   // go on, and uploads are still taken.
@@ -144,22 +124,7 @@ class AtlasService {
   void Stop();
 
  private:
-  using TimePoint = std::chrono::steady_clock::time_point;
-  enum class WaitEnd { kDone, kDamaged, kTimedOut };
-
-  Result<WaitEnd> WaitFor(const std::function<bool(const DirtyState&)>& is_done,
-                          TimePoint deadline,
-                          const std::stop_token& stop,
-                          DirtyState& state);
-  bool IsStuck(const DirtyState& state) const;
-  Status CheckRunning(const std::stop_token& stop) const;
-  // CheckRunning, and kTimeout, in these words, when the time is up.
-  std::function<Status()> CheckFor(const Patience& patience, std::string too_late) const;
   std::function<Status()> CheckPast(std::uint64_t revision, const Patience& patience) const;
-  // kTimeout when more than damaged tiles is left at the deadline.
-  Result<WaitEnd> WaitForWorkers(TimePoint deadline,
-                                 const std::stop_token& stop,
-                                 DirtyState& state);
   void RebuildDamaged(const TileId& id);
   Result<PoseBatch> PlacePoses(PoseBatchRequest request);
 
@@ -170,6 +135,8 @@ class AtlasService {
   ChangeSignal changes_;
   WatchHub watches_;
   FusionScheduler fusion_;
+  FusionWait wait_;
+  WholeAtlas whole_;
   PastAtlas past_;
 };
 

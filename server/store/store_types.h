@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "core/geometry/map_profile.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/tile_id.h"
+#include "server/store/missing_uploads.h"
 #include "server/store/session_types.h"
 
 namespace atlas {
@@ -55,7 +57,8 @@ struct NewKeyframe {
   std::array<std::int32_t, 4> level_quaternion{};
   std::optional<PositionPrior> prior;
   Bytes blob;
-  std::vector<TileId> footprint;  // the level-0 tiles it touches at `pose`
+  std::vector<TileId> footprint;            // the level-0 tiles it touches at `pose`
+  std::shared_ptr<MissingUploads> missing;  // of who sends it; null: order does not matter
 };
 
 struct PutKeyframeResult {

@@ -127,7 +127,7 @@ PURE = set("""
     Eigen/Cholesky Eigen/Core Eigen/Eigenvalues Eigen/Geometry Eigen/LU tl/expected.hpp
     """.split())
 DOORS = {
-    "core/base": {"xxhash.h", "zstd.h"},
+    "core/base": {"cerrno", "filesystem", "xxhash.h", "zstd.h"},  # names of files and errors of them
     "core/scan": {"filesystem", "fstream"},
     "core/simulation": {"cerrno", "cstdio", "filesystem"},
     "core/simulation/city": {"atomic"},  # a cache of chunks, whichever thread casts

@@ -5,19 +5,11 @@
 #include <fstream>
 #include <system_error>
 
+#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
-
-Status SystemError(const char* what, const std::filesystem::path& path, int error) {
-  StatusCode code = StatusCode::kInternal;
-  if (error == ENOENT) code = StatusCode::kNotFound;
-  if (error == EACCES || error == EPERM || error == EROFS) code = StatusCode::kPermissionDenied;
-  if (error == ENOTDIR || error == EISDIR || error == EEXIST) code = StatusCode::kConflict;
-  if (error == ENOSPC || error == EDQUOT) code = StatusCode::kResourceExhausted;
-  return {code, StrCat(what, ' ', path.string(), ": ", std::generic_category().message(error))};
-}
 
 // errno of the failing call, 0 when the bytes are in the file.
 int WriteBytes(const std::filesystem::path& path, ByteSpan bytes) {
@@ -35,7 +27,7 @@ int WriteBytes(const std::filesystem::path& path, ByteSpan bytes) {
 Status MakeDirectory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
-  return error ? SystemError("cannot make folder", directory, error.value()) : Status();
+  return error ? DiskError("cannot make folder", directory, error.value()) : Status();
 }
 
 Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
@@ -49,7 +41,7 @@ Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
   }
   if (failed == 0) return {};
   std::filesystem::remove(partial, error);
-  return SystemError("cannot write", path, failed);
+  return DiskError("cannot write", path, failed);
 }
 
 Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes) {
@@ -69,7 +61,7 @@ Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64
     return Error(StatusCode::kResourceExhausted,
                  StrCat(path.string(), ": more than ", max_bytes, " bytes"));
   }
-  if (!file.eof()) return Error(SystemError("cannot read", path, errno != 0 ? errno : EIO));
+  if (!file.eof()) return Error(DiskError("cannot read", path, errno != 0 ? errno : EIO));
   return text;
 }
 

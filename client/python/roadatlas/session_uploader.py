@@ -73,8 +73,8 @@ class SessionUploader:
 
 
 class _Work:
-    """What is left, by rising sequence number. `postponed`: refused for now; the daemon may have what is behind them,
-    so that its last sequence number says nothing about these."""
+    """What is left, by rising sequence number: the daemon takes nothing behind what it refused for now (`postponed`), so
+    that its last sequence number tells of all before it."""
 
     def __init__(self, uploads: Iterable[atlas_pb2.UploadKeyframe], vehicle: str, session: str) -> None:
         self.waiting: dict[int, atlas_pb2.UploadKeyframe] = {}
@@ -87,8 +87,7 @@ class _Work:
             self.waiting[upload.key.sequence] = upload
 
     def skip(self, last_sequence: int | None) -> None:
-        there = [] if last_sequence is None else [sequence for sequence in self.waiting if sequence <= last_sequence
-                                                  and sequence not in self.postponed]
+        there = [] if last_sequence is None else [sequence for sequence in self.waiting if sequence <= last_sequence]
         for sequence in there:
             del self.waiting[sequence]
         self.report.there_already += there

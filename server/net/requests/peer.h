@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <stop_token>
 #include <utility>
 
 #include "server/net/requests/upload_order.h"
 #include "server/net/stream/reply_writer.h"
+#include "server/service/upload_check.h"
 
 namespace atlas {
 
@@ -37,6 +39,7 @@ class Peer {
 
   ReplyWriter& out;
   UploadOrder uploads;
+  const std::shared_ptr<MissingUploads> missing = std::make_shared<MissingUploads>();
 
  private:
   std::map<std::uint64_t, std::stop_source> cancellable_;

@@ -24,21 +24,21 @@ double LengthFromWire(std::uint64_t length_um) {
   return 1e-6 * static_cast<double>(length_um);
 }
 
-Result<SyncArea::Shape> ShapeFromWire(const wire::Area& area) {
+Result<MapArea> ShapeFromWire(const wire::Area& area) {
   switch (area.shape_case()) {
     case wire::Area::kDisc:
-      return SyncDisc{PointFromWire(area.disc().center()), LengthFromWire(area.disc().radius_um())};
+      return DiscArea{PointFromWire(area.disc().center()), LengthFromWire(area.disc().radius_um())};
     case wire::Area::kBox:
-      return SyncBox{PointFromWire(area.box().min()), PointFromWire(area.box().max())};
+      return BoxArea{PointFromWire(area.box().min()), PointFromWire(area.box().max())};
     case wire::Area::kCorridor: {
-      SyncCorridor corridor{{}, LengthFromWire(area.corridor().half_width_um())};
+      CorridorArea corridor{{}, LengthFromWire(area.corridor().half_width_um())};
       for (const wire::Area::Point& point : area.corridor().route()) {
         corridor.route_m.push_back(PointFromWire(point));
       }
       return corridor;
     }
     case wire::Area::kTiles: {
-      SyncTiles tiles;
+      TilesArea tiles;
       for (const std::uint64_t key : area.tiles().keys()) {
         const auto id = TileId::FromKey(key);
         if (!id) {
@@ -118,7 +118,7 @@ Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& messag
 }  // namespace
 
 Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profile) {
-  Result<SyncArea::Shape> shape = ShapeFromWire(message);
+  Result<MapArea> shape = ShapeFromWire(message);
   if (!shape) {
     return Error(shape.error());
   }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "proto/wire/convert.h"
 #include "server/net/requests/answer.h"
 #include "server/net/requests/on_pool.h"
 #include "server/net/requests/request_conversion.h"
@@ -43,6 +44,12 @@ asio::awaitable<Result<NewKeyframe>> CheckUpload(RequestContext& context,
   co_return co_await OnPool(context.pool, check);
 }
 
+void NoteRefusal(const wire::UploadKeyframe& message, const Status& why, MissingUploads& missing) {
+  if (const Result<KeyframeKey> key = KeyFromWire(message.key())) {
+    missing.NoteEnd(*key, why);
+  }
+}
+
 }  // namespace
 
 asio::awaitable<Status> AnswerUpload(RequestContext& context,
@@ -50,10 +57,12 @@ asio::awaitable<Status> AnswerUpload(RequestContext& context,
                                      Peer& peer) {
   UploadOrder::Turn turn(peer.uploads);
   Result<NewKeyframe> keyframe = co_await CheckUpload(context, request.upload_keyframe());
+  co_await turn.Come();
   if (!keyframe) {
+    NoteRefusal(request.upload_keyframe(), keyframe.error(), *peer.missing);
     co_return keyframe.error();
   }
-  co_await turn.Come();
+  keyframe->missing = peer.missing;
   const auto executor = co_await asio::this_coro::executor;
   const auto put = std::make_shared<OneShot<PutKeyframeResult>>(executor);
   const auto done = [put](Result<PutKeyframeResult> result) {

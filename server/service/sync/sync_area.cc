@@ -85,21 +85,21 @@ Nearest NearestTo(const Vector2d& from,
   return nearest;
 }
 
-Status Check(const SyncDisc& disc) {
+Status Check(const DiscArea& disc) {
   if (!IsFinite(disc.center_m) || !(disc.radius_m >= 0.0)) {
     return Refuse("a disc has a centre and a radius of 0 m or more");
   }
   return {};
 }
 
-Status Check(const SyncBox& box) {
+Status Check(const BoxArea& box) {
   if (!IsFinite(box.min_m) || !IsFinite(box.max_m) || (box.max_m - box.min_m).minCoeff() < 0.0) {
     return Refuse("the lower corner of a box is not above the upper one");
   }
   return {};
 }
 
-Status Check(const SyncCorridor& corridor) {
+Status Check(const CorridorArea& corridor) {
   const auto& route = corridor.route_m;
   if (route.empty() || route.size() > SyncArea::kMaxRoutePoints) {
     return Refuse(
@@ -111,7 +111,7 @@ Status Check(const SyncCorridor& corridor) {
   return {};
 }
 
-Status Check(const SyncTiles& tiles) {
+Status Check(const TilesArea& tiles) {
   if (tiles.ids.size() > SyncArea::kMaxTiles) {
     return Refuse(StrCat(tiles.ids.size(), " tiles, expected at most ", SyncArea::kMaxTiles));
   }
@@ -126,7 +126,7 @@ Status Check(const SyncTiles& tiles) {
 
 }  // namespace
 
-Result<SyncArea> SyncArea::Create(Shape shape, const MapProfile& profile) {
+Result<SyncArea> SyncArea::Create(MapArea shape, const MapProfile& profile) {
   Status status = std::visit([](const auto& s) { return Check(s); }, shape);
   if (!status.ok()) {
     return Error(std::move(status));
@@ -134,15 +134,15 @@ Result<SyncArea> SyncArea::Create(Shape shape, const MapProfile& profile) {
   return SyncArea(std::move(shape), profile);
 }
 
-SyncArea::SyncArea(Shape shape, const MapProfile& profile)
+SyncArea::SyncArea(MapArea shape, const MapProfile& profile)
     : shape_(std::move(shape)), tile_m_(profile.tile_size_m()) {
-  if (auto* disc = std::get_if<SyncDisc>(&shape_)) {
+  if (auto* disc = std::get_if<DiscArea>(&shape_)) {
     way_m_ = {Clamped(disc->center_m)};
     reach_m_ = std::min(disc->radius_m, kMaxExtent_m);
-  } else if (auto* box = std::get_if<SyncBox>(&shape_)) {
+  } else if (auto* box = std::get_if<BoxArea>(&shape_)) {
     *box = {Clamped(box->min_m), Clamped(box->max_m)};
     way_m_ = {0.5 * (box->min_m + box->max_m)};
-  } else if (auto* corridor = std::get_if<SyncCorridor>(&shape_)) {
+  } else if (auto* corridor = std::get_if<CorridorArea>(&shape_)) {
     for (const Vector2d& point : corridor->route_m) {
       way_m_.push_back(Clamped(point));
     }
@@ -162,7 +162,7 @@ SyncArea::Square SyncArea::SquareOf(const TileId& id, int bits) const {
 }
 
 bool SyncArea::Touches(const TileId& id, int bits) const {
-  if (const auto* tiles = std::get_if<SyncTiles>(&shape_)) {
+  if (const auto* tiles = std::get_if<TilesArea>(&shape_)) {
     const std::uint64_t first = id.Key();
     const std::uint64_t last = first + (std::uint64_t{1} << (2 * bits)) - 1;
     const auto found = std::partition_point(tiles->ids.begin(), tiles->ids.end(),
@@ -170,7 +170,7 @@ bool SyncArea::Touches(const TileId& id, int bits) const {
     return found != tiles->ids.end() && found->Key() <= last;
   }
   const Square square = SquareOf(id, bits);
-  if (const auto* box = std::get_if<SyncBox>(&shape_)) {
+  if (const auto* box = std::get_if<BoxArea>(&shape_)) {
     return (square.min_m.array() <= box->max_m.array()).all() &&
            (square.max_m.array() >= box->min_m.array()).all();
   }
@@ -187,12 +187,12 @@ bool SyncArea::Touches(const TileId& id, int bits) const {
 
 TileRect SyncArea::Bounds(std::uint8_t level) const {
   TileRect rect{level};
-  if (std::holds_alternative<SyncTiles>(shape_)) {
+  if (std::holds_alternative<TilesArea>(shape_)) {
     return rect;
   }
   Vector2d min_m = way_m_[0];
   Vector2d max_m = way_m_[0];
-  if (const auto* box = std::get_if<SyncBox>(&shape_)) {
+  if (const auto* box = std::get_if<BoxArea>(&shape_)) {
     min_m = box->min_m;
     max_m = box->max_m;
   }
@@ -215,7 +215,7 @@ TileRect SyncArea::Bounds(std::uint8_t level) const {
 }
 
 const std::vector<TileId>* SyncArea::tiles() const {
-  const auto* tiles = std::get_if<SyncTiles>(&shape_);
+  const auto* tiles = std::get_if<TilesArea>(&shape_);
   return tiles == nullptr ? nullptr : &tiles->ids;
 }
 

@@ -5,45 +5,26 @@
 
 #include <cstdint>
 #include <optional>
-#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "core/base/status.h"
+#include "core/geometry/map_area.h"
 #include "core/geometry/map_profile.h"
 #include "core/geometry/tile_id.h"
 #include "server/store/store_types.h"
 
 namespace atlas {
 
-struct SyncDisc {
-  Eigen::Vector2d center_m = Eigen::Vector2d::Zero();
-  double radius_m = 0.0;
-};
-struct SyncBox {
-  Eigen::Vector2d min_m = Eigen::Vector2d::Zero();
-  Eigen::Vector2d max_m = Eigen::Vector2d::Zero();
-};
-// What lies within half a width of a route, which begins where the vehicle is.
-struct SyncCorridor {
-  std::vector<Eigen::Vector2d> route_m;
-  double half_width_m = 0.0;
-};
-struct SyncTiles {
-  std::vector<TileId> ids;  // in key order, each once
-};
-
 class SyncArea {
  public:
-  using Shape = std::variant<SyncDisc, SyncBox, SyncCorridor, SyncTiles>;
-
   static constexpr std::size_t kMaxRoutePoints = 256;
   static constexpr std::size_t kMaxTiles = 65'536;
 
   // kInvalidArgument: not finite, a box or a width below nothing, a route without points or with
-  // too many, too many tiles or not in order.
-  static Result<SyncArea> Create(Shape shape, const MapProfile& profile);
+  // too many, too many tiles or not in key order.
+  static Result<SyncArea> Create(MapArea shape, const MapProfile& profile);
 
   // Squares of 2^bits tiles a side, aligned to their size, are given by their lower tile.
   bool Touches(const TileId& id, int bits = 0) const;
@@ -63,10 +44,10 @@ class SyncArea {
     Eigen::Vector2d max_m;
   };
 
-  SyncArea(Shape shape, const MapProfile& profile);
+  SyncArea(MapArea shape, const MapProfile& profile);
   Square SquareOf(const TileId& id, int bits) const;
 
-  Shape shape_;
+  MapArea shape_;
   double tile_m_ = 0.0;                 // side of a level-0 tile
   std::vector<Eigen::Vector2d> way_m_;  // of the vehicle: a point, a route, or nothing
   std::vector<double> along_m_;         // from its beginning to each point

@@ -12,8 +12,8 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
-#include "server/store/sqlite/disk_error.h"
 
 namespace atlas {
 namespace fs = std::filesystem;

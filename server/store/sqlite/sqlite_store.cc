@@ -1,9 +1,11 @@
 #include "server/store/sqlite/sqlite_store.h"
 
+#include <exception>
 #include <utility>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/reader_pool.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
@@ -17,6 +19,7 @@
 #include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/compaction_transactions.h"
 #include "server/store/sqlite/transactions/counter_check.h"
+#include "server/store/sqlite/transactions/current_reads.h"
 #include "server/store/sqlite/transactions/history_reads.h"
 #include "server/store/sqlite/transactions/session_transactions.h"
 #include "server/store/sqlite/transactions/transactions.h"
@@ -35,6 +38,33 @@ DatabaseOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem
 
 std::uint64_t ReadRevision(Connection& connection) {
   return ReadCounter(connection, Counter::kRevision);
+}
+
+// In its turn; what fails is noted at once, for those behind it in the same group.
+Result<PutKeyframeResult> PutInTurn(Connection& connection, const NewKeyframe& keyframe) {
+  if (Status status = keyframe.missing->CheckTurn(keyframe.key); !status.ok()) {
+    return Error(std::move(status));
+  }
+  try {
+    auto result = PutKeyframeInStore(connection, keyframe);
+    if (!result) {
+      keyframe.missing->NoteEnd(keyframe.key, result.error());
+    }
+    return result;
+  } catch (const std::exception& error) {
+    keyframe.missing->NoteEnd(keyframe.key, StatusFromException(error));
+    throw;
+  }
+}
+
+// Notes what became of it, then calls `done`.
+AtlasStore::Done<PutKeyframeResult> Noting(const NewKeyframe& keyframe,
+                                           AtlasStore::Done<PutKeyframeResult> done) {
+  return [missing = keyframe.missing, key = keyframe.key,
+          done = std::move(done)](Result<PutKeyframeResult> result) {
+    missing->NoteEnd(key, result ? Status() : result.error());
+    done(std::move(result));
+  };
 }
 
 class SqliteStore final : public AtlasStore {
@@ -58,8 +88,11 @@ class SqliteStore final : public AtlasStore {
   }
 
   void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) override {
+    if (keyframe.missing != nullptr) {
+      done = Noting(keyframe, std::move(done));
+    }
     Write<PutKeyframeResult>(std::move(done), [k = std::move(keyframe)](Connection& connection) {
-      return PutKeyframeInStore(connection, k);
+      return k.missing == nullptr ? PutKeyframeInStore(connection, k) : PutInTurn(connection, k);
     });
   }
   void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) override {
@@ -120,8 +153,14 @@ class SqliteStore final : public AtlasStore {
   WriteFigures ReadWriteFigures() const override { return writes_.ReadFigures(); }
   void Flush() override { writes_.Flush(); }
 
-  Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override;
-  Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override;
+  Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override {
+    return readers_.Run<FoundKeyframes>(
+        [keys](Connection& connection) { return FindKeyframeRecords(connection, keys); });
+  }
+  Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override {
+    return readers_.Run<TileSources>(
+        [&id, since](Connection& connection) { return GatherTileSources(connection, id, since); });
+  }
   Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) override {
     return readers_.Run<TileSources>([&id, revision](Connection& connection) {
       return GatherTileSourcesAt(connection, id, revision);
@@ -135,7 +174,11 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<Bytes>([id](Connection& connection) { return ReadBlob(connection, id); });
   }
   Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
-                                                    std::uint32_t limit) override;
+                                                    std::uint32_t limit) override {
+    return readers_.Run<std::vector<std::int64_t>>([=](Connection& connection) {
+      return Result<std::vector<std::int64_t>>(ListKeyframeRows(connection, after_id, limit));
+    });
+  }
   Result<StoredKeyframe> ReadKeyframe(std::int64_t id) override {
     return readers_.Run<StoredKeyframe>([id](Connection& connection) -> Result<StoredKeyframe> {
       auto record = VerifyKeyframeRecord(connection, id);
@@ -176,7 +219,13 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<DirtyState>(
         [](Connection& connection) { return Result<DirtyState>(ReadDirty(connection)); });
   }
-  Result<StoreCounts> ReadCounts() override;
+  Result<StoreCounts> ReadCounts() override {
+    return readers_.Run<StoreCounts>([this](Connection& connection) {
+      StoreCounts counts = ReadStoreCounts(connection);
+      counts.store_bytes = directory_.StoreBytes();
+      return Result<StoreCounts>(counts);
+    });
+  }
   Result<std::vector<SessionRecord>> ListSessions() override {
     return readers_.Run<std::vector<SessionRecord>>(
         [](Connection& connection) { return ReadSessions(connection); });
@@ -243,59 +292,6 @@ class SqliteStore final : public AtlasStore {
   ReaderPool readers_;
 };
 
-Result<FoundKeyframes> SqliteStore::FindKeyframes(std::span<const KeyframeKey> keys) {
-  return readers_.Run<FoundKeyframes>([keys](Connection& connection) -> Result<FoundKeyframes> {
-    FoundKeyframes records;
-    for (const KeyframeKey& key : keys) {
-      auto record = FindKeyframeRecord(connection, key);
-      if (!record) {
-        return Error(record.error());
-      }
-      records.push_back(std::move(*record));
-    }
-    return records;
-  });
-}
-
-Result<TileSources> SqliteStore::GatherTile(const TileId& id, std::uint64_t since) {
-  return readers_.Run<TileSources>([&](Connection& connection) -> Result<TileSources> {
-    TileSources sources;
-    sources.revision = ReadCounter(connection, Counter::kRevision);
-    sources.is_whole = since < ReadCounter(connection, Counter::kHistoryHorizon) || since == 0;
-    for (const FootprintRow& row : FootprintsSince(connection, id, sources.is_whole ? 0 : since)) {
-      if (!row.is_current) {
-        sources.gone.push_back(row.keyframe_id);
-        continue;
-      }
-      auto record = ReadKeyframeRecord(connection, row.keyframe_id);
-      if (!record) {
-        return Error(record.error());
-      }
-      if (IsInMap(record->session_state)) {
-        sources.keyframes.push_back(std::move(*record));
-      } else {
-        sources.gone.push_back(row.keyframe_id);
-      }
-    }
-    return sources;
-  });
-}
-
-Result<std::vector<std::int64_t>> SqliteStore::ListKeyframeIds(std::int64_t after_id,
-                                                               std::uint32_t limit) {
-  using Ids = std::vector<std::int64_t>;
-  return readers_.Run<Ids>([=](Connection& connection) -> Result<Ids> {
-    Query row = connection.Prepare("SELECT id FROM keyframes WHERE id > ? ORDER BY id LIMIT ?");
-    row.Bind(after_id).Bind(limit);
-    Ids ids;
-    while (row.Step()) {
-      row.Rewind();
-      ids.push_back(row.Int());
-    }
-    return ids;
-  });
-}
-
 Result<TileBlock> SqliteStore::ReadTileBlock(std::uint64_t block) {
   if (TileBlock kept = tiles_.Find(block)) {
     return kept;
@@ -316,24 +312,6 @@ Status SqliteStore::ScanTiles(const TileRect& rect,
   return ReadStatus([&](Connection& connection) {
     ScanTileRows(connection, rect, visit);
     return Status();
-  });
-}
-
-Result<StoreCounts> SqliteStore::ReadCounts() {
-  return readers_.Run<StoreCounts>([this](Connection& connection) -> Result<StoreCounts> {
-    StoreCounts counts;
-    counts.revision = ReadCounter(connection, Counter::kRevision);
-    counts.keyframes = ReadCounter(connection, Counter::kKeyframes);
-    counts.keyframe_bytes = ReadCounter(connection, Counter::kKeyframeBytes);
-    counts.compacted = ReadCounter(connection, Counter::kCompacted);
-    counts.sessions = ReadCounter(connection, Counter::kSessions);
-    counts.tiles = ReadCounter(connection, Counter::kTiles);
-    counts.tile_bytes = ReadCounter(connection, Counter::kTileBytes);
-    counts.cells = ReadCounter(connection, Counter::kCells);
-    counts.multilayer_cells = ReadCounter(connection, Counter::kMultilayerCells);
-    counts.dirty_tiles = ReadDirty(connection).dirty_tiles;
-    counts.store_bytes = directory_.StoreBytes();
-    return counts;
   });
 }
 

@@ -6,6 +6,8 @@
 //                                                  places of the drive
 //        follow_bench near SERVER POSES COUNT      the same for what planning to the next place
 //                                                  takes: 25 m, without columns
+//        follow_bench update SERVER POSES FOLDER   what changed of the tiles in the folder since,
+//                                                  as differences and as a whole
 #include <chrono>
 #include <cstdlib>
 #include <future>
@@ -16,6 +18,7 @@
 #include "client/vehicle/atlas_view.h"
 #include "tests/bench/follow/first_map.h"
 #include "tests/bench/follow/route_places.h"
+#include "tests/bench/follow/store_update.h"
 
 namespace atlas::testing {
 namespace {
@@ -131,6 +134,22 @@ Status TimeFirstMaps(FirstMapOptions options, const Places& places, std::size_t 
   return failure;
 }
 
+Status Update(const Endpoint& daemon, const Places& places, const std::string& folder) {
+  BoxArea area{places.front().head<2>(), places.front().head<2>()};
+  for (const Eigen::Vector3d& place : places) {
+    area.min_m = area.min_m.cwiseMin(place.head<2>());
+    area.max_m = area.max_m.cwiseMax(place.head<2>());
+  }
+  area.min_m.array() -= kRadius_m;
+  area.max_m.array() += kRadius_m;
+  const auto update = UpdateStore(daemon, area, folder);
+  if (!update) return update.error();
+  std::cout << "{\"tiles\": " << update->tiles << ", \"deltas\": " << update->deltas
+            << ", \"bytes\": " << update->bytes << ", \"whole_bytes\": " << update->whole_bytes
+            << "}" << std::endl;
+  return {};
+}
+
 FirstMapOptions FirstOptions(const Endpoint& daemon, bool is_near) {
   FirstMapOptions options;
   options.daemon = daemon;
@@ -145,6 +164,7 @@ Status Run(const std::string& what,
            const std::string& more) {
   if (what == "drive") return Follow(daemon, places, more);
   if (what == "discs") return SendDiscs(daemon, places);
+  if (what == "update") return Update(daemon, places, more);
   return TimeFirstMaps(FirstOptions(daemon, what == "near"), places,
                        std::strtoul(more.c_str(), nullptr, 10));
 }
@@ -155,10 +175,10 @@ Status Run(const std::string& what,
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   const auto daemon = atlas::Endpoint::Parse(argc > 3 ? argv[2] : "");
-  const bool has_more = what == "drive" || what == "first" || what == "near";
+  const bool has_more = what == "drive" || what == "first" || what == "near" || what == "update";
   if (!daemon || argc != (has_more ? 5 : 4) || (!has_more && what != "discs")) {
-    std::cerr << "usage: follow_bench drive SERVER POSES FOLDER | discs SERVER POSES | first|near "
-                 "SERVER POSES COUNT\n";
+    std::cerr << "usage: follow_bench drive|update SERVER POSES FOLDER | discs SERVER POSES | "
+                 "first|near SERVER POSES COUNT\n";
     return 2;
   }
   const auto places = atlas::testing::PlacesAlong(argv[3], atlas::testing::kSpacing_m);

@@ -13,6 +13,7 @@
 
 #include "core/base/str_cat.h"
 #include "core/simulation/worlds/simulated_world.h"
+#include "server/config/daemon_config.h"
 #include "server/store/await.h"
 #include "tests/bench/updates/atlas_at_work.h"
 #include "tests/bench/updates/drive_uploads.h"
@@ -141,6 +142,7 @@ Status Run(const std::string& world, double range_m, int seconds) {
   }
   FusionOptions fusion;
   fusion.workers = std::max(1U, std::thread::hardware_concurrency());
+  fusion.nice = DaemonConfig().fusion_nice;
   AtlasAtWork atlas(profile, fusion);
   const auto arrivals = Fleet(atlas.service(), std::move(drives)).Run();
   if (!arrivals) return arrivals.error();

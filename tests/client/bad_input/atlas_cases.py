@@ -159,7 +159,7 @@ def target_cases(cases, drives, work):
     cases.refused("render into a missing folder", ["render", "-o", closed / "nowhere/map.png"], "not_found",
                   "nowhere")
     cases.refused("render over a folder", ["render", "-o", drives.good], "conflict", "good")
-    cases.refused("render into a file", ["render", "-o", file / "map.png"], "not_found", "map.png")
+    cases.refused("render into a file", ["render", "-o", file / "map.png"], "conflict", "map.png")
     cases.forbidden("render into a closed folder", ["render", "-o", closed / "map.png"], "map.png")
     cases.refused("query into a file", ["query", *near, "-o", file], "conflict", "poses.txt", is_stream=True)
     cases.forbidden("query into a closed folder", ["query", *near, "-o", closed / "tiles"], "tiles", is_stream=True)

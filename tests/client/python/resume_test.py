@@ -158,15 +158,18 @@ class ResumeTest(AtlasCase):
 
 
 class BusyDaemon:
-    """Stands in for AtlasClient: refuses some keyframes at first, and counts what it was sent."""
+    """Stands in for AtlasClient: refuses some keyframes at first, and what is behind them until they come again, and
+    counts what it was sent."""
 
     def __init__(self, busy):
         self.busy = set(busy)
+        self.missing = set()
         self.taken = []
         self.sent = []
 
     def __call__(self, resume):
         self.last_sequence = max(self.taken, default=None)
+        self.missing.clear()
         return self
 
     def __enter__(self):
@@ -180,9 +183,11 @@ class BusyDaemon:
         return upload.key.sequence
 
     def result(self, sequence):
-        if sequence in self.busy:
-            self.busy.remove(sequence)
+        if sequence in self.busy or min(self.missing, default=sequence) < sequence:
+            self.busy.discard(sequence)
+            self.missing.add(sequence)
             raise RequestRefused(sequence + 1, Code.UNAVAILABLE, "busy", True, 1)
+        self.missing.discard(sequence)
         self.taken.append(sequence)
         return Reply()
 
@@ -193,12 +198,12 @@ class Reply:
 
 class PostponedTest(unittest.TestCase):
 
-    def test_refused_for_now_is_sent_again_though_later_ones_are_there(self):
+    def test_refused_for_now_is_sent_again_and_so_is_what_is_behind_it(self):
         daemon = BusyDaemon({2, 5})
         uploads = [self.named(i) for i in range(8)]
         report = SessionUploader(daemon, "car", "near", first_pause_s=0.001).upload(uploads)
-        self.assertEqual(daemon.sent, [*range(8), 2, 5])
-        self.assertEqual((report.acknowledged, report.refused), ([0, 1, 3, 4, 6, 7, 2, 5], {}))
+        self.assertEqual(daemon.sent, [*range(8), *range(2, 8)])
+        self.assertEqual((report.acknowledged, report.refused), (list(range(8)), {}))
 
     @staticmethod
     def named(sequence):

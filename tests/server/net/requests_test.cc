@@ -219,24 +219,52 @@ TEST_F(RequestTest, PipelinedUploadsReachTheDiskInTheirOrder) {
   }
 }
 
+wire::HelloReply Resume(BlockingPeer& peer, const std::string& session) {
+  wire::Envelope hello;
+  hello.set_request_id(1);
+  hello.mutable_hello()->set_protocol_major(kProtocolMajor);
+  hello.mutable_hello()->mutable_resume()->set_vehicle("bus");
+  hello.mutable_hello()->mutable_resume()->set_session(session);
+  peer.Send(hello);
+  auto reply = peer.Receive();
+  EXPECT_TRUE(reply && reply->has_hello_reply());
+  return reply->hello_reply();
+}
+
 TEST_F(RequestTest, AHelloThatResumesIsToldTheLastSequence) {
   Serve();
   const auto greet = [this](const std::string& session) {
     BlockingPeer peer(port_);
-    wire::Envelope hello;
-    hello.set_request_id(1);
-    hello.mutable_hello()->set_protocol_major(kProtocolMajor);
-    hello.mutable_hello()->mutable_resume()->set_vehicle("bus");
-    hello.mutable_hello()->mutable_resume()->set_session(session);
-    peer.Send(hello);
-    auto reply = peer.Receive();
-    EXPECT_TRUE(reply && reply->has_hello_reply());
-    return reply->hello_reply();
+    return Resume(peer, session);
   };
   EXPECT_FALSE(greet("day").has_last_sequence());
   UploadDrive(5);
   EXPECT_EQ(greet("day").last_sequence(), 4u);
   EXPECT_FALSE(greet("night").has_last_sequence());
+}
+
+// Vehicles that never hear a refusal: the store takes one write at a time and refuses the others,
+// each connection goes on behind what is there.
+TEST_F(RequestTest, BehindTheLastSequenceNothingIsMissing) {
+  constexpr std::uint32_t kCount = 60;
+  max_queued_writes_ = 1;
+  Serve(0);
+  std::uint32_t next = 0;
+  int connections = 0;
+  for (; next < kCount; ++connections) {
+    ASSERT_LT(connections, 1'000);
+    BlockingPeer peer(port_);
+    const wire::HelloReply hello = Resume(peer, "day");
+    next = hello.has_last_sequence() ? hello.last_sequence() + 1 : 0;
+    ASSERT_EQ(service_->ReadStatus()->counts.keyframes, next);
+    for (std::uint32_t i = next; i < kCount; ++i) {
+      ASSERT_TRUE(peer.Send(UploadOf(i, 2 + i)));
+    }
+    for (std::uint32_t i = next; i < kCount; ++i) {
+      ASSERT_TRUE(peer.Receive().has_value());
+    }
+  }
+  EXPECT_GT(connections, 2);  // or nothing was ever refused
 }
 
 TEST_F(RequestTest, AWaitThatRunsOutSaysSo) {

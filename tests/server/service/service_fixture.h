@@ -74,6 +74,7 @@ class ServiceTest : public ::testing::Test {
     SqliteStoreOptions options;
     options.directory = directory_ / name;
     options.new_profile = profile_;
+    options.max_queued_writes = max_queued_writes_;
     auto store = OpenSqliteStore(options);
     ASSERT_TRUE(store.has_value()) << store.error().message();
     store_ = std::move(*store);
@@ -126,6 +127,7 @@ class ServiceTest : public ::testing::Test {
   }
 
   MapProfile profile_ = TestProfile();  // of new atlases
+  std::size_t max_queued_writes_ = SqliteStoreOptions().max_queued_writes;
   SurveyCacheLimits surveys_{100'000, 100'000};
   SurveyFilesOptions survey_files_;  // none
   std::filesystem::path directory_;

@@ -275,6 +275,27 @@ TEST_F(DiskTest, AFullDiskRefusesWritesKeepsReadsAndRecovers) {
   EXPECT_EQ(store_->ReadCounts()->keyframes, accepted + 1);
 }
 
+TEST_F(DiskTest, WhatAFullDiskRefusedComesBeforeWhatIsBehindIt) {
+  Open();
+  const auto missing = std::make_shared<MissingUploads>();
+  const auto send = [&](std::uint32_t sequence) {
+    NewKeyframe keyframe = Big(sequence);
+    keyframe.missing = missing;
+    return Put(std::move(keyframe));
+  };
+  std::uint32_t refused = 0;
+  while (refused < 100 && send(refused)) {
+    ++refused;
+  }
+  ASSERT_LT(refused, 100u);
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=16m"), 0);
+  EXPECT_EQ(send(refused + 1).error().code(), StatusCode::kUnavailable);
+  for (const std::uint32_t sequence : {refused, refused + 1, refused + 2}) {
+    const auto put = send(sequence);
+    EXPECT_TRUE(put.has_value()) << put.error().message();
+  }
+}
+
 TEST_F(DiskTest, AnAtlasOnAFullDiskIsOpened) {
   Open();
   std::uint64_t accepted = 0;

@@ -89,11 +89,11 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
   std::vector<Status> results(group.size());
   Status transaction = RunInTransaction(group, results);
   if (!transaction.ok()) {
+    NoteRefusal(transaction);
     Settle(group);  // whether a commit that failed wrote something is not known
     std::fill(results.begin(), results.end(), transaction);
   }
   for (std::size_t i = 0; i < group.size(); ++i) {
-    NoteRefusal(results[i]);
     group[i].finish(results[i]);
   }
 }
@@ -106,7 +106,7 @@ void WriteQueue::Settle(const std::vector<Operation>& group) {
   }
 }
 
-// Of what is wrong with one write alone there is nothing to note.
+// That a write is wrong in itself is no refusal of the store.
 void WriteQueue::NoteRefusal(const Status& status) {
   const StatusCode code = status.code();
   if (code == StatusCode::kResourceExhausted || code == StatusCode::kPermissionDenied ||
@@ -172,6 +172,7 @@ Status WriteQueue::RunOne(Operation& operation) {
     status = operation.run(*connection_);
   } catch (const std::exception& error) {
     status = StatusFromException(error);
+    NoteRefusal(status);
   }
   if (!status.ok() && connection_->is_in_transaction()) {
     connection_->Execute("ROLLBACK TO operation");

@@ -11,19 +11,19 @@ namespace {
 
 using Eigen::Vector2d;
 
-SyncArea Make(SyncArea::Shape shape) {
+SyncArea Make(MapArea shape) {
   auto area = SyncArea::Create(std::move(shape), MapProfile());  // tiles of 12.8 m
   EXPECT_TRUE(area.has_value()) << area.error().message();
   return *std::move(area);
 }
 
-StatusCode CodeOf(SyncArea::Shape shape) {
+StatusCode CodeOf(MapArea shape) {
   const auto area = SyncArea::Create(std::move(shape), MapProfile());
   return area ? StatusCode::kOk : area.error().code();
 }
 
 TEST(SyncAreaTest, ADiscTouchesWhatIsWithinItsRadius) {
-  const SyncArea disc = Make(SyncDisc{{6.4, 6.4}, 10.0});
+  const SyncArea disc = Make(DiscArea{{6.4, 6.4}, 10.0});
   EXPECT_TRUE(disc.Touches({0, 0, 0}));
   EXPECT_TRUE(disc.Touches({0, 1, 0}));   // begins 6.4 m away
   EXPECT_TRUE(disc.Touches({0, 1, 1}));   // 9.05 m
@@ -35,7 +35,7 @@ TEST(SyncAreaTest, ADiscTouchesWhatIsWithinItsRadius) {
 }
 
 TEST(SyncAreaTest, ACorridorTouchesWhatIsBesideItsRoute) {
-  const SyncArea corridor = Make(SyncCorridor{{{0, 0}, {1'000, 0}, {1'000, 500}}, 5.0});
+  const SyncArea corridor = Make(CorridorArea{{{0, 0}, {1'000, 0}, {1'000, 500}}, 5.0});
   EXPECT_TRUE(corridor.Touches({0, 40, 0}));
   EXPECT_TRUE(corridor.Touches({0, 40, -1}));
   EXPECT_FALSE(corridor.Touches({0, 40, 1}));
@@ -45,12 +45,12 @@ TEST(SyncAreaTest, ACorridorTouchesWhatIsBesideItsRoute) {
 }
 
 TEST(SyncAreaTest, ABoxAndTilesTouchWhatTheyHold) {
-  const SyncArea box = Make(SyncBox{{1.0, 1.0}, {2.0, 30.0}});
+  const SyncArea box = Make(BoxArea{{1.0, 1.0}, {2.0, 30.0}});
   EXPECT_TRUE(box.Touches({0, 0, 0}));
   EXPECT_TRUE(box.Touches({0, 0, 2}));
   EXPECT_FALSE(box.Touches({0, 1, 0}));
   EXPECT_FALSE(box.Touches({0, 0, 3}));
-  const SyncArea tiles = Make(SyncTiles{{{0, 1, 1}, {0, 9, 1}, {2, 0, 0}}});
+  const SyncArea tiles = Make(TilesArea{{{0, 1, 1}, {0, 9, 1}, {2, 0, 0}}});
   EXPECT_TRUE(tiles.Touches({0, 1, 1}));
   EXPECT_FALSE(tiles.Touches({0, 1, 2}));
   EXPECT_TRUE(tiles.Touches({0, 0, 0}, 3));
@@ -80,20 +80,20 @@ TEST(SyncAreaTest, DistancesAreThoseOfTheirPoints) {
       nearest_m = std::min(nearest_m, (point - in_tile).norm());
     }
     const double step_m = (route[1] - route[0]).norm() / 200.0;
-    EXPECT_TRUE(Make(SyncCorridor{route, nearest_m + 1e-9}).Touches(id)) << i;
+    EXPECT_TRUE(Make(CorridorArea{route, nearest_m + 1e-9}).Touches(id)) << i;
     if (nearest_m > step_m) {
-      EXPECT_FALSE(Make(SyncCorridor{route, nearest_m - step_m}).Touches(id)) << i;
+      EXPECT_FALSE(Make(CorridorArea{route, nearest_m - step_m}).Touches(id)) << i;
     }
   }
 }
 
 TEST(SyncAreaTest, WhatLiesAheadCountsAsFartherOff) {
-  const SyncArea corridor = Make(SyncCorridor{{{0, 0}, {1'000, 0}}, 50.0});
+  const SyncArea corridor = Make(CorridorArea{{{0, 0}, {1'000, 0}}, 50.0});
   EXPECT_EQ(corridor.Distance({0, 0, 0}), 0.0);
   EXPECT_NEAR(corridor.Distance({0, 10, 0}), 0.25 * 128.0, 1e-6);
   EXPECT_LT(corridor.Distance({0, 10, 0}), corridor.Distance({0, 20, 0}));
   EXPECT_LT(corridor.Distance({0, 10, 0}), corridor.Distance({0, 10, 2}));
-  EXPECT_EQ(Make(SyncTiles{{{0, 5, 5}}}).Distance({0, 5, 5}), 0.0);
+  EXPECT_EQ(Make(TilesArea{{{0, 5, 5}}}).Distance({0, 5, 5}), 0.0);
 }
 
 // What Bounds() leaves out is never touched.
@@ -102,8 +102,8 @@ TEST(SyncAreaTest, BoundsHoldEverything) {
   for (int i = 0; i < 2'000; ++i) {
     const double x_m = static_cast<double>(random() % 1'000) / 10.0 - 50.0;
     const SyncArea area =
-        i % 2 == 0 ? Make(SyncDisc{{x_m, 12.8}, static_cast<double>(random() % 300) / 10.0})
-                   : Make(SyncBox{{x_m, -12.8}, {x_m + 12.8, 25.6}});
+        i % 2 == 0 ? Make(DiscArea{{x_m, 12.8}, static_cast<double>(random() % 300) / 10.0})
+                   : Make(BoxArea{{x_m, -12.8}, {x_m + 12.8, 25.6}});
     const TileId id{static_cast<std::uint8_t>(random() % 3),
                     static_cast<std::int32_t>(random() % 16) - 8,
                     static_cast<std::int32_t>(random() % 16) - 8};
@@ -116,19 +116,19 @@ TEST(SyncAreaTest, BoundsHoldEverything) {
 TEST(SyncAreaTest, HostileNumbersAreRefusedOrHarmless) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInf = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(CodeOf(SyncDisc{{kNan, 0}, 1.0}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncDisc{{0, 0}, kNan}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncDisc{{0, 0}, -1.0}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncBox{{0, 0}, {1, -1}}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncBox{{-kInf, 0}, {1, 1}}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncCorridor{{}, 1.0}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncCorridor{std::vector<Vector2d>(257, Vector2d::Zero()), 1.0}),
+  EXPECT_EQ(CodeOf(DiscArea{{kNan, 0}, 1.0}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(DiscArea{{0, 0}, kNan}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(DiscArea{{0, 0}, -1.0}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(BoxArea{{0, 0}, {1, -1}}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(BoxArea{{-kInf, 0}, {1, 1}}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(CorridorArea{{}, 1.0}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(CorridorArea{std::vector<Vector2d>(257, Vector2d::Zero()), 1.0}),
             StatusCode::kInvalidArgument);
-  EXPECT_EQ(CodeOf(SyncTiles{{{0, 1, 1}, {0, 1, 1}}}), StatusCode::kInvalidArgument);
-  const SyncArea far = Make(SyncDisc{{1e300, -1e300}, 1e300});
+  EXPECT_EQ(CodeOf(TilesArea{{{0, 1, 1}, {0, 1, 1}}}), StatusCode::kInvalidArgument);
+  const SyncArea far = Make(DiscArea{{1e300, -1e300}, 1e300});
   const TileRect rect = far.Bounds(0);
   EXPECT_LE(rect.min_x, rect.max_x);
-  EXPECT_TRUE(Make(SyncDisc{{0, 0}, kInf}).Touches({0, 1'000'000, -1'000'000}));
+  EXPECT_TRUE(Make(DiscArea{{0, 0}, kInf}).Touches({0, 1'000'000, -1'000'000}));
   EXPECT_FALSE(std::isnan(far.Distance({0, TileId::kMaxCoordinate, TileId::kMinCoordinate})));
 }
 

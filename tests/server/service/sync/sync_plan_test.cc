@@ -83,21 +83,21 @@ class Streets : public KnownTiles {
   }
 };
 
-SyncArea Area(SyncArea::Shape shape) {
+SyncArea Area(MapArea shape) {
   return SyncArea::Create(std::move(shape), SmallProfile()).value();
 }
-SyncRequest Ask(SyncArea::Shape shape) {
+SyncRequest Ask(MapArea shape) {
   return {Area(std::move(shape)), 0, 0, kAllSections, {}, {}};
 }
-SyncArea::Shape AnyShape(std::uint32_t seed) {
+MapArea AnyShape(std::uint32_t seed) {
   const double x_m = seed % 7 * 40.0 - 120.0;
   switch (seed % 3) {
     case 0:
-      return SyncDisc{{x_m, 5.0}, 30.0 + seed % 5 * 60.0};
+      return DiscArea{{x_m, 5.0}, 30.0 + seed % 5 * 60.0};
     case 1:
-      return SyncBox{{x_m, -100.0}, {x_m + 150.0, 200.0}};
+      return BoxArea{{x_m, -100.0}, {x_m + 150.0, 200.0}};
     default:
-      return SyncCorridor{{{x_m, -300.0}, {0.0, 0.0}, {300.0, x_m}}, 40.0};
+      return CorridorArea{{{x_m, -300.0}, {0.0, 0.0}, {300.0, x_m}}, 40.0};
   }
 }
 
@@ -180,7 +180,7 @@ TEST(SyncPlanTest, TheVehicleIsSharpFirst) {
       tiles.Put({level, x, 0}, 1);
     }
   }
-  const SyncPlan plan = Plan(Ask(SyncDisc{{6.4, 6.4}, 400.0}), tiles);
+  const SyncPlan plan = Plan(Ask(DiscArea{{6.4, 6.4}, 400.0}), tiles);
   const std::vector<std::uint64_t> keys = KeysOf(plan.items);
   const auto place = [&](const TileId& id) {
     return std::find(keys.begin(), keys.end(), id.Key());
@@ -196,7 +196,7 @@ TEST(SyncPlanTest, CheapTilesComeBeforeDearOnes) {
   tiles.Put({1, 0, 0}, 1);
   tiles.Put({0, 0, 0}, 1, 30'000);
   tiles.Put({0, 1, 0}, 1, 1'000);
-  SyncRequest request = Ask(SyncBox{{0, 0}, {25.5, 1}});
+  SyncRequest request = Ask(BoxArea{{0, 0}, {25.5, 1}});
   request.coarsest_level = 1;
   EXPECT_THAT(KeysOf(Plan(request, tiles).items),
               ElementsAre(TileId{1, 0, 0}.Key(), TileId{0, 1, 0}.Key(), TileId{0, 0, 0}.Key()));
@@ -225,7 +225,7 @@ TEST(SyncPlanTest, GoesOnWhereTheReplyBeforeEnded) {
 
 TEST(SyncPlanTest, WhatChangedMeanwhileComesLast) {
   Streets tiles(1);
-  SyncRequest request = Ask(SyncDisc{{0, 0}, 300.0});
+  SyncRequest request = Ask(DiscArea{{0, 0}, 300.0});
   const SyncPlan first = Plan(request, tiles, {5});
   const SyncItem& last = first.items.back();
   request.after = SyncCursor{tiles.revision(), last.priority, last.tile.id.Key()};
@@ -260,7 +260,7 @@ TEST(SyncPlanTest, WhatIsHeldIsNotSent) {
 
 TEST(SyncPlanTest, ExactlyWhatChangedIsSent) {
   Streets tiles(3);
-  SyncRequest request = Ask(SyncDisc{{0, 0}, 1'000.0});
+  SyncRequest request = Ask(DiscArea{{0, 0}, 1'000.0});
   request.held = Hold(AllOf(tiles));
   const TileId changed = tiles.tiles().begin()->second.id;
   const TileId gone = std::next(tiles.tiles().begin(), 5)->second.id;
@@ -278,7 +278,7 @@ TEST(SyncPlanTest, ExactlyWhatChangedIsSent) {
 TEST(SyncPlanTest, ABlockThatDiffersIsAskedForInDetail) {
   for (const std::size_t max_blocks : {16'384u, 0u}) {
     Streets tiles(3);
-    SyncRequest request = Ask(SyncDisc{{0, 0}, 1'000.0});
+    SyncRequest request = Ask(DiscArea{{0, 0}, 1'000.0});
     request.held = Hold({}, BlocksOf(tiles));
     const TileId changed = tiles.tiles().begin()->second.id;
     const std::uint64_t emptied = TileBlockOf(tiles.tiles().rbegin()->first);
@@ -298,7 +298,7 @@ TEST(SyncPlanTest, ABlockThatDiffersIsAskedForInDetail) {
 TEST(SyncPlanTest, TilesBesideAHeldBlocksAreNew) {
   KnownTiles tiles;
   tiles.Put({0, 0, 0}, 1);
-  SyncRequest request = Ask(SyncDisc{{0, 0}, 100.0});
+  SyncRequest request = Ask(DiscArea{{0, 0}, 100.0});
   request.held = Hold({}, BlocksOf(tiles));
   tiles.Put({0, 1, 1}, 2);
   const SyncPlan plan = Plan(request, tiles);
@@ -312,7 +312,7 @@ TEST(SyncPlanTest, OnlySectionsThatAreMissingAreSent) {
   KnownTiles tiles;
   tiles.Put({0, 0, 0}, 1);
   tiles.Put({0, 1, 0}, 1);
-  SyncRequest request = Ask(SyncDisc{{0, 0}, 100.0});
+  SyncRequest request = Ask(DiscArea{{0, 0}, 100.0});
   request.sections = kSurface | kColumns;
   request.held = Hold({{TileId{0, 0, 0}.Key(), 1, kSurface}, {TileId{0, 1, 0}.Key(), 7, kSurface}});
   const SyncPlan plan = Plan(request, tiles);
@@ -327,7 +327,7 @@ TEST(SyncPlanTest, OnlySectionsThatAreMissingAreSent) {
 
 TEST(SyncPlanTest, LevelsAreBounded) {
   Streets tiles(4);
-  SyncRequest request = Ask(SyncDisc{{0, 0}, 500.0});
+  SyncRequest request = Ask(DiscArea{{0, 0}, 500.0});
   request.finest_level = 1;
   request.coarsest_level = 3;
   request.held = Hold({{TileId{0, 999, 999}.Key(), 1}, {TileId{4, 99, 99}.Key(), 1}});
@@ -351,20 +351,20 @@ TEST(SyncPlanTest, ALargeAreaIsScanned) {
               KeysOf(Plan(request, tiles).items));
   }
   Streets tiles(0);
-  EXPECT_EQ(Plan(Ask(SyncDisc{{0, 0}, 1e12}), tiles).items.size(), tiles.tiles().size());
+  EXPECT_EQ(Plan(Ask(DiscArea{{0, 0}, 1e12}), tiles).items.size(), tiles.tiles().size());
 }
 
 TEST(SyncPlanTest, AnAreaWithTooManyTilesIsRefused) {
   Streets tiles(0);
   const auto refused =
-      PlanSync(Ask(SyncDisc{{0, 0}, 1e6}), tiles, SmallProfile(), true, {4'096, 100});
+      PlanSync(Ask(DiscArea{{0, 0}, 1e6}), tiles, SmallProfile(), true, {4'096, 100});
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code(), StatusCode::kInvalidArgument);
 }
 
 TEST(SyncPlanTest, SaysThatItTakesTheDisk) {
   Streets tiles(0);
-  const SyncRequest request = Ask(SyncDisc{{0, 0}, 300.0});
+  const SyncRequest request = Ask(DiscArea{{0, 0}, 300.0});
   EXPECT_TRUE(PlanSync(request, tiles, SmallProfile(), false).value().has_value());
   tiles.ForgetBlock(TileBlockOf(TileId{0, 0, 0}.Key()));
   EXPECT_FALSE(PlanSync(request, tiles, SmallProfile(), false).value().has_value());
@@ -379,7 +379,7 @@ TEST(SyncPlanTest, CertainTilesAreAskedForByTheirKeys) {
       ids.push_back(tile.id);
     }
   }
-  const SyncPlan plan = Plan(Ask(SyncTiles{ids}), tiles);
+  const SyncPlan plan = Plan(Ask(TilesArea{ids}), tiles);
   EXPECT_EQ(plan.items.size(), ids.size());
 }
 

@@ -16,7 +16,7 @@ constexpr std::uint32_t kTop = 3;
 TileWatch::Scope Everywhere(double radius_m = 1e6) {
   MapProfile profile;
   profile.levels = kTop + 1;
-  return {SyncArea::Create(SyncDisc{{0, 0}, radius_m}, profile).value(), 0, kTop};
+  return {SyncArea::Create(DiscArea{{0, 0}, radius_m}, profile).value(), 0, kTop};
 }
 
 TEST(TileWatchTest, TellsTheNewestOfEachTileOnce) {

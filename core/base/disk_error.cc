@@ -1,4 +1,4 @@
-#include "server/store/sqlite/disk_error.h"
+#include "core/base/disk_error.h"
 
 #include <cerrno>
 #include <system_error>
@@ -16,10 +16,15 @@ StatusCode CodeOf(int error) {
       return StatusCode::kPermissionDenied;
     case ENOSPC:
     case EDQUOT:
+    case EFBIG:
+    case EMFILE:
+    case ENFILE:
       return StatusCode::kResourceExhausted;
     case ENOENT:
       return StatusCode::kNotFound;
     case ENOTDIR:
+    case EISDIR:
+    case ENOTEMPTY:
     case EEXIST:
       return StatusCode::kConflict;
     default:
@@ -29,9 +34,9 @@ StatusCode CodeOf(int error) {
 
 }  // namespace
 
-Status DiskError(const std::string& what, const std::filesystem::path& path, int error) {
+Status DiskError(std::string_view what, const std::filesystem::path& path, int error) {
   return {CodeOf(error),
-          StrCat(what, " ", path.string(), ": ", std::generic_category().message(error))};
+          StrCat(what, ' ', path.string(), ": ", std::generic_category().message(error))};
 }
 
 }  // namespace atlas

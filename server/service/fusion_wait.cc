@@ -1,0 +1,101 @@
+#include "server/service/fusion_wait.h"
+
+#include <utility>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+
+Status FusionWait::CheckRunning(const std::stop_token& stop) const {
+  if (changes_.is_closed()) {
+    return Status(StatusCode::kUnavailable, "the daemon is shutting down");
+  }
+  if (stop.stop_requested()) {
+    return Status(StatusCode::kUnavailable, "the peer is gone");
+  }
+  return {};
+}
+
+// Every mark that is left was tried since it was set, and damage was why it failed.
+bool FusionWait::IsStuck(const DirtyState& state) const {
+  return state.dirty_tiles != 0 && state.failed_tiles == state.dirty_tiles &&
+         damage_.size() >= state.dirty_tiles;
+}
+
+Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtyState&)>& is_done,
+                                          const Limit& limit,
+                                          DirtyState& state) const {
+  while (true) {
+    const std::uint64_t seen = changes_.version();
+    const auto read = store_.ReadDirtyState();
+    if (!read) {
+      return Error(read.error());
+    }
+    state = *read;
+    if (is_done(state)) {
+      return End::kDone;
+    }
+    if (IsStuck(state)) {
+      return End::kDamaged;
+    }
+    if (!changes_.WaitPast(seen, limit.deadline, limit.stop)) {
+      if (Status status = CheckRunning(limit.stop); !status.ok()) {
+        return Error(std::move(status));
+      }
+      return End::kTimedOut;
+    }
+  }
+}
+
+Result<WaitOutcome> FusionWait::UntilClean(const Limit& limit) const {
+  DirtyState state;
+  const auto end = Until([](const DirtyState& s) { return s.dirty_tiles == 0; }, limit, state);
+  if (!end) {
+    return Error(end.error());
+  }
+  WaitOutcome outcome{state.revision, state.dirty_tiles, *end == End::kTimedOut, {}};
+  if (*end == End::kDamaged) {
+    outcome.damage = damage_.Summary();
+  }
+  return outcome;
+}
+
+Result<WaitOutcome> FusionWait::UntilCleanInTime(const Limit& limit) const {
+  auto outcome = UntilClean(limit);
+  if (outcome && outcome->is_timed_out) {
+    return Error(StatusCode::kTimeout, StrCat("the atlas is not clean: ", outcome->dirty_tiles,
+                                              " tiles are to be fused"));
+  }
+  return outcome;
+}
+
+Status FusionWait::ForRevision(std::uint64_t revision, const Limit& limit) const {
+  if (const std::uint64_t current = store_.revision(); revision > current) {
+    return Status(StatusCode::kInvalidArgument,
+                  StrCat("cannot wait for revision ", revision, ", the atlas is at ", current));
+  }
+  DirtyState state;
+  const auto end = Until(
+      [revision](const DirtyState& s) { return s.dirty_tiles == 0 || s.oldest_since > revision; },
+      limit, state);
+  if (!end) {
+    return end.error();
+  }
+  if (*end == End::kDamaged) {
+    return damage_.Summary();
+  }
+  if (*end == End::kTimedOut) {
+    return Status(StatusCode::kTimeout, StrCat("tiles do not reflect revision ", revision,
+                                               " yet: ", state.dirty_tiles, " are to be fused"));
+  }
+  return {};
+}
+
+std::function<Status()> FusionWait::Check(const Limit& limit, std::string too_late) const {
+  return [this, limit, too_late = std::move(too_late)] {
+    ATLAS_RETURN_IF_ERROR(CheckRunning(limit.stop));
+    return limit.is_over() ? Status(StatusCode::kTimeout, too_late) : Status();
+  };
+}
+
+}  // namespace atlas

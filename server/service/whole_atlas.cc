@@ -1,0 +1,113 @@
+#include "server/service/whole_atlas.h"
+
+#include <utility>
+
+namespace atlas {
+namespace {
+
+// What is found between two uploads is looked for again so often.
+constexpr int kCompactionAttempts = 3;
+
+}  // namespace
+
+Result<std::uint64_t> WholeAtlas::CleanRevision(const FusionWait::Limit& limit) const {
+  const auto clean = wait_.UntilCleanInTime(limit);
+  if (!clean) {
+    return Error(clean.error());
+  }
+  if (!clean->damage.ok()) {
+    return Error(clean->damage);
+  }
+  return clean->revision;
+}
+
+Result<AtlasDigest> WholeAtlas::Digest(const Patience& patience) const {
+  const FusionWait::Limit limit(patience);
+  const auto check_stop = wait_.Check(limit, "the digest was not computed in time");
+  while (true) {
+    const auto revision = CleanRevision(limit);
+    if (!revision) {
+      return Error(revision.error());
+    }
+    auto digest = ComputeDigest(store_, check_stop);
+    if (!digest) {
+      return Error(digest.error());
+    }
+    const auto after = store_.ReadDirtyState();
+    if (!after) {
+      return Error(after.error());
+    }
+    if (after->revision == *revision) {
+      digest->revision = *revision;
+      return digest;
+    }
+    if (limit.is_over()) {
+      return Error(StatusCode::kTimeout, "the atlas changes while its digest is computed");
+    }
+  }
+}
+
+Result<VerifyReport> WholeAtlas::Verify(bool rebuild, const Patience& patience) const {
+  const FusionWait::Limit limit(patience);
+  AtlasVerifier::Options options;
+  options.rebuild = rebuild;
+  options.check_stop = wait_.Check(limit, "the atlas was not verified in time");
+  while (true) {
+    std::uint64_t clean_revision = 0;
+    if (rebuild) {
+      const auto clean = wait_.UntilCleanInTime(limit);
+      if (!clean) {
+        return Error(clean.error());
+      }
+      clean_revision = clean->revision;
+    }
+    const auto before = store_.ReadCounts();
+    if (!before) {
+      return Error(before.error());
+    }
+    auto report = AtlasVerifier(store_, options).Run();
+    if (!report) {
+      return Error(report.error());
+    }
+    const auto after = store_.ReadCounts();
+    if (!after) {
+      return Error(after.error());
+    }
+    report->revision = after->revision;
+    // A tile that changed between being read and being rebuilt is no mismatch, and a keyframe that
+    // was dropped since it was listed no damage: look again.
+    const bool is_in_doubt =
+        (rebuild && report->mismatched > 0 && after->revision != clean_revision) ||
+        (report->damaged > 0 && after->compacted != before->compacted);
+    if (!is_in_doubt) {
+      return report;
+    }
+    if (limit.is_over()) {
+      return Error(StatusCode::kTimeout, "the atlas changes while it is verified");
+    }
+  }
+}
+
+Result<CompactionReport> WholeAtlas::Compact(const CompactionRequest& request,
+                                             const Patience& patience) const {
+  if (Status status = CheckCompaction(request, store_.identity().profile); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const FusionWait::Limit limit(patience);
+  const auto check_stop = wait_.Check(limit, "the atlas was not compacted in time");
+  for (int attempt = 0; attempt < kCompactionAttempts; ++attempt) {
+    const auto revision = CleanRevision(limit);
+    if (!revision) {
+      return Error(revision.error());
+    }
+    auto report = CompactAt(store_, *revision, request, check_stop);
+    if (report || report.error().code() != StatusCode::kConflict) {
+      changes_.Notify();
+      return report;
+    }
+  }
+  return Error(StatusCode::kUnavailable,
+               "the atlas keeps changing: try again while nothing is uploaded");
+}
+
+}  // namespace atlas

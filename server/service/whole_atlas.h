@@ -1,0 +1,44 @@
+// What takes the whole atlas, standing still: its digest, its verification, its compaction. Each
+// waits until nothing is dirty, and is done again when the atlas changed meanwhile.
+//
+// Thread-safe. `patience` bounds all of it, kTimeout; kUnavailable when it is stopped, or the
+// daemon ends.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/status.h"
+#include "server/service/change_signal.h"
+#include "server/service/compaction/compact_atlas.h"
+#include "server/service/fusion_wait.h"
+#include "server/service/verification/atlas_digest.h"
+#include "server/service/verification/atlas_verify.h"
+#include "server/store/atlas_store.h"
+
+namespace atlas {
+
+class WholeAtlas {
+ public:
+  WholeAtlas(AtlasStore& store, ChangeSignal& changes, const FusionWait& wait)
+      : store_(store), changes_(changes), wait_(wait) {}
+
+  // kInvalidData names the damage that keeps the atlas from becoming clean.
+  Result<AtlasDigest> Digest(const Patience& patience) const;
+  // `rebuild` waits and reports what is damaged; a plain check does not wait.
+  Result<VerifyReport> Verify(bool rebuild, const Patience& patience) const;
+  // Drops the keyframes that matter nowhere any more (preset bounded); the tiles stay as they are.
+  // kUnavailable when uploads do not let it finish, kInvalidData names what is damaged; errors of
+  // the request as CheckCompaction. Without success everything is as it was.
+  Result<CompactionReport> Compact(const CompactionRequest& request,
+                                   const Patience& patience) const;
+
+ private:
+  // Of an atlas without dirty tiles, nor damage.
+  Result<std::uint64_t> CleanRevision(const FusionWait::Limit& limit) const;
+
+  AtlasStore& store_;
+  ChangeSignal& changes_;
+  const FusionWait& wait_;
+};
+
+}  // namespace atlas

@@ -1,0 +1,77 @@
+#include "server/store/sqlite/transactions/current_reads.h"
+
+#include <utility>
+
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/keyframe_table.h"
+
+namespace atlas {
+
+Result<FoundKeyframes> FindKeyframeRecords(Connection& connection,
+                                           std::span<const KeyframeKey> keys) {
+  FoundKeyframes records;
+  for (const KeyframeKey& key : keys) {
+    auto record = FindKeyframeRecord(connection, key);
+    if (!record) {
+      return Error(record.error());
+    }
+    records.push_back(std::move(*record));
+  }
+  return records;
+}
+
+std::vector<std::int64_t> ListKeyframeRows(Connection& connection,
+                                           std::int64_t after_id,
+                                           std::uint32_t limit) {
+  Query row = connection.Prepare("SELECT id FROM keyframes WHERE id > ? ORDER BY id LIMIT ?");
+  row.Bind(after_id).Bind(limit);
+  std::vector<std::int64_t> ids;
+  while (row.Step()) {
+    row.Rewind();
+    ids.push_back(row.Int());
+  }
+  return ids;
+}
+
+Result<TileSources> GatherTileSources(Connection& connection,
+                                      const TileId& id,
+                                      std::uint64_t since) {
+  TileSources sources;
+  sources.revision = ReadCounter(connection, Counter::kRevision);
+  sources.is_whole = since < ReadCounter(connection, Counter::kHistoryHorizon) || since == 0;
+  for (const FootprintRow& row : FootprintsSince(connection, id, sources.is_whole ? 0 : since)) {
+    if (!row.is_current) {
+      sources.gone.push_back(row.keyframe_id);
+      continue;
+    }
+    auto record = ReadKeyframeRecord(connection, row.keyframe_id);
+    if (!record) {
+      return Error(record.error());
+    }
+    if (IsInMap(record->session_state)) {
+      sources.keyframes.push_back(std::move(*record));
+    } else {
+      sources.gone.push_back(row.keyframe_id);
+    }
+  }
+  return sources;
+}
+
+StoreCounts ReadStoreCounts(Connection& connection) {
+  StoreCounts counts;
+  counts.revision = ReadCounter(connection, Counter::kRevision);
+  counts.keyframes = ReadCounter(connection, Counter::kKeyframes);
+  counts.keyframe_bytes = ReadCounter(connection, Counter::kKeyframeBytes);
+  counts.compacted = ReadCounter(connection, Counter::kCompacted);
+  counts.sessions = ReadCounter(connection, Counter::kSessions);
+  counts.tiles = ReadCounter(connection, Counter::kTiles);
+  counts.tile_bytes = ReadCounter(connection, Counter::kTileBytes);
+  counts.cells = ReadCounter(connection, Counter::kCells);
+  counts.multilayer_cells = ReadCounter(connection, Counter::kMultilayerCells);
+  counts.dirty_tiles = ReadDirty(connection).dirty_tiles;
+  return counts;
+}
+
+}  // namespace atlas
