@@ -1,6 +1,8 @@
 #include "server/base/thread_priority.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <fstream>
 
 #include <sched.h>
 #include <sys/resource.h>
@@ -21,6 +23,14 @@ bool YieldToOthers(int steps) {
   }
   const int of_process = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::getpid()));
   return ::setpriority(PRIO_PROCESS, 0, std::min(of_process + steps, kNicest)) == 0;
+}
+
+std::chrono::nanoseconds TimeWithoutCore() {
+  std::int64_t on_core_ns = 0;
+  std::int64_t waiting_ns = 0;
+  std::ifstream file("/proc/thread-self/schedstat");
+  file >> on_core_ns >> waiting_ns;
+  return std::chrono::nanoseconds(file ? waiting_ns : 0);
 }
 
 }  // namespace atlas

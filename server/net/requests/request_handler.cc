@@ -98,7 +98,7 @@ void RequestHandler::Cancel(const Envelope& request, Peer& peer) {
 asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
   RequestRecord record(peer.out.peer(), request);
   const std::uint64_t id = request.request_id();
-  const Places::Place place = watch_places_.Take();
+  Places::Place place = watch_places_.Take();
   Status status;
   if (place == nullptr) {
     status = {StatusCode::kUnavailable, StrCat(watch_places_.max_places(),
@@ -110,6 +110,7 @@ asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
   } else {
     status = co_await SendWatch(context_.service, request, peer.cancelled(id), peer.out);
     peer.End(id);
+    place.reset();  // whoever hears of the end may begin another
     const bool is_over = status.code() == StatusCode::kUnavailable;  // as every watch once is
     record.End(is_over ? Status() : status);
   }

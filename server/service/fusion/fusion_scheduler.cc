@@ -39,7 +39,7 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
       refresher_(store, options.building, log_) {
   for (unsigned i = 0; i < options_.workers; ++i) {
     threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
-      RunWorker(stop, {owner, {}});
+      RunWorker(stop, owner);
     });
   }
 }
@@ -63,11 +63,14 @@ void FusionScheduler::Stop() {
   }
 }
 
-void FusionScheduler::RunWorker(const std::stop_token& stop, Worker worker) {
+void FusionScheduler::RunWorker(const std::stop_token& stop, const std::string& owner) {
   if (options_.nice > 0 && !YieldToOthers(options_.nice)) {
-    log_(LogLevel::kWarning, StrCat("fusion: ", worker.owner, " cannot stand back by ",
-                                    options_.nice, ": it runs like the others"));
+    log_(LogLevel::kWarning, StrCat("fusion: ", owner, " cannot stand back by ", options_.nice,
+                                    ": it runs like the others"));
   }
+  WorkerPace::Options pace;
+  pace.rest_to_wait = options_.nice > 0 ? pace.rest_to_wait : 0;
+  Worker worker{owner, WorkerPace(&TimeWithoutCore, pace), {}};
   while (!stop.stop_requested()) {
     const std::uint64_t seen = changes_.version();
     if (!Work(worker, stop)) {
@@ -140,7 +143,10 @@ void FusionScheduler::BuildClaims(Worker& worker,
     }
   }
   std::vector<Unfinished> unfinished;
-  const auto begin = std::chrono::steady_clock::now();
+  auto begin = std::chrono::steady_clock::now();
+  const auto note_time = [&] {
+    building_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begin).count();
+  };
   Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
     const TileClaim& claim =
         *std::find_if(claims.begin(), claims.end(), [&](const TileClaim& c) { return c.id == id; });
@@ -155,8 +161,11 @@ void FusionScheduler::BuildClaims(Worker& worker,
     unfinished.push_back({claim, is_removal, Begin<FinishResult>([&](auto done) {
                             store_.FinishTile(std::move(tile), std::move(done));
                           })});
+    note_time();
+    worker.pace.Rest(stop);
+    begin = std::chrono::steady_clock::now();
   });
-  building_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begin).count();
+  note_time();
   for (Unfinished& tile : unfinished) {
     const auto result = tile.result.get();
     if (!result && result.error().code() == StatusCode::kConflict) {

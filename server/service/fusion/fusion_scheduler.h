@@ -19,6 +19,7 @@
 #include "server/service/change_signal.h"
 #include "server/service/fusion/damage_list.h"
 #include "server/service/fusion/tile_refresher.h"
+#include "server/service/fusion/worker_pace.h"
 #include "server/service/log_sink.h"
 #include "server/store/atlas_store.h"
 
@@ -68,10 +69,11 @@ class FusionScheduler {
   };
   struct Worker {
     std::string owner;
+    WorkerPace pace;
     std::vector<Return> returns;  // claims to be given back; no others are taken before they are
   };
 
-  void RunWorker(const std::stop_token& stop, Worker worker);
+  void RunWorker(const std::stop_token& stop, const std::string& owner);
   bool Work(Worker& worker, const std::stop_token& stop);
   std::vector<TileClaim> NextClaims(const std::string& owner);
   bool StartNextWave(std::uint64_t done);

@@ -1,7 +1,10 @@
 #include "server/base/thread_priority.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -33,6 +36,26 @@ TEST(ThreadPriorityTest, TheNicestGetsWhatNobodyElseWants) {
   }).join();
   EXPECT_EQ(policy, SCHED_IDLE);
   EXPECT_EQ(::sched_getscheduler(0), SCHED_OTHER);
+}
+
+// More threads than cores, each at work for a while: some of them wait.
+TEST(ThreadPriorityTest, WhoWaitsForACoreKnowsHowLong) {
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
+  std::atomic<std::int64_t> waited_ns = 0;
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 0; i < 2 * cores; ++i) {
+      threads.emplace_back([&] {
+        const auto before = TimeWithoutCore();
+        while (std::chrono::steady_clock::now() < end) {
+        }
+        waited_ns += (TimeWithoutCore() - before).count();
+      });
+    }
+  }
+  // 200 ms of a core each are missing, for half of the threads.
+  EXPECT_GT(waited_ns, static_cast<std::int64_t>(cores) * 100'000'000);
 }
 
 }  // namespace
