@@ -23,7 +23,8 @@ class WorkerPace {
   WorkerPace(std::function<Nanoseconds()> without_core, const Options& options);
 
   // Between two pieces of work. Rests for some times as long as the thread had to wait for its core
-  // since the last call, and so is there for no more than a quarter of the time; ends on `stop`.
+  // since the last call: with three, who gets little of a core wants it a quarter of the time. Ends
+  // on `stop`.
   void Rest(const std::stop_token& stop);
 
  private:
