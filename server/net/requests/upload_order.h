@@ -60,7 +60,7 @@ class UploadOrder {
   boost::asio::steady_timer changed_;  // cancelled when somebody left
   std::uint64_t next_ = 0;
   std::uint64_t first_ = 0;
-  std::set<std::uint64_t> left_early_;  // before their turn: refused
+  std::set<std::uint64_t> left_early_;  // before their turn: given up
 };
 
 }  // namespace atlas
