@@ -14,6 +14,7 @@ from bench_daemon import Atlas, Certificate, rows_of
 from bench_serving import CONNECTIONS, ROUNDS, THREADS, fill, write_tile_files
 
 ROUND_MS = 3000
+LONG_ROUND_MS = 30_000  # in which the map's age settles
 VEHICLES = 4
 WORKERS = 2
 
@@ -64,8 +65,8 @@ def stored_keyframes(bin_dir, drive, folder):
     return target
 
 
-def load(bin_dir, port, folder, case, number, *, connections=CONNECTIONS, tls=False):
-    row, = rows_of(bin_dir / "serving_bench", "load", port, folder, case, connections, number, ROUND_MS,
+def load(bin_dir, port, folder, case, number, *, connections=CONNECTIONS, tls=False, round_ms=ROUND_MS):
+    row, = rows_of(bin_dir / "serving_bench", "load", port, folder, case, connections, number, round_ms,
                    *(["tls"] if tls else []))
     return row
 
@@ -95,6 +96,7 @@ def bench_reads(bin_dir, emit, drive):
             with Atlas(bin_dir, "--network-threads", str(THREADS), "--workers", str(WORKERS), *options) as atlas:
                 fill(atlas, drive)
                 emit_reads(emit, f"reads.{name}", list(read_rounds(bin_dir, atlas, keyframes, per_s)))
+                emit_age(emit, f"reads.{name}", bin_dir, atlas, keyframes, per_s)
 
 
 def read_rounds(bin_dir, atlas, keyframes, per_s):
@@ -112,14 +114,14 @@ def idle_reads(bin_dir, atlas, tiles, number):
     return load(bin_dir, atlas.port, tiles, "single", number)
 
 
-def busy_reads(bin_dir, atlas, tiles, number, keyframes, per_s):
+def busy_reads(bin_dir, atlas, tiles, number, keyframes, per_s, *, round_ms=ROUND_MS, options=()):
     atlas.run("wait")
-    seconds = ROUND_MS // 1000 + 2  # before, and behind
+    seconds = round_ms // 1000 + 2  # before, and behind
     with Beside(bin_dir / "upload_bench", "send", keyframes, atlas.port, f"round.{number}", VEHICLES,
-                seconds * per_s, per_s) as fleet:
+                seconds * per_s, per_s, *options) as fleet:
         time.sleep(1)
         began, before = time.monotonic(), fusion_figures(atlas)
-        row = load(bin_dir, atlas.port, tiles, "single", number)
+        row = load(bin_dir, atlas.port, tiles, "single", number, round_ms=round_ms)
         fused_s, row["tiles_built"] = (now - then for now, then in zip(fusion_figures(atlas), before))
         row["workers_busy"] = fused_s / (time.monotonic() - began)
         row.update(fleet.end())
@@ -138,6 +140,15 @@ def emit_reads(emit, name, pairs):
     emit(name + ".acknowledged_p99", of_busy(pairs, "acknowledged_ms_p99"), "ms, keyframes meanwhile", "none", None)
     emit(name + ".workers_busy", of_busy(pairs, "workers_busy"), f"of {WORKERS} fusion workers", "none", None)
     emit(name + ".tiles_built", of_busy(pairs, "tiles_built"), "tiles meanwhile", "none", None)
+
+
+def emit_age(emit, name, bin_dir, atlas, keyframes, per_s):
+    """How long it takes until the map reflects what was acknowledged, while readers take all that they get."""
+    with tempfile.TemporaryDirectory() as tiles:
+        write_tile_files(bin_dir, atlas, tiles)
+        row = busy_reads(bin_dir, atlas, tiles, ROUNDS, keyframes, per_s, round_ms=LONG_ROUND_MS, options=("age",))
+    for what in ("p50", "max"):
+        emit(f"{name}.map_age_{what}", row[f"map_age_s_{what}"], f"s, in {LONG_ROUND_MS // 1000} s of reads", "none", None)
 
 
 def bench_uploads(bin_dir, emit, drive):
@@ -171,8 +182,11 @@ def uploads(bin_dir, atlas, keyframes, vehicles, number):
 
 
 def bench_connections(bin_dir, emit, drive):
-    """A good client beside 2,000 quiet connections and 50 hostile ones, in the clear and with TLS."""
-    for name, with_tls, asked_mib in (("connections", False, 64), ("connections_tls", True, 160)):
+    """A good client beside 2,000 quiet connections and 50 hostile ones: that break rules, in the clear and with TLS,
+    and that keep to them but ask for as much as may be asked."""
+    for name, with_tls, hostility, asked in (("connections", False, "breaks_rules", "asked at most 64"),
+                                             ("connections_tls", True, "breaks_rules", "asked at most 160"),
+                                             ("connections_heavy", False, "asks_much", "none")):
         with contextlib.ExitStack() as stack:
             tiles, keys = (stack.enter_context(tempfile.TemporaryDirectory()) for _ in range(2))
             certificate = Certificate(keys) if with_tls else None
@@ -182,19 +196,20 @@ def bench_connections(bin_dir, emit, drive):
             load(bin_dir, atlas.port, tiles, "single", -1, tls=with_tls)  # what is kept ready counts as there
             before = atlas.resident_bytes()
             for connections in (1, CONNECTIONS):
-                pairs = [crowd_round(bin_dir, atlas, tiles, number, connections, with_tls)
+                pairs = [crowd_round(bin_dir, atlas, tiles, number, connections, hostility, with_tls)
                          for number in range(-1, ROUNDS)][1:]  # the first one warms up
-                emit_crowd(emit, f"{name}.{connections}", pairs, before, asked_mib)
+                emit_crowd(emit, f"{name}.{connections}", pairs, before, asked)
 
 
-def crowd_round(bin_dir, atlas, tiles, number, connections, with_tls):
+def crowd_round(bin_dir, atlas, tiles, number, connections, hostility, with_tls):
     return alternate(number,
                      lambda: load(bin_dir, atlas.port, tiles, "single", number, connections=connections, tls=with_tls),
-                     lambda: crowded(bin_dir, atlas, tiles, number, connections, with_tls))
+                     lambda: crowded(bin_dir, atlas, tiles, number, connections, hostility, with_tls))
 
 
-def crowded(bin_dir, atlas, tiles, number, connections, with_tls):
-    with Beside(bin_dir / "crowd_bench", atlas.port, IDLE, SLOW, HOSTILE, *(["tls"] if with_tls else [])) as crowd:
+def crowded(bin_dir, atlas, tiles, number, connections, hostility, with_tls):
+    with Beside(bin_dir / "crowd_bench", atlas.port, IDLE, SLOW, HOSTILE, hostility,
+                *(["tls"] if with_tls else [])) as crowd:
         time.sleep(0.5)
         row = load(bin_dir, atlas.port, tiles, "single", number, connections=connections, tls=with_tls)
         row["open"] = atlas.metric("roadatlas_connections")
@@ -207,13 +222,13 @@ def crowded(bin_dir, atlas, tiles, number, connections, with_tls):
     return row
 
 
-def emit_crowd(emit, name, pairs, before, asked_mib):
+def emit_crowd(emit, name, pairs, before, asked):
     p99 = of_busy(pairs, "batch_ms_p99")
     emit(name + ".p99", p99, "ms", "without the crowd, asked at most 2", p99 / ratio(pairs, "batch_ms_p99"))
     rate = of_busy(pairs, "tiles_per_s")
     emit(name + ".tiles_per_s", rate, "tiles/s", "without the crowd", rate / ratio(pairs, "tiles_per_s"))
     emit(name + ".memory", (max(row["resident_bytes"] for _, row in pairs) - before) / 2**20,
-         f"MiB more than {before >> 20}", f"asked at most {asked_mib}", asked_mib)
+         f"MiB more than {before >> 20}", asked, None)
     emit(name + ".visits", of_busy(pairs, "visits") / (ROUND_MS / 1000 + 0.5), "hostile connections/s", "none", None)
 
 

@@ -81,6 +81,7 @@ NetOptions NetFrom(const DaemonConfig& config) {
                         : std::max(1, static_cast<int>(std::thread::hardware_concurrency() / 4));
   options.of_name = NameLimitsFrom(config);
   options.tile_frame_bytes = static_cast<std::size_t>(config.reply_mib) << 20;
+  options.max_watched_bytes = static_cast<std::size_t>(config.watch_mib) << 20;
   return options;
 }
 

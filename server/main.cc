@@ -101,8 +101,8 @@ void ReloadConfig(LiveConfig& config) {
                   StatusCodeName(outcome.error().code()), outcome.error().message());
     return;
   }
-  spdlog::info("signal 1: configuration read again, {} changed",
-               outcome->changed.empty() ? "nothing" : Joined(outcome->changed));
+  spdlog::info("signal 1: configuration and its files read again, {} changed",
+               outcome->changed.empty() ? "no setting" : Joined(outcome->changed));
   if (!outcome->waiting.empty()) {
     spdlog::warn("signal 1: changes that need a restart: {}", Joined(outcome->waiting));
   }

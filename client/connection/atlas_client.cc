@@ -130,14 +130,23 @@ AtlasClient& AtlasClient::operator=(AtlasClient&&) noexcept = default;
 AtlasClient::~AtlasClient() = default;
 
 Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
+  milliseconds ignored{0};
+  return Connect(options, ignored);
+}
+
+Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options,
+                                         milliseconds& retry_after) {
+  retry_after = milliseconds(0);
   Result<DaemonConnection> connection =
       DaemonConnection::Open(options.endpoint, options.connect_timeout, options.tls);
   if (!connection) return Error(connection.error());
-  auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout);
+  auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout,
+                                              options.max_retry_after);
   wire::Envelope request = HelloRequest(options);
   const milliseconds less =
       std::min(options.connect_timeout - options.request_timeout, milliseconds(0));
   const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply, less);
+  retry_after = channel->retry_after();
   if (!reply) return Error(reply.error());
   const wire::HelloReply& hello = reply->hello_reply();
   if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {
@@ -318,6 +327,10 @@ Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout)
                        done.mismatched(),
                        {done.findings().begin(), done.findings().end()},
                        done.revision()};
+}
+
+milliseconds AtlasClient::retry_after() const {
+  return channel_->retry_after();
 }
 
 std::uint64_t AtlasClient::bytes_sent() const {

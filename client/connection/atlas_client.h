@@ -29,6 +29,8 @@ struct ConnectionOptions {
   std::string token;                                  // of a person; empty: none
   std::chrono::milliseconds connect_timeout{5'000};   // to connect, and to shake hands
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
+  // The most that is believed of a daemon that wants to be left alone; it asks for 1 s or 5 s.
+  std::chrono::milliseconds max_retry_after{60'000};
 };
 
 class AtlasClient {
@@ -37,6 +39,9 @@ class AtlasClient {
 
   // Connects and shakes hands. kUnsupported when the daemon speaks another protocol version.
   static Result<AtlasClient> Connect(const ConnectionOptions& options);
+  // The same; `retry_after` is set to how long a daemon that refused wants to be left alone, or 0.
+  static Result<AtlasClient> Connect(const ConnectionOptions& options,
+                                     std::chrono::milliseconds& retry_after);
 
   AtlasClient(const AtlasClient&) = delete;
   AtlasClient& operator=(const AtlasClient&) = delete;
@@ -78,6 +83,9 @@ class AtlasClient {
                                     std::chrono::milliseconds timeout);
   Result<VerifySummary> Verify(bool is_rebuild, std::chrono::milliseconds timeout);
 
+  // How long the daemon still wants to be left alone, by what it refused for a while on this
+  // connection (`retry_after_ms`); 0: it does not. Nothing here waits for it by itself.
+  std::chrono::milliseconds retry_after() const;
   std::uint64_t bytes_sent() const;
   std::uint64_t bytes_received() const;
 

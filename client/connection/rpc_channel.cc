@@ -1,5 +1,6 @@
 #include "client/connection/rpc_channel.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -7,8 +8,12 @@
 
 namespace atlas {
 
-RpcChannel::RpcChannel(DaemonConnection connection, Milliseconds frame_timeout)
-    : connection_(std::move(connection)), frame_timeout_(frame_timeout) {}
+RpcChannel::RpcChannel(DaemonConnection connection,
+                       Milliseconds frame_timeout,
+                       Milliseconds max_retry_after)
+    : connection_(std::move(connection)),
+      frame_timeout_(frame_timeout),
+      max_retry_after_(max_retry_after) {}
 
 Result<std::uint64_t> RpcChannel::Send(wire::Envelope& request) {
   request.set_request_id(last_id_ + 1);
@@ -28,11 +33,24 @@ Result<wire::Envelope> RpcChannel::Receive(Milliseconds extra) {
   if (!reply) {
     return Error(reply.error().WithContext("daemon at " + connection_.endpoint().ToText()));
   }
+  if (reply->has_error()) NoteRetryAfter(reply->error());
   if (reply->request_id() == 0 && reply->has_error()) {
     return Error(ErrorFromWire(reply->error()).status);
   }
   if (reply->request_id() == 0 || reply->request_id() > last_id_) return Error(Unexpected(*reply));
   return reply;
+}
+
+void RpcChannel::NoteRetryAfter(const wire::Error& error) {
+  const RemoteError refusal = ErrorFromWire(error);
+  if (!refusal.retry) return;
+  const Milliseconds asked(refusal.retry_after_ms);
+  retry_at_ = std::max(retry_at_, Clock::now() + std::min(asked, max_retry_after_));
+}
+
+RpcChannel::Milliseconds RpcChannel::retry_after() const {
+  const Clock::time_point now = Clock::now();
+  return now < retry_at_ ? std::chrono::ceil<Milliseconds>(retry_at_ - now) : Milliseconds(0);
 }
 
 Result<wire::Envelope> RpcChannel::ReceiveAnyFor(std::uint64_t id, Milliseconds extra) {

@@ -15,8 +15,9 @@ class RpcChannel {
  public:
   using Milliseconds = std::chrono::milliseconds;
 
-  // `frame_timeout`: for every frame to be sent or to arrive whole.
-  RpcChannel(DaemonConnection connection, Milliseconds frame_timeout);
+  // `frame_timeout`: for every frame to be sent or to arrive whole. `max_retry_after`: the most
+  // that is believed of a daemon that wants to be left alone.
+  RpcChannel(DaemonConnection connection, Milliseconds frame_timeout, Milliseconds max_retry_after);
 
   // Gives the request the next id, which is returned.
   Result<std::uint64_t> Send(wire::Envelope& request);
@@ -38,13 +39,21 @@ class RpcChannel {
 
   // The reply is one that no caller expects.
   Status Unexpected(const wire::Envelope& reply) const;
+  // How long the daemon still wants to be left alone, by what it refused so far; 0: it does not.
+  Milliseconds retry_after() const;
   // Of the frame received last, its header included.
   std::uint64_t last_frame_bytes() const { return last_frame_bytes_; }
   DaemonConnection& connection() { return connection_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  void NoteRetryAfter(const wire::Error& error);
+
   DaemonConnection connection_;
   Milliseconds frame_timeout_;
+  Milliseconds max_retry_after_;
+  Clock::time_point retry_at_ = Clock::time_point::min();
   std::uint64_t last_id_ = 0;
   std::uint64_t last_frame_bytes_ = 0;
 };

@@ -22,7 +22,9 @@ LinkEnvironment LinkEnvironment::Real() {
   const auto engine = std::make_shared<std::mt19937_64>(std::random_device()());
   return {[] { return Clock::now(); }, [](milliseconds time) { std::this_thread::sleep_for(time); },
           [engine] { return std::uniform_real_distribution<double>(0.0, 1.0)(*engine); },
-          &AtlasClient::Connect};
+          [](const ConnectionOptions& options, milliseconds& retry_after) {
+            return AtlasClient::Connect(options, retry_after);
+          }};
 }
 
 AtlasLink::AtlasLink(LinkOptions options, LinkEnvironment environment)
@@ -38,17 +40,18 @@ Status AtlasLink::CheckAtlas(const AtlasClient& client) {
 Status AtlasLink::Connect(milliseconds timeout) {
   ConnectionOptions connection = options_.connection;
   connection.connect_timeout = std::min(connection.connect_timeout, timeout);
-  Result<AtlasClient> client = environment_.connect(connection);
+  milliseconds retry_after{0};
+  Result<AtlasClient> client = environment_.connect(connection, retry_after);
   Status status = client ? CheckAtlas(*client) : client.error();
   if (!status.ok()) {
-    NoteFailure(status);
+    NoteFailure(status, retry_after);
     return status;
   }
   client_.emplace(*std::move(client));
   return {};
 }
 
-void AtlasLink::NoteFailure(const Status& status) {
+void AtlasLink::NoteFailure(const Status& status, milliseconds retry_after) {
   last_failure_ = status;
   if (!MaySucceedLater(status.code())) {
     refusal_ = status;
@@ -58,7 +61,8 @@ void AtlasLink::NoteFailure(const Status& status) {
                          static_cast<double>(1 << std::min(failures_, kMaxDoublings));
   const double most_ms = std::min(doubled, static_cast<double>(options_.max_delay.count()));
   const auto delay = milliseconds(static_cast<std::int64_t>(environment_.random() * most_ms));
-  next_attempt_ = environment_.now() + delay;
+  // Added, not the larger of both: else all that were refused together come back together.
+  next_attempt_ = environment_.now() + retry_after + delay;
   ++failures_;
 }
 
@@ -95,8 +99,9 @@ void AtlasLink::Report(const Status& status) {
                          status.code() == StatusCode::kTimeout ||
                          status.code() == StatusCode::kInvalidData;
   if (!is_broken || !client_) return;
+  const milliseconds retry_after = client_->retry_after();
   client_.reset();
-  NoteFailure({StatusCode::kUnavailable, status.message()});
+  NoteFailure({StatusCode::kUnavailable, status.message()}, retry_after);
 }
 
 void AtlasLink::TryAgain() {

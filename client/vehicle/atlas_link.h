@@ -1,6 +1,6 @@
 // Keeps a connection to one daemon: connects within a deadline, and after a failure not before a
-// random part of a delay that doubles, so that a fleet does not come back all at once. Stops by
-// itself when what failed will fail again. One thread at a time.
+// random part of a delay that doubles, so that a fleet does not come back all at once, nor before
+// the daemon wants it. Stops by itself when what failed will fail again. One thread at a time.
 #pragma once
 
 #include <chrono>
@@ -28,7 +28,10 @@ struct LinkEnvironment {
   std::function<Clock::time_point()> now;
   std::function<void(std::chrono::milliseconds)> sleep;
   std::function<double()> random;  // uniform in [0, 1)
-  std::function<Result<AtlasClient>(const ConnectionOptions&)> connect;
+  // As AtlasClient::Connect.
+  std::function<Result<AtlasClient>(const ConnectionOptions&,
+                                    std::chrono::milliseconds& retry_after)>
+      connect;
 
   static LinkEnvironment Real();
 };
@@ -56,7 +59,7 @@ class AtlasLink {
 
   Status Connect(std::chrono::milliseconds timeout);
   Status CheckAtlas(const AtlasClient& client);
-  void NoteFailure(const Status& status);
+  void NoteFailure(const Status& status, std::chrono::milliseconds retry_after);
 
   LinkOptions options_;
   LinkEnvironment environment_;

@@ -85,7 +85,7 @@ Result<Bytes> LoadFile(const fs::path& path, std::uint64_t max_bytes) {
   }
   const auto size = static_cast<std::uint64_t>(facts.st_size);
   if (size > max_bytes) {
-    return Error(StatusCode::kResourceExhausted,
+    return Error(StatusCode::kInvalidData,
                  StrCat(path.string(), ": ", size, " bytes, expected at most ", max_bytes));
   }
   Bytes bytes(size);

@@ -20,7 +20,7 @@ enum class Durability : std::uint8_t {
 
 // kResourceExhausted on a full disk, kPermissionDenied, else kUnavailable; nothing is left then.
 Status StoreFile(const std::filesystem::path& path, ByteSpan bytes, Durability durability);
-// kNotFound, kResourceExhausted above `max_bytes`, else as above.
+// kNotFound, kInvalidData above `max_bytes` (nobody wrote that), else what the disk said.
 Result<Bytes> LoadFile(const std::filesystem::path& path, std::uint64_t max_bytes);
 // With its parents; fine when it exists. Its name is settled on the device.
 Status MakeFolder(const std::filesystem::path& folder);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <map>
 #include <optional>
 #include <string>
@@ -102,6 +103,43 @@ void RemoveFile(const fs::path& path) {
   fs::remove(path, ignored);
 }
 
+struct KnownAtlas {
+  fs::file_time_type opened;
+  AtlasKey atlas;
+};
+
+// By name, so that those opened at the same time have an order.
+std::vector<KnownAtlas> KnownBelow(const fs::path& root) {
+  std::map<std::string, KnownAtlas> known;
+  std::error_code error;
+  for (fs::directory_iterator entry(root, error), end; !error && entry != end;
+       entry.increment(error)) {
+    auto atlas = ReadAtlas(entry->path());
+    const std::string name = entry->path().filename().string();
+    if (!atlas || name != FolderName(atlas->atlas_id)) continue;
+    std::error_code unknown;  // then the time is the earliest there is
+    known[name] = {fs::last_write_time(entry->path() / kAtlasName, unknown), *std::move(atlas)};
+  }
+  std::vector<KnownAtlas> all;
+  all.reserve(known.size());
+  for (auto& [name, atlas] : known) {
+    all.push_back(std::move(atlas));
+  }
+  return all;
+}
+
+// The time of writing of `atlas` says when it was opened. It is later than that of all others even
+// where the vehicle's clock was set back.
+void NoteOpened(const fs::path& root, const AtlasKey& atlas) {
+  fs::file_time_type now = fs::file_time_type::clock::now();
+  for (const KnownAtlas& other : KnownBelow(root)) {
+    const bool is_later = other.atlas.atlas_id != atlas.atlas_id && other.opened >= now;
+    if (is_later) now = other.opened + std::chrono::milliseconds(1);
+  }
+  std::error_code ignored;  // a read-only disk: what it says stays as it is
+  fs::last_write_time(root / FolderName(atlas.atlas_id) / kAtlasName, now, ignored);
+}
+
 // Files of the folder with their time of writing.
 struct Dated {
   fs::file_time_type written;
@@ -114,13 +152,13 @@ TileFiles::TileFiles(fs::path folder, Bytes atlas_id)
     : folder_(std::move(folder)), atlas_id_(std::move(atlas_id)) {}
 
 std::vector<AtlasKey> TileFiles::Known(const fs::path& root) {
+  std::vector<KnownAtlas> by_time = KnownBelow(root);
+  std::stable_sort(by_time.begin(), by_time.end(),
+                   [](const KnownAtlas& a, const KnownAtlas& b) { return a.opened > b.opened; });
   std::vector<AtlasKey> known;
-  std::error_code error;
-  for (fs::directory_iterator entry(root, error), end; !error && entry != end;
-       entry.increment(error)) {
-    auto atlas = ReadAtlas(entry->path());
-    const bool is_named = atlas && entry->path().filename() == FolderName(atlas->atlas_id);
-    if (is_named) known.push_back(*std::move(atlas));
+  known.reserve(by_time.size());
+  for (KnownAtlas& one : by_time) {
+    known.push_back(std::move(one.atlas));
   }
   return known;
 }
@@ -134,10 +172,12 @@ Result<TileFiles> TileFiles::Open(const fs::path& root, const AtlasKey& atlas) {
   TileFiles files(root / FolderName(atlas.atlas_id), atlas.atlas_id);
   if (Status status = MakeFolder(files.folder_); !status.ok()) return Error(std::move(status));
   const auto known = ReadAtlas(files.folder_);
-  if (known && *known == atlas) return files;
-  if (known) files.RemoveAll();
-  Status status = StoreFile(files.folder_ / kAtlasName, EncodeAtlas(atlas), Durability::kWhole);
-  if (!status.ok()) return Error(std::move(status));
+  if (!known || *known != atlas) {
+    if (known) files.RemoveAll();
+    Status status = StoreFile(files.folder_ / kAtlasName, EncodeAtlas(atlas), Durability::kWhole);
+    if (!status.ok()) return Error(std::move(status));
+  }
+  NoteOpened(root, atlas);
   return files;
 }
 

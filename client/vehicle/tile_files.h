@@ -36,10 +36,12 @@ class TileFiles {
     std::uint64_t bytes = 0;
   };
 
-  // The atlases with a folder below `root`: where a vehicle without a connection begins.
+  // The atlases with a folder below `root`, the one that was opened last first: where a vehicle
+  // without a connection begins.
   static std::vector<AtlasKey> Known(const std::filesystem::path& root);
 
-  // Makes the folder if there is none. A folder of another profile is emptied.
+  // Makes the folder if there is none, and is the last one opened then, as far as the disk lets it
+  // be written down. A folder of another profile is emptied.
   static Result<TileFiles> Open(const std::filesystem::path& root, const AtlasKey& atlas);
 
   // By when they were written, the last one last. Removes what writes that never ended left, and

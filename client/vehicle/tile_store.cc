@@ -42,7 +42,8 @@ TileStore::TileStore(AtlasKey atlas, const TileStoreOptions& options)
 Result<TileStore> TileStore::Open(AtlasKey atlas, const TileStoreOptions& options) {
   TileStore store(std::move(atlas), options);
   if (options.folder.empty()) return store;
-  if (Status status = store.OpenFolder(); !status.ok()) return Error(std::move(status));
+  store.disk_problem_ = store.OpenFolder();
+  if (store.disk_problem_.code() == StatusCode::kInvalidArgument) return Error(store.disk_problem_);
   return store;
 }
 
@@ -140,8 +141,8 @@ void TileStore::Keep(const TileFacts& facts, Bytes blob) {
     const Result<std::uint64_t> written = files_->Write(facts, blob);
     entry.is_on_disk = written.has_value();
     if (written) disk_.Insert(facts.id, *written);
-    disk_failures_ += written ? 0U : 1U;
   }
+  disk_failures_ += !options_.folder.empty() && !entry.is_on_disk ? 1U : 0U;
   memory_.Insert(facts.id, blob.size());
   entry.blob = std::make_shared<const Bytes>(std::move(blob));
   tiles_[facts.id.Key()] = std::move(entry);

@@ -26,7 +26,8 @@ struct TileStoreOptions {
 
 class TileStore {
  public:
-  // Reads the folder's names, no tile. Errors of a folder that cannot be made.
+  // Reads the folder's names, no tile. A folder that the disk does not let it make or use leaves a
+  // store in memory, and disk_problem says why. kInvalidArgument: an atlas id that is none.
   static Result<TileStore> Open(AtlasKey atlas, const TileStoreOptions& options);
 
   TileStore(const TileStore&) = delete;  // its orders point into themselves
@@ -41,6 +42,8 @@ class TileStore {
   std::size_t disk_bytes() const { return disk_.bytes(); }
   // Tiles that the disk had no room for, or would not take: held in memory only.
   std::uint64_t disk_failures() const { return disk_failures_; }
+  // Ok, or why nothing outlives the store although it was given a folder.
+  const Status& disk_problem() const { return disk_problem_; }
 
   // Null: not held.
   const TileFacts* Find(const TileId& id) const;
@@ -90,6 +93,7 @@ class TileStore {
   // Told as held in part: they may be gone before the rest of them comes.
   std::map<std::uint64_t, TileFacts> told_;
   std::uint64_t disk_failures_ = 0;
+  Status disk_problem_;
 };
 
 }  // namespace atlas

@@ -111,25 +111,62 @@ Status UploadSpool::Put(const KeyframeUpload& upload) {
   return {};
 }
 
+std::uint64_t UploadSpool::Forget(Number number) {
+  const auto found = waiting_.find(number);
+  const std::uint64_t bytes = found->second;
+  waiting_bytes_ -= bytes;
+  waiting_.erase(found);
+  return bytes;
+}
+
 void UploadSpool::Remove(Number number) {
   RemoveFile(PathOf(number));
-  const auto found = waiting_.find(number);
-  waiting_bytes_ -= found->second;
-  waiting_.erase(found);
+  Forget(number);
 }
 
 Status UploadSpool::SetAside(Number number, const std::string& reason) {
-  const auto found = waiting_.find(number);
+  const fs::path reason_path = refused_folder() / NameOf(number, kReasonSuffix);
   const std::string text = reason + "\n";
   const Bytes bytes(text.begin(), text.end());
-  ATLAS_RETURN_IF_ERROR(
-      StoreFile(refused_folder() / NameOf(number, kReasonSuffix), bytes, Durability::kOnDevice));
-  ATLAS_RETURN_IF_ERROR(MoveFile(PathOf(number), refused_folder() / NameOf(number, kSuffix)));
-  waiting_bytes_ -= found->second;
-  refused_bytes_ += found->second;
-  refused_.insert(waiting_.extract(found));
+  ATLAS_RETURN_IF_ERROR(StoreFile(reason_path, bytes, Durability::kOnDevice));
+  const Status moved = MoveFile(PathOf(number), refused_folder() / NameOf(number, kSuffix));
+  if (!moved.ok()) RemoveFile(reason_path);
+  if (moved.code() == StatusCode::kNotFound) Forget(number);
+  ATLAS_RETURN_IF_ERROR(moved);
+  refused_bytes_ += refused_[number] = Forget(number);
   TrimRefused();
   return {};
+}
+
+Status UploadSpool::PutBack(Number number) {
+  const std::uint64_t bytes = refused_.at(number);
+  if (waiting_bytes_ + bytes > options_.max_bytes) {
+    return {StatusCode::kResourceExhausted,
+            StrCat("upload spool: ", waiting_bytes_, " bytes wait, no room for ", bytes,
+                   " that were refused, of ", options_.max_bytes)};
+  }
+  const Status moved = MoveFile(refused_folder() / NameOf(number, kSuffix), PathOf(number));
+  if (!moved.ok() && moved.code() != StatusCode::kNotFound) return moved;
+  RemoveFile(refused_folder() / NameOf(number, kReasonSuffix));
+  refused_.erase(number);
+  refused_bytes_ -= bytes;
+  ATLAS_RETURN_IF_ERROR(moved);
+  waiting_[number] = bytes;
+  waiting_bytes_ += bytes;
+  return {};
+}
+
+Result<std::size_t> UploadSpool::RetryRefused() {
+  const std::map<Number, std::uint64_t> refused = refused_;
+  std::size_t count = 0;
+  Status failure;
+  for (const auto& [number, bytes] : refused) {
+    const Status status = PutBack(number);
+    count += status.ok() ? 1U : 0U;
+    if (failure.ok()) failure = status;
+  }
+  if (count == 0 && !failure.ok()) return Error(failure);
+  return count;
 }
 
 void UploadSpool::TrimRefused() {
@@ -174,20 +211,42 @@ class UploadSpool::Sending {
   }
 
   Status SendOne(Number number) {
-    const Result<Bytes> file = LoadFile(spool_.PathOf(number), kMaxSpooledBytes);
-    if (!file && MaySucceedLater(file.error().code())) return file.error();
-    Result<SpooledKeyframe> keyframe =
-        file ? DecodeSpooled(*file) : Result<SpooledKeyframe>(Error(file.error()));
-    if (!keyframe) return SetAside(number, keyframe.error());
+    const Result<SpooledKeyframe> keyframe = Load(number);
+    if (!keyframe) return {};
     // Two under one key: the answers to them could not be told apart.
     if (in_flight_.contains(keyframe->key)) ATLAS_RETURN_IF_ERROR(uploader_.Finish());
     in_flight_[keyframe->key] = number;
     return uploader_.Upload(keyframe->ToUpload());
   }
 
-  Status SetAside(Number number, const Status& reason) {
-    ++report_.set_aside;
-    return spool_.SetAside(number, StrCat(StatusCodeName(reason.code()), ": ", reason.message()));
+  // What cannot be sent is dealt with here, and stops no other.
+  Result<SpooledKeyframe> Load(Number number) {
+    const Result<Bytes> file = LoadFile(spool_.PathOf(number), kMaxSpooledBytes);
+    Result<SpooledKeyframe> keyframe =
+        file ? DecodeSpooled(*file) : Result<SpooledKeyframe>(Error(file.error()));
+    if (keyframe) return keyframe;
+    if (keyframe.error().code() == StatusCode::kInvalidData) {
+      SetAside(number, keyframe.error());
+    } else {
+      if (keyframe.error().code() == StatusCode::kNotFound) spool_.Forget(number);
+      NoteProblem(keyframe.error());
+    }
+    return keyframe;
+  }
+
+  void SetAside(Number number, const Status& reason) {
+    const Status status =
+        spool_.SetAside(number, StrCat(StatusCodeName(reason.code()), ": ", reason.message()));
+    if (status.ok()) {
+      ++report_.set_aside;
+    } else {
+      NoteProblem(status);
+    }
+  }
+
+  void NoteProblem(const Status& problem) {
+    ++(problem.code() == StatusCode::kNotFound ? report_.vanished : report_.skipped);
+    if (report_.problem.ok()) report_.problem = problem;
   }
 
   void OnAnswer(const KeyframeKey& key, const Status& answer) {
@@ -198,8 +257,8 @@ class UploadSpool::Sending {
       ++report_.acknowledged;
     } else if (MaySucceedLater(answer.code()) || IsOfTheClient(answer.code())) {
       if (failure_.ok()) failure_ = answer;
-    } else if (Status status = SetAside(number, answer); !status.ok() && failure_.ok()) {
-      failure_ = std::move(status);
+    } else {
+      SetAside(number, answer);
     }
   }
 
@@ -211,6 +270,9 @@ class UploadSpool::Sending {
 };
 
 Result<SpoolReport> UploadSpool::Send(AtlasClient& client) {
+  SpoolReport held_back;
+  held_back.retry_after = client.retry_after();
+  if (held_back.retry_after.count() > 0) return held_back;
   return Sending(*this, client).Run();
 }
 

@@ -3,6 +3,7 @@
 // order of Put. One thread at a time, one process a folder.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -25,6 +26,11 @@ struct SpoolOptions {
 struct SpoolReport {
   std::uint64_t acknowledged = 0;  // and gone from the disk; duplicates among them
   std::uint64_t set_aside = 0;     // refused for good or damaged; with a .reason beside each
+  std::uint64_t skipped = 0;       // could not be read, or set aside, this time: they wait
+  std::uint64_t vanished = 0;      // removed by somebody else: forgotten
+  Status problem;                  // the first file's of those skipped or vanished
+  // Not 0: nothing was sent, the daemon wants to be left alone for so long.
+  std::chrono::milliseconds retry_after{0};
 };
 
 class UploadSpool {
@@ -37,9 +43,17 @@ class UploadSpool {
   Status Put(const KeyframeUpload& upload);
   // Oldest first, as many at a time as the options say. Fails when the link does, with the first
   // refusal that may pass (what waits is kept then), or when the client may not upload at all.
+  // Sends nothing while the daemon wants to be left alone (AtlasClient::retry_after). A file that
+  // is of no use stops no other.
   Result<SpoolReport> Send(AtlasClient& client);
 
+  // Puts what was refused back into the queue, at the places that it had, as far as there is room:
+  // for when the reason is gone (a clock that was fast, another daemon). How many; fails only when
+  // none could be moved.
+  Result<std::size_t> RetryRefused();
+
   std::size_t waiting() const { return waiting_.size(); }
+  std::size_t refused() const { return refused_.size(); }
   std::uint64_t waiting_bytes() const { return waiting_bytes_; }
   std::filesystem::path refused_folder() const { return options_.folder / "refused"; }
 
@@ -50,8 +64,12 @@ class UploadSpool {
   explicit UploadSpool(SpoolOptions options) : options_(std::move(options)) {}
   Status Scan();
   void Remove(Number number);
-  // Moves it out of the queue, the reason first.
+  // Moves it out of the queue, the reason first. kNotFound: it vanished, and waits no more.
   Status SetAside(Number number, const std::string& reason);
+  // The bytes that it had.
+  std::uint64_t Forget(Number number);
+  // Back into the queue. kNotFound: it vanished, and is refused no more.
+  Status PutBack(Number number);
   void TrimRefused();
   std::filesystem::path PathOf(Number number) const;
 

@@ -67,12 +67,12 @@ Result<Bytes> DecompressAgainst(ByteSpan prefix, ByteSpan frame, std::size_t exp
     return Error(StatusCode::kInvalidData, "compressed block is truncated or has trailing bytes");
   }
   // One a thread: to be made for each frame it is too large.
-  thread_local const Decompressor context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
-  ZSTD_DCtx_reset(context.get(), ZSTD_reset_session_only);
-  ZSTD_DCtx_refPrefix(context.get(), prefix.data(), prefix.size());
+  thread_local const Decompressor kContext(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  ZSTD_DCtx_reset(kContext.get(), ZSTD_reset_session_only);
+  ZSTD_DCtx_refPrefix(kContext.get(), prefix.data(), prefix.size());
   Bytes bytes(expected_size);
   const std::size_t size =
-      ZSTD_decompressDCtx(context.get(), bytes.data(), bytes.size(), frame.data(), frame.size());
+      ZSTD_decompressDCtx(kContext.get(), bytes.data(), bytes.size(), frame.data(), frame.size());
   if (ZSTD_isError(size) != 0 || size != expected_size) {
     return Error(StatusCode::kInvalidData,
                  StrCat("compressed block is damaged: ", ZSTD_getErrorName(size)));

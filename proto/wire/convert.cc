@@ -24,11 +24,14 @@ wire::KeyframeKey KeyToWire(const KeyframeKey& key) {
 }
 
 Result<KeyframeKey> KeyFromWire(const wire::KeyframeKey& message) {
-  KeyframeKey key{{message.vehicle(), message.session()}, message.sequence()};
-  if (Status status = key.Validate(); !status.ok()) {
+  Status status = ValidateName("vehicle", message.vehicle());  // as they are: they may be long
+  if (status.ok()) {
+    status = ValidateName("session", message.session());
+  }
+  if (!status.ok()) {
     return Error(std::move(status));
   }
-  return key;
+  return KeyframeKey{{message.vehicle(), message.session()}, message.sequence()};
 }
 
 wire::Pose PoseToWire(const QuantizedPose& pose) {

@@ -72,6 +72,14 @@ Status CheckFramePayload(const FrameHeader& header, ByteSpan payload) {
   return {};
 }
 
+Result<ByteSpan> LargeFrame::Payload() const {
+  const ByteSpan payload = ByteSpan(bytes_).subspan(begin_);
+  if (Status status = CheckFramePayload(header_, payload); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return payload;
+}
+
 FrameDecoder::FrameDecoder(std::uint32_t max_payload_bytes)
     : max_payload_bytes_(max_payload_bytes) {}
 
@@ -104,6 +112,24 @@ Result<std::optional<ByteSpan>> FrameDecoder::Next() {
     DropConsumed();
   }
   return frame;
+}
+
+std::optional<LargeFrame> FrameDecoder::TakeLarge(std::size_t above_bytes) {
+  if (failure_ || pending_bytes() <= kFrameHeaderBytes + above_bytes) {
+    return std::nullopt;
+  }
+  const std::size_t begin = consumed_ + kFrameHeaderBytes;
+  const auto header = DecodeFrameHeader(ByteSpan(buffer_).subspan(consumed_, kFrameHeaderBytes),
+                                        max_payload_bytes_);
+  if (!header || header->payload_bytes <= above_bytes ||
+      header->payload_bytes > buffer_.size() - begin) {
+    return std::nullopt;
+  }
+  const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(begin + header->payload_bytes);
+  Bytes rest(end, buffer_.end());  // little beside what is taken, which is not copied
+  buffer_.erase(end, buffer_.end());
+  consumed_ = 0;
+  return LargeFrame(*header, std::exchange(buffer_, std::move(rest)), begin);
 }
 
 Result<std::optional<ByteSpan>> FrameDecoder::TakeFrame() {

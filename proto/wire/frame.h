@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "core/base/bytes.h"
 #include "core/base/status.h"
@@ -35,6 +36,23 @@ Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload
 // kInvalidData when the payload does not have the header's checksum.
 Status CheckFramePayload(const FrameHeader& header, ByteSpan payload);
 
+// A frame by itself, whole but not looked into: that takes as long as it is large.
+class LargeFrame {
+ public:
+  // `bytes`: those of the payload, from `begin` on, are the last ones.
+  LargeFrame(const FrameHeader& header, Bytes bytes, std::size_t begin)
+      : header_(header), bytes_(std::move(bytes)), begin_(begin) {}
+
+  std::size_t size() const { return kFrameHeaderBytes + header_.payload_bytes; }
+  // As long as this lives. kInvalidData when it does not have the header's checksum.
+  Result<ByteSpan> Payload() const;
+
+ private:
+  FrameHeader header_;
+  Bytes bytes_;
+  std::size_t begin_;
+};
+
 // Bytes in as they come, payloads out: for peers that read in arbitrary pieces. Holds what has
 // arrived and was not handed out; memory grows with that, never with what a header claims, and
 // goes when it is gone.
@@ -48,6 +66,8 @@ class FrameDecoder {
   // The next whole payload, valid until the next call of anything here; nullopt if more bytes are
   // needed. An error is final.
   Result<std::optional<ByteSpan>> Next();
+  // The next frame, if it is whole and its payload above this; else it is for Next().
+  std::optional<LargeFrame> TakeLarge(std::size_t above_bytes);
   // That have come and that Next() did not hand out.
   std::size_t pending_bytes() const { return buffer_.size() - consumed_; }
 

@@ -2,13 +2,22 @@
 
 #include <set>
 
+#include "server/config/setting_table.h"
+
 namespace atlas {
 namespace {
 
-// Of one setting alone: what else is given plays no part in what it means.
-Result<DaemonConfig> ConfigOf(const GivenSettings& given, const std::string& key) {
-  const auto found = given.find(key);
-  return ConfigFrom(found == given.end() ? GivenSettings() : GivenSettings{*found});
+// The defaults but for one setting, whether it makes sense alone or not: a certificate without its
+// key does not.
+Result<DaemonConfig> WithOnly(const GivenSettings& given, const std::string& key) {
+  DaemonConfig config;
+  if (const auto found = given.find(key); found != given.end()) {
+    Status status = SettingByKey(key).apply(key, found->second.text, config);
+    if (!status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return config;
 }
 
 // Keys whose values differ, however they are written.
@@ -21,7 +30,7 @@ std::vector<std::string> Differences(const GivenSettings& before, const GivenSet
   }
   std::vector<std::string> differing;
   for (const std::string& key : keys) {
-    if (ConfigOf(before, key) != ConfigOf(after, key)) {
+    if (WithOnly(before, key) != WithOnly(after, key)) {
       differing.push_back(key);
     }
   }

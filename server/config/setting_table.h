@@ -12,15 +12,15 @@
 
 namespace atlas {
 
-struct Setting {
-  const char* key;  // in the file
-  const char* flag;
-  const char* environment;
-  const char* value;  // what kind of one, for --help
-  const char* help;
-  SettingType type;
+struct Setting {              // NOLINT(clang-analyzer-optin.performance.Padding): in reading order
+  const char* key = nullptr;  // in the file
+  const char* flag = nullptr;
+  const char* environment = nullptr;
+  const char* value = nullptr;  // what kind of one, for --help
+  const char* help = nullptr;
+  SettingType type = {};
   // kInvalidArgument says what was expected.
-  Status (*apply)(const std::string& key, const std::string& text, DaemonConfig& config);
+  Status (*apply)(const std::string& key, const std::string& text, DaemonConfig& config) = nullptr;
   bool is_live = false;  // may change while the daemon runs: a part of LiveConfig takes it
 };
 

@@ -16,6 +16,7 @@ namespace atlas {
 struct PeerRecord {
   std::string address;    // "ADDRESS:PORT"
   std::string client;     // what it calls itself; empty until it is greeted
+  std::string name;       // of its certificate or token; empty: it has none
   NetCounters& counters;  // of its thread, as is the next
   LineBudget& lines;      // about requests
   std::chrono::milliseconds slow_request;
@@ -25,6 +26,9 @@ struct PeerRecord {
     line.Add("peer", address);
     if (!client.empty()) {
       line.Add("client", client);
+    }
+    if (!name.empty()) {
+      line.Add("name", name);
     }
     return line;
   }

@@ -19,7 +19,7 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/connection/byte_budget.h"
+#include "server/net/byte_budget.h"
 #include "server/net/connection/net_thread.h"
 #include "server/net/connection/visit_pace.h"
 #include "server/net/peer_socket.h"
@@ -76,6 +76,7 @@ class TcpServer::Impl {
     for (const auto& thread : threads_) {
       thread->Stop();
     }
+    handler_.Join();
     pool_.join();
     reading_pool_.join();
     service_.Flush();
@@ -196,7 +197,7 @@ class TcpServer::Impl {
         return;
       }
     }
-    thread.Serve({std::move(socket), std::move(place), std::move(session), security_.access});
+    thread.Serve({std::move(socket), std::move(place), std::move(session), security_});
   }
 
   // One line a second, however many come.

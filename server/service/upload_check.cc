@@ -22,7 +22,7 @@ Status CheckTime(std::int64_t time_ms, std::int64_t now_ms) {
 }
 
 Result<KeyframeHeader> CheckBlob(ByteSpan blob, const MapProfile& profile) {
-  const auto header = ReadKeyframeHeader(blob);
+  auto header = ReadKeyframeHeader(blob);
   if (!header) {
     return header;
   }

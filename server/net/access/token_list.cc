@@ -26,8 +26,8 @@ bool ParseWhole(std::string_view text, T& value, int base = 10) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// The end of that day, UTC.
-std::optional<std::int64_t> EndOfDay_ms(std::string_view text) {
+// The end of that day, UTC, in ms since 1970.
+std::optional<std::int64_t> EndOfDay(std::string_view text) {
   int year = 0;
   unsigned month = 0;
   unsigned day = 0;
@@ -99,7 +99,7 @@ Result<TokenList::Entry> TokenList::ParseLine(const std::string& line) {
         StrCat("there is no role '", role, "', expected reader, vehicle, merge or admin")));
   }
   entry.owner.role = *known;
-  entry.expires_ms = EndOfDay_ms(expires);
+  entry.expires_ms = EndOfDay(expires);
   if (!entry.expires_ms && expires != "never") {
     return Error(Malformed(StrCat("'", expires, "', expected a day (2027-06-30) or never")));
   }

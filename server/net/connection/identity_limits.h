@@ -9,7 +9,7 @@
 #include <mutex>
 #include <string>
 
-#include "server/net/connection/byte_budget.h"
+#include "server/net/byte_budget.h"
 #include "server/net/connection/token_bucket.h"
 #include "server/net/net_options.h"
 #include "server/net/places.h"
@@ -36,6 +36,11 @@ class IdentityAllowance {
     return std::max(requests_.Take(static_cast<double>(requests), now),
                     bytes_.Take(static_cast<double>(bytes), now));
   }
+  // Nothing that it sent counts any more.
+  bool IsRested(TokenBucket::Time now) {
+    const std::lock_guard lock(mutex_);
+    return requests_.IsFull(now) && bytes_.IsFull(now);
+  }
   // From now on; what it has already it keeps.
   void Change(const NameLimits& limits) {
     connections_.set_max_places(limits.connections);
@@ -57,14 +62,16 @@ class IdentityLimits {
  public:
   explicit IdentityLimits(const NameLimits& limits) : limits_(limits) {}
 
-  // Shared by all who hold it; forgotten when nobody does.
-  std::shared_ptr<IdentityAllowance> Of(const std::string& name) {
+  // Shared by all who hold it; forgotten when nobody does and it is as a new one: who comes again
+  // goes on from where it was.
+  std::shared_ptr<IdentityAllowance> Of(const std::string& name, TokenBucket::Time now) {
     const std::lock_guard lock(mutex_);
-    std::erase_if(allowances_, [](const auto& entry) { return entry.second.expired(); });
-    auto allowance = allowances_[name].lock();
+    std::erase_if(allowances_, [now](const auto& entry) {
+      return entry.second.use_count() == 1 && entry.second->IsRested(now);
+    });
+    auto& allowance = allowances_[name];
     if (allowance == nullptr) {
       allowance = std::make_shared<IdentityAllowance>(limits_);
-      allowances_[name] = allowance;
     }
     return allowance;
   }
@@ -72,17 +79,15 @@ class IdentityLimits {
   void Change(const NameLimits& limits) {
     const std::lock_guard lock(mutex_);
     limits_ = limits;
-    for (const auto& [name, weak] : allowances_) {
-      if (const auto allowance = weak.lock()) {
-        allowance->Change(limits);
-      }
+    for (const auto& [name, allowance] : allowances_) {
+      allowance->Change(limits);
     }
   }
 
  private:
   std::mutex mutex_;
   NameLimits limits_;
-  std::map<std::string, std::weak_ptr<IdentityAllowance>> allowances_;
+  std::map<std::string, std::shared_ptr<IdentityAllowance>> allowances_;
 };
 
 }  // namespace atlas

@@ -96,6 +96,7 @@ asio::awaitable<void> NetThread::CheckDeadlines() {
     timer.expires_after(LookEvery(options_));
     co_await timer.async_wait(asio::use_awaitable);
     const auto now = PeerConnection::Clock::now();
+    handler_.ReturnFreed(now);
     std::erase_if(connections_, [now](const auto& weak) {
       const auto connection = weak.lock();
       if (connection) {

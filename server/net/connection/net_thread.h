@@ -15,7 +15,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 
-#include "server/net/connection/byte_budget.h"
+#include "server/net/byte_budget.h"
 #include "server/net/connection/peer_connection.h"
 #include "server/net/net_counters.h"
 #include "server/net/net_options.h"

@@ -1,16 +1,17 @@
 #include "server/net/connection/peer_connection.h"
 
-#include <exception>
 #include <optional>
 #include <utility>
 
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
 #include "server/net/access/access_check.h"
+#include "server/net/connection/completion.h"
 
 namespace atlas {
 namespace {
@@ -18,37 +19,8 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-constexpr std::size_t kMaxClientBytes = 100;  // of its name that are kept for the log
-
-Status HoldsTooMuch(std::size_t bytes, const std::string& whose) {
-  return {StatusCode::kResourceExhausted,
-          StrCat("the daemon holds ", bytes, " bytes of requests of ", whose,
-                 " already; try again later")};
-}
-
-// The one place where what escapes a coroutine is caught. It keeps the connection alive until then.
-class Completion {
- public:
-  Completion(std::shared_ptr<PeerConnection> connection, const char* what)
-      : connection_(std::move(connection)), what_(what) {}
-
-  void operator()(std::exception_ptr failure) const {
-    if (!failure) {
-      return;
-    }
-    try {
-      std::rethrow_exception(failure);
-    } catch (const std::exception& error) {
-      const std::string message = StrCat(what_, " failed: ", error.what());
-      spdlog::error("{}", connection_->peer().Line(message).text());
-    }
-    connection_->CloseNow();
-  }
-
- private:
-  std::shared_ptr<PeerConnection> connection_;
-  const char* what_;
-};
+constexpr std::size_t kBytesInTurn = 256u << 10;  // of one peer that has more
+constexpr std::size_t kMaxClientBytes = 100;      // of its name that are kept for the log
 
 }  // namespace
 
@@ -56,18 +28,18 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
     : stream_(std::move(arrival.socket), std::move(arrival.session)),
       place_(std::move(arrival.place)),
       handler_(surroundings.handler),
-      budget_(surroundings.budget),
       limits_(surroundings.limits),
       buffer_(surroundings.buffer),
       options_(surroundings.options),
-      peer_{stream_.PeerName(), "", surroundings.counters, surroundings.lines,
+      peer_{stream_.PeerName(),   "", "", surroundings.counters, surroundings.lines,
             options_.slow_request},
       writer_(stream_, peer_, options_),
-      as_peer_(writer_, stream_.executor()),
+      as_peer_(writer_, stream_.executor(), options_.max_connection_watched_bytes),
       decoder_(options_.max_hello_bytes),
+      held_(surroundings.budget),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
-      access_(std::move(arrival.access)),
+      security_(std::move(arrival.security)),
       rate_pause_(stream_.executor()) {}
 
 void PeerConnection::Start() {
@@ -105,6 +77,7 @@ asio::awaitable<void> PeerConnection::Read() {
 }
 
 asio::awaitable<Status> PeerConnection::ReadRequests() {
+  std::size_t turn_bytes = 0;
   while (true) {
     if (!HasRoom()) {
       co_await WaitForRoom();
@@ -121,7 +94,7 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
     }
     if (came.bytes > 0) {
       peer_.counters.received_bytes.Add(came.bytes);
-      if (Status status = Hold(came.bytes); !status.ok()) {
+      if (Status status = held_.Take(came.bytes); !status.ok()) {
         co_return status;
       }
       decoder_.Push(buffer_.first(came.bytes));
@@ -134,22 +107,36 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
         co_await KeepToRate(came.bytes);
       }
     }
+    turn_bytes += came.bytes;
     if (came.is_blocked && !is_draining_ && !is_refused_) {
+      turn_bytes = 0;
       co_await stream_.WaitUntilReadable(stop_reading_.slot());
+    } else if (turn_bytes >= kBytesInTurn) {
+      turn_bytes = 0;
+      co_await asio::post(stream_.executor(), asio::use_awaitable);  // the others'
     }
   }
 }
 
 asio::awaitable<Status> PeerConnection::TakeRequests() {
   while (!is_refused_ && !is_draining_ && !writer_.is_closed()) {
-    const auto payload = decoder_.Next();
-    if (!payload) {
-      co_return payload.error();
+    Status status;
+    std::optional<LargeFrame> large;
+    if (is_greeted_) {
+      large = decoder_.TakeLarge(options_.large_frame_bytes);
     }
-    if (!*payload) {
-      break;
+    if (large) {
+      status = co_await TakeLargeRequest(*std::move(large));
+    } else {
+      const auto payload = decoder_.Next();
+      if (!payload) {
+        co_return payload.error();
+      }
+      if (!*payload) {
+        break;
+      }
+      status = TakeRequest(**payload);
     }
-    Status status = TakeRequest(**payload);
     if (!status.ok()) {
       co_return status;
     }
@@ -166,21 +153,49 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
 
 // Answers it at once, or lets it run beside the others.
 Status PeerConnection::TakeRequest(ByteSpan payload) {
-  const std::size_t frame_bytes = kFrameHeaderBytes + payload.size();
+  std::shared_ptr<const void> held = HoldRequest(kFrameHeaderBytes + payload.size());
   Result<wire::Envelope> envelope = ParseEnvelope(payload);
   if (!envelope) {
     return envelope.error();
   }
-  auto rest = is_greeted_ ? Answer(*std::move(envelope)) : Greet(*std::move(envelope));
-  if (!rest) {
-    Release(frame_bytes);
+  if (!is_greeted_) {
+    Begin(Greet(*std::move(envelope)));
     return {};
   }
-  requests_ += 1;
-  request_bytes_ += frame_bytes;
-  asio::co_spawn(stream_.executor(), Serve(*std::move(rest), frame_bytes),
-                 Completion(shared_from_this(), "a request"));
+  const Status denied = CheckMayAsk(identity_, *envelope);
+  Begin(Answer({std::make_shared<wire::Envelope>(*std::move(envelope)), std::move(held)}, denied));
   return {};
+}
+
+// The peer's next one has to wait until this one is read, the other connections have not.
+asio::awaitable<Status> PeerConnection::TakeLargeRequest(LargeFrame frame) {
+  std::shared_ptr<const void> held = HoldRequest(frame.size());
+  writer_.Flush();
+  is_held_up_ = true;
+  auto read = co_await handler_.ReadLarge(std::move(frame), identity_);
+  is_held_up_ = false;
+  frame_clock_.Restart(Clock::now(), decoder_.pending_bytes());
+  if (!read) {
+    co_return read.error();
+  }
+  held.reset();  // the frame is gone; now it counts as what was made of it
+  if (Status full = held_.Take(read->bytes); !full.ok()) {
+    read->denied = std::move(full);
+  } else {
+    read->request.held = HoldRequest(read->bytes);
+  }
+  if (!writer_.is_closed()) {
+    Begin(Answer(std::move(read->request), read->denied));
+  }
+  co_return Status();
+}
+
+void PeerConnection::Begin(MaybeAwaited rest) {
+  if (rest) {
+    requests_ += 1;
+    asio::co_spawn(stream_.executor(), Serve(*std::move(rest)),
+                   Completion(shared_from_this(), "a request"));
+  }
 }
 
 PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
@@ -199,24 +214,24 @@ PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
 
 Status PeerConnection::ComeIn(const wire::Envelope& hello) {
   credentials_ = Credentials::Of(stream_.certificate(), hello.hello().token());
-  const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
+  const Result<Identity> identity = Identify();
   if (!identity) {
     return identity.error();
   }
-  ATLAS_RETURN_IF_ERROR(handler_.CheckGreeting(hello));
   identity_ = *identity;
+  identity_until_ = Clock::now() + options_.identity_check;
+  peer_.name = identity_.name;
+  ATLAS_RETURN_IF_ERROR(handler_.CheckGreeting(hello));
   if (identity_.name.empty()) {
     return {};
   }
-  const auto allowance = limits_.Of(identity_.name);
+  const auto allowance = limits_.Of(identity_.name, Clock::now());
   own_place_ = allowance->TakeConnection();
   if (own_place_ == nullptr) {
     return {StatusCode::kUnavailable, StrCat(allowance->max_connections(), " connections of ",
                                              identity_.name, " are open already; try again later")};
   }
-  if (!allowance->held().Take(held_bytes_)) {
-    return HoldsTooMuch(allowance->held().max_bytes(), identity_.name);
-  }
+  ATLAS_RETURN_IF_ERROR(held_.CountByName(allowance, identity_.name));
   allowance_ = allowance;
   return {};
 }
@@ -234,39 +249,49 @@ asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
   frame_clock_.Restart(Clock::now(), decoder_.pending_bytes());
 }
 
-PeerConnection::MaybeAwaited PeerConnection::Answer(wire::Envelope request) {
+PeerConnection::MaybeAwaited PeerConnection::Answer(Request request, const Status& denied) {
   ++unpaid_requests_;
-  if (const Status denied = CheckMayAsk(identity_, request); !denied.ok()) {
-    RequestRecord(peer_, request).End(denied);
-    writer_.PushError(request.request_id(), denied);
+  if (!denied.ok()) {
+    const wire::Envelope& message = *request.message;
+    RequestRecord(peer_, message, request.began).End(denied);
+    writer_.PushError(message.request_id(), denied);
     return std::nullopt;
   }
   return handler_.Handle(std::move(request), as_peer_);
 }
 
 void PeerConnection::ChangeSecurity(const ServerSecurity& security) {
-  access_ = security.access;
-  if (!is_greeted_) {
-    return;
-  }
-  Status status = security.tls == nullptr ? Status() : stream_.CheckCertificate(*security.tls);
-  if (status.ok()) {
-    const Result<Identity> identity = access_->Identify(credentials_, handler_.NowMs());
-    status = identity ? Status() : identity.error();
-    identity_ = identity.value_or(identity_);
-  }
-  if (!status.ok()) {
-    const std::string what = StrCat(identity_.name, ", no longer: ", status.message());
-    spdlog::warn("{}", peer_.Line(what).text());
-    CloseNow();
+  security_ = security;
+  if (is_greeted_) {
+    CheckIdentity(Clock::now());
   }
 }
 
-asio::awaitable<void> PeerConnection::Serve(asio::awaitable<void> request, std::size_t bytes) {
+Result<Identity> PeerConnection::Identify() const {
+  if (security_.tls != nullptr) {  // the handshake may have been under other rules
+    Status status = stream_.CheckCertificate(*security_.tls);
+    if (!status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return security_.access->Identify(credentials_, handler_.NowMs());
+}
+
+void PeerConnection::CheckIdentity(Clock::time_point now) {
+  identity_until_ = now + options_.identity_check;
+  const Result<Identity> identity = Identify();
+  if (identity) {
+    identity_ = *identity;
+    return;
+  }
+  const std::string what = StrCat(identity_.name, ", no longer: ", identity.error().message());
+  spdlog::warn("{}", peer_.Line(what).text());
+  CloseNow();
+}
+
+asio::awaitable<void> PeerConnection::Serve(asio::awaitable<void> request) {
   co_await std::move(request);
   requests_ -= 1;
-  request_bytes_ -= bytes;
-  Release(bytes);
   changed_.cancel();
   if (requests_ == 0 && !frame_clock_.is_mid_frame()) {
     frame_clock_.Expect(Clock::now(), 0);
@@ -326,6 +351,12 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
     CloseNow();
     return;
   }
+  if (is_greeted_ && now >= identity_until_) {
+    CheckIdentity(now);
+    if (phase_ == Phase::kClosed) {
+      return;
+    }
+  }
   const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
                            (requests_ == 0 || frame_clock_.is_mid_frame());
   if (is_expected && now >= frame_clock_.deadline()) {
@@ -337,30 +368,19 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
   }
 }
 
-Status PeerConnection::Hold(std::size_t bytes) {
-  if (!budget_.Take(bytes)) {
-    return HoldsTooMuch(options_.max_held_bytes, "all");
-  }
-  if (allowance_ != nullptr && !allowance_->held().Take(bytes)) {
-    budget_.GiveBack(bytes);
-    return HoldsTooMuch(allowance_->held().max_bytes(), identity_.name);
-  }
-  held_bytes_ += bytes;
-  return {};
-}
-
-void PeerConnection::Release(std::size_t bytes) {
-  budget_.GiveBack(bytes);
-  if (allowance_ != nullptr) {
-    allowance_->held().GiveBack(bytes);
-  }
-  held_bytes_ -= bytes;
+std::shared_ptr<const void> PeerConnection::HoldRequest(std::size_t bytes) {
+  request_bytes_ += bytes;
+  return {this, [self = shared_from_this(), bytes](const void*) {
+            self->request_bytes_ -= bytes;
+            self->held_.GiveBack(bytes);
+            self->changed_.cancel();
+          }};
 }
 
 // What came of a frame that nobody waits for any more.
 void PeerConnection::DropUnread() {
   decoder_ = FrameDecoder(options_.max_frame_bytes);
-  Release(held_bytes_ - request_bytes_);
+  held_.GiveBack(held_.bytes() - request_bytes_);
 }
 
 void PeerConnection::Finish() {

@@ -17,8 +17,9 @@
 
 #include "proto/wire/frame.h"
 #include "server/net/access/access_control.h"
-#include "server/net/connection/byte_budget.h"
+#include "server/net/byte_budget.h"
 #include "server/net/connection/frame_clock.h"
+#include "server/net/connection/held_bytes.h"
 #include "server/net/connection/identity_limits.h"
 #include "server/net/net_options.h"
 #include "server/net/peer_record.h"
@@ -51,20 +52,21 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
     boost::asio::ip::tcp::socket socket;
     Places::Place place;
     SslSession session;  // null: in the clear
-    std::shared_ptr<const AccessControl> access;
+    ServerSecurity security;
   };
 
   PeerConnection(Arrival arrival, const Surroundings& surroundings);
   PeerConnection(const PeerConnection&) = delete;
   PeerConnection& operator=(const PeerConnection&) = delete;
-  ~PeerConnection() { Release(held_bytes_); }
+  ~PeerConnection() = default;
 
   // Spawns the coroutines; they keep the connection alive until the peer or Drain() ends it.
   void Start();
   // Takes no further request; closes when those in flight are answered.
   void Drain();
   void CloseNow();
-  // To be called now and then: closes when the peer owes something for too long.
+  // To be called now and then: closes when the peer owes something for too long, or may not come in
+  // any more: certificates and tokens expire.
   void CheckDeadlines(Clock::time_point now);
   // From now on these rules hold: closes when the peer may not come in any more.
   void ChangeSecurity(const ServerSecurity& security);
@@ -78,36 +80,42 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
     kClosed,
   };
 
+  // What is left to be awaited of the reply.
+  using MaybeAwaited = std::optional<boost::asio::awaitable<void>>;
+
   boost::asio::awaitable<void> Read();
   boost::asio::awaitable<void> Write();
-  boost::asio::awaitable<void> Serve(boost::asio::awaitable<void> request, std::size_t bytes);
+  boost::asio::awaitable<void> Serve(boost::asio::awaitable<void> request);
   // Requests until the peer closes, breaks a rule (the error) or the connection drains.
   boost::asio::awaitable<Status> ReadRequests();
   // The requests of which all bytes have come.
   boost::asio::awaitable<Status> TakeRequests();
   Status TakeRequest(ByteSpan payload);
-  // What is left to be awaited of the reply.
-  using MaybeAwaited = std::optional<boost::asio::awaitable<void>>;
+  boost::asio::awaitable<Status> TakeLargeRequest(LargeFrame frame);
+  void Begin(MaybeAwaited rest);
   MaybeAwaited Greet(wire::Envelope hello);
-  MaybeAwaited Answer(wire::Envelope request);
+  MaybeAwaited Answer(Request request, const Status& denied);
   bool HasRoom() const;
   boost::asio::awaitable<void> WaitForRoom();
   // Reads on and drops what comes: closing a socket with unread bytes resets it, and the peer would
   // lose the replies that are still under way.
   boost::asio::awaitable<void> Linger();
+  // Whom it is by the rules as they are now.
+  Result<Identity> Identify() const;
+  // Closes when it would not come in any more.
+  void CheckIdentity(Clock::time_point now);
   // Whom it is, within what one may have.
   Status ComeIn(const wire::Envelope& hello);
   // As long as its name has sent too much.
   boost::asio::awaitable<void> KeepToRate(std::size_t bytes);
-  Status Hold(std::size_t bytes);
-  void Release(std::size_t bytes);
+  // What a request that was read counts for, until it is destroyed.
+  std::shared_ptr<const void> HoldRequest(std::size_t bytes);
   void DropUnread();
   void Finish();
 
   PeerStream stream_;
   Places::Place place_;
   RequestHandler& handler_;
-  ByteBudget& budget_;
   IdentityLimits& limits_;
   const std::span<std::uint8_t> buffer_;
   const NetOptions& options_;
@@ -115,14 +123,15 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   ReplyWriter writer_;
   Peer as_peer_;  // for its requests
   FrameDecoder decoder_;
-  std::size_t held_bytes_ = 0;  // of `budget_`: what was received and is not answered yet
+  HeldBytes held_;  // received and not answered yet
   boost::asio::cancellation_signal stop_reading_;
   boost::asio::steady_timer changed_;  // cancelled when a request is done
   FrameClock frame_clock_;             // of what the peer owes next
   Clock::time_point linger_until_;
-  std::shared_ptr<const AccessControl> access_;
+  ServerSecurity security_;
   Credentials credentials_;                       // that it showed
   Identity identity_;                             // from the greeting on
+  Clock::time_point identity_until_;              // it is to be checked again
   std::shared_ptr<IdentityAllowance> allowance_;  // of its name, if it has one
   Places::Place own_place_;                       // of these connections
   boost::asio::steady_timer rate_pause_;

@@ -20,6 +20,11 @@ class TokenBucket {
     per_s_ = per_s;
     tokens_ = std::min(tokens_, per_s);
   }
+  // What was taken is there again: it is as one that is new.
+  bool IsFull(Time now) const {
+    const std::chrono::duration<double> passed = now - last_;
+    return tokens_ + per_s_ * passed.count() >= per_s_;
+  }
   // Takes them, whether they are there or not; how long to wait before anything else comes.
   Duration Take(double amount, Time now) {
     if (per_s_ <= 0.0) {

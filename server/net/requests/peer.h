@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <utility>
 
+#include "server/net/byte_budget.h"
 #include "server/net/requests/upload_order.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/upload_check.h"
@@ -17,8 +18,10 @@ namespace atlas {
 class Peer {
  public:
   // `writer` outlives this; all on `executor`.
-  Peer(ReplyWriter& writer, boost::asio::any_io_executor executor)
-      : out(writer), uploads(std::move(executor)) {}
+  Peer(ReplyWriter& writer,
+       const boost::asio::any_io_executor& executor,
+       std::size_t max_watched_bytes)
+      : out(writer), uploads(executor), watched(max_watched_bytes) {}
 
   // Fewer than a connection may have requests in flight: a peer can always say "cancel".
   static constexpr std::size_t kMaxCancellable = 16;
@@ -39,6 +42,7 @@ class Peer {
 
   ReplyWriter& out;
   UploadOrder uploads;
+  ByteBudget watched;  // areas that its watches keep
   const std::shared_ptr<MissingUploads> missing = std::make_shared<MissingUploads>();
 
  private:

@@ -4,14 +4,16 @@
 #include <utility>
 #include <vector>
 
+#include <boost/asio/post.hpp>
+
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
 #include "server/net/requests/on_pool.h"
 #include "server/net/requests/read_requests.h"
 #include "server/net/requests/request_conversion.h"
-#include "server/net/requests/watch_reply.h"
 #include "server/net/requests/whole_atlas_requests.h"
 #include "server/net/requests/write_requests.h"
+#include "server/service/process_memory.h"
 
 namespace atlas {
 namespace {
@@ -66,24 +68,32 @@ asio::awaitable<void> RequestHandler::Resume(SessionKey session,
   co_await out.Send(std::move(reply));
 }
 
-std::optional<asio::awaitable<void>> RequestHandler::Handle(Envelope request, Peer& peer) {
-  if (request.has_cancel_request()) {
-    Cancel(request, peer);
+std::optional<asio::awaitable<void>> RequestHandler::Handle(Request request, Peer& peer) {
+  const Envelope& message = *request.message;
+  if (message.has_cancel_request()) {
+    Cancel(message, peer);
     return std::nullopt;
   }
-  if (request.has_watch_request()) {
-    return Watch(std::move(request), peer);
+  if (message.has_watch_request()) {
+    return watches_.Answer(std::move(request), peer);
   }
-  if (!request.has_sync_request()) {
+  if (!message.has_sync_request()) {
     return Await(std::move(request), peer);
   }
-  RequestRecord record(peer.out.peer(), request);
-  auto reply = std::make_shared<SyncReply>(context_.service, frames_, std::move(request));
+  RequestRecord record(peer.out.peer(), message, request.began);
+  auto reply = std::make_shared<SyncReply>(context_.service, frames_, std::move(request.message),
+                                           request.is_large);
   const bool may_begin = reply->message().wait_revision() == 0;
   if (may_begin && SyncAtOnce(*reply, record, peer.out)) {
     return std::nullopt;
   }
-  return Sync(std::move(reply), std::move(record), peer.out);
+  return Sync(std::move(reply), std::move(request.held), std::move(record), peer.out);
+}
+
+void RequestHandler::ReturnFreed(FreedMemory::Clock::time_point now) {
+  if (freed_.IsDue(now)) {
+    asio::post(context_.pool, &ReturnFreeMemory);
+  }
 }
 
 void RequestHandler::Cancel(const Envelope& request, Peer& peer) {
@@ -95,44 +105,22 @@ void RequestHandler::Cancel(const Envelope& request, Peer& peer) {
   record.End({});
 }
 
-asio::awaitable<void> RequestHandler::Watch(Envelope request, Peer& peer) {
-  RequestRecord record(peer.out.peer(), request);
-  const std::uint64_t id = request.request_id();
-  Places::Place place = watch_places_.Take();
-  Status status;
-  if (place == nullptr) {
-    status = {StatusCode::kUnavailable, StrCat(watch_places_.max_places(),
-                                               " watches are under way already; try again later")};
-  } else if (!peer.Begin(id)) {
-    status = {StatusCode::kInvalidArgument,
-              StrCat("watch ", id, ": there is one under this id, or there are ",
-                     Peer::kMaxCancellable, " on this connection")};
-  } else {
-    status = co_await SendWatch(context_.service, request, peer.cancelled(id), peer.out);
-    peer.End(id);
-    place.reset();  // whoever hears of the end may begin another
-    const bool is_over = status.code() == StatusCode::kUnavailable;  // as every watch once is
-    record.End(is_over ? Status() : status);
-  }
-  record.End(status);
-  co_await peer.out.SendError(id, std::move(status));
-}
-
-asio::awaitable<void> RequestHandler::Await(Envelope request, Peer& peer) {
-  RequestRecord record(peer.out.peer(), request);
+asio::awaitable<void> RequestHandler::Await(Request request, Peer& peer) {
+  RequestRecord record(peer.out.peer(), *request.message, request.began);
   Status status = co_await Dispatch(request, peer);
   record.End(status);
   if (!status.ok()) {
-    co_await peer.out.SendError(request.request_id(), std::move(status));
+    co_await peer.out.SendError(request.message->request_id(), std::move(status));
   }
 }
 
-asio::awaitable<Status> RequestHandler::Dispatch(const Envelope& request, Peer& peer) {
+asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& peer) {
+  const Envelope& request = *whole.message;
   switch (request.body_case()) {
     case Envelope::kUploadKeyframe:
       return AnswerUpload(context_, request, peer);
     case Envelope::kUpdatePoses:
-      return AnswerUpdatePoses(context_, request, peer.out);
+      return AnswerUpdatePoses(context_, whole, peer.out);
     case Envelope::kChangeSession:
       return AnswerChangeSession(context_, request, peer.out);
     case Envelope::kQueryRegion:
@@ -191,6 +179,7 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWr
 }
 
 asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
+                                           std::shared_ptr<const void> /*held*/,
                                            RequestRecord record,
                                            ReplyWriter& out) {
   Status status = co_await WaitAndSync(reply, out);

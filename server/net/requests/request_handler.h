@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/thread_pool.hpp>
@@ -10,13 +11,16 @@
 #include "proto/wire/envelope.h"
 #include "server/net/access/access_control.h"
 #include "server/net/net_options.h"
-#include "server/net/places.h"
+#include "server/net/requests/freed_memory.h"
+#include "server/net/requests/large_requests.h"
 #include "server/net/requests/peer.h"
+#include "server/net/requests/request.h"
 #include "server/net/requests/request_context.h"
 #include "server/net/requests/request_conversion.h"
 #include "server/net/requests/request_record.h"
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
+#include "server/net/requests/watch_requests.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
@@ -32,7 +36,8 @@ class RequestHandler {
                  const NetOptions& options)
       : context_{service, pool, reading_pool, WaitPlaces(options.max_waits)},
         options_(options),
-        watch_places_(options.max_watches),
+        large_(freed_),
+        watches_(service, large_, freed_, options),
         frames_(options.tile_frame_bytes) {}
 
   std::int64_t NowMs() const { return context_.service.NowMs(); }
@@ -46,30 +51,41 @@ class RequestHandler {
                                                     ReplyWriter& out);
   // Every later one, which gets its replies, or one error. What can be answered from memory is, at
   // once; else the rest is to be awaited.
-  std::optional<boost::asio::awaitable<void>> Handle(wire::Envelope request, Peer& peer);
+  std::optional<boost::asio::awaitable<void>> Handle(Request request, Peer& peer);
+  // Those of frames that are large; to be handled as any other then.
+  boost::asio::awaitable<Result<LargeRequests::Outcome>> ReadLarge(LargeFrame frame,
+                                                                   const Identity& identity) {
+    return large_.Read(std::move(frame), identity);
+  }
+  // Waits for those that are being read; to be called before the connections' threads are gone.
+  void Join() { large_.Join(); }
+  // What requests left behind goes back to the system, if that is much. To be called now and then.
+  void ReturnFreed(FreedMemory::Clock::time_point now);
 
  private:
   using Envelope = wire::Envelope;
 
-  boost::asio::awaitable<void> Await(Envelope request, Peer& peer);
-  boost::asio::awaitable<void> Watch(Envelope request, Peer& peer);
+  boost::asio::awaitable<void> Await(Request request, Peer& peer);
   boost::asio::awaitable<void> Resume(SessionKey session,
                                       Envelope reply,
                                       RequestRecord record,
                                       ReplyWriter& out);
   static void Cancel(const Envelope& request, Peer& peer);
-  boost::asio::awaitable<Status> Dispatch(const Envelope& request, Peer& peer);
+  boost::asio::awaitable<Status> Dispatch(const Request& whole, Peer& peer);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
   // False: what is left takes long, or the disk, or the peer does not take it.
   static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);
   boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
+                                    std::shared_ptr<const void> held,
                                     RequestRecord record,
                                     ReplyWriter& out);
   boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
 
   RequestContext context_;
   const NetOptions& options_;
-  Places watch_places_;
+  FreedMemory freed_;
+  LargeRequests large_;
+  WatchRequests watches_;
   TileFrames frames_;
 };
 

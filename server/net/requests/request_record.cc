@@ -74,12 +74,14 @@ std::size_t IndexOf(StatusCode code) {
 
 }  // namespace
 
-RequestRecord::RequestRecord(const PeerRecord& peer, const Envelope& request)
+RequestRecord::RequestRecord(const PeerRecord& peer,
+                             const Envelope& request,
+                             Clock::time_point began)
     : peer_(&peer),
       id_(request.request_id()),
       kind_(KindOf(request)),
       may_wait_(MayWait(request)),
-      began_(Clock::now()) {
+      began_(began) {
   peer.counters.in_flight.Add();
 }
 

@@ -17,8 +17,10 @@ class RequestRecord {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Begins now. `peer` outlives this.
-  RequestRecord(const PeerRecord& peer, const wire::Envelope& request);
+  // `began`: its last byte was there. `peer` outlives this.
+  RequestRecord(const PeerRecord& peer,
+                const wire::Envelope& request,
+                Clock::time_point began = Clock::now());
   RequestRecord(RequestRecord&& other) noexcept
       : peer_(std::exchange(other.peer_, nullptr)),
         id_(other.id_),

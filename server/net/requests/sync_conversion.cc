@@ -24,6 +24,7 @@ double LengthFromWire(std::uint64_t length_um) {
   return 1e-6 * static_cast<double>(length_um);
 }
 
+// Of all but tiles.
 Result<MapArea> ShapeFromWire(const wire::Area& area) {
   switch (area.shape_case()) {
     case wire::Area::kDisc:
@@ -37,17 +38,7 @@ Result<MapArea> ShapeFromWire(const wire::Area& area) {
       }
       return corridor;
     }
-    case wire::Area::kTiles: {
-      TilesArea tiles;
-      for (const std::uint64_t key : area.tiles().keys()) {
-        const auto id = TileId::FromKey(key);
-        if (!id) {
-          return Error(id.error().WithContext("sync area"));
-        }
-        tiles.ids.push_back(*id);
-      }
-      return tiles;
-    }
+    case wire::Area::kTiles:
     case wire::Area::SHAPE_NOT_SET:
       break;
   }
@@ -89,13 +80,17 @@ Result<HeldTiles> HeldFromWire(const wire::SyncRequest& message) {
   return HeldTiles::Create(std::move(tiles), std::move(blocks));
 }
 
+// Another number when places are counted differently: a cursor of the daemon before is no place
+// then.
+constexpr std::uint64_t kOrderVersion = 2;
+
 // Of all that decides on the order.
 std::uint64_t HashOfOrder(const wire::SyncRequest& message) {
   wire::SyncRequest order;
   *order.mutable_area() = message.area();
   order.set_finest_level(message.finest_level());
   order.set_coarsest_level(message.coarsest_level());
-  return Hash64(BytesFromWire(order.SerializeAsString()));
+  return Hash64(BytesFromWire(order.SerializeAsString())) + kOrderVersion;
 }
 
 Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& message) {
@@ -118,6 +113,10 @@ Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& messag
 }  // namespace
 
 Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profile) {
+  if (message.has_tiles()) {
+    const auto& keys = message.tiles().keys();
+    return SyncArea::OfTiles({keys.begin(), keys.end()}, profile);
+  }
   Result<MapArea> shape = ShapeFromWire(message);
   if (!shape) {
     return Error(shape.error());

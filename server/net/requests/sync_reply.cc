@@ -26,32 +26,39 @@ constexpr std::size_t kManifestBytes = kFrameHeaderBytes + 64;
 constexpr std::size_t kAnnouncementBytes = 40;
 constexpr std::size_t kEndBytes = kFrameHeaderBytes + 96;
 constexpr std::size_t kTileFrameBytes = kFrameHeaderBytes + 11;  // besides its body
-constexpr std::size_t kSmallRequestBytes = 16u
-                                           << 10;  // reads and plans in well under a millisecond
 
 }  // namespace
 
-SyncReply::SyncReply(AtlasService& service, TileFrames& frames, wire::Envelope request)
-    : service_(service), tiles_(service, frames), envelope_(std::move(request)) {
+SyncReply::SyncReply(AtlasService& service,
+                     TileFrames& frames,
+                     std::shared_ptr<const wire::Envelope> request,
+                     bool is_large)
+    : service_(service),
+      tiles_(service, frames),
+      envelope_(std::move(request)),
+      is_large_(is_large) {
   if (message().timeout_ms() > 0) {
     deadline_ = Clock::now() + TimeoutFromWire(message().timeout_ms());
   }
 }
 
 Result<SyncReply::Step> SyncReply::Next(bool may_block, std::vector<ReplyFrame>& out) {
+  if (is_large_ && !may_block) {
+    return Step::kBlocked;
+  }
   if (!has_begun_) {
-    const Result<Step> begun = Begin(may_block);
+    Result<Step> begun = Begin(may_block);
     if (!begun || *begun == Step::kBlocked) {
       return begun;
     }
   }
   Batch batch;
-  batch.manifest = ReplyTo(envelope_);
+  batch.manifest = ReplyTo(*envelope_);
   const bool is_first = sent_bytes_ == 0;
   if (is_first) {
     *batch.manifest.mutable_sync_manifest() = holdings_;
   }
-  const Result<Step> filled = Fill(may_block, batch);
+  Result<Step> filled = Fill(may_block, batch);
   if (!filled) {
     return filled;
   }
@@ -65,9 +72,6 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block, std::vector<ReplyFrame>&
 }
 
 Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
-  if (!may_block && envelope_.ByteSizeLong() > kSmallRequestBytes) {
-    return Step::kBlocked;
-  }
   if (!request_) {
     Result<SyncRequest> request = SyncFromWire(message(), profile());
     if (!request) {
@@ -77,7 +81,7 @@ Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
     last_ = request_->after.value_or(SyncCursor{
         service_.revision(), std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
   }
-  const Result<Step> planned = Plan(may_block);
+  Result<Step> planned = Plan(may_block);
   if (!planned || *planned == Step::kBlocked) {
     return planned;
   }
@@ -94,11 +98,15 @@ Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
 }
 
 Result<SyncReply::Step> SyncReply::Plan(bool may_block) {
+  if (is_for_pool_ && !may_block) {
+    return Step::kBlocked;
+  }
   auto plan = service_.PlanSync(*request_, may_block);
   if (!plan) {
     return Error(plan.error());
   }
-  if (!*plan) {
+  is_for_pool_ = !*plan;
+  if (is_for_pool_) {
     return Step::kBlocked;
   }
   plan_ = **std::move(plan);
@@ -114,7 +122,7 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, Batch& batch) {
   while (batch.tiles.size() < max_tiles && batch.tile_bytes < kBatchBytes) {
     if (next_ == plan_.items.size() && plan_.is_cut) {
       request_->after = last_;
-      const Result<Step> planned = Plan(may_block);
+      Result<Step> planned = Plan(may_block);
       if (!planned || *planned == Step::kBlocked) {
         return planned;
       }
@@ -181,7 +189,7 @@ Status SyncReply::Emit(const Batch& batch, std::vector<ReplyFrame>& out) {
 }
 
 Result<Bytes> SyncReply::EndFrame(End how) const {
-  wire::Envelope envelope = ReplyTo(envelope_);
+  wire::Envelope envelope = ReplyTo(*envelope_);
   wire::SyncEnd& end = *envelope.mutable_sync_end();
   end.set_tiles(sent_tiles_);
   end.set_revision(last_.revision);

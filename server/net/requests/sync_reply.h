@@ -27,11 +27,15 @@ class SyncReply {
     kBlocked,  // nothing was done: the next frames take the disk, or long
   };
 
-  // Its time runs from now on. `service` and `frames` outlive this.
-  SyncReply(AtlasService& service, TileFrames& frames, wire::Envelope request);
+  // Its time runs from now on. `is_large`: every step takes long. `service` and `frames` outlive
+  // this.
+  SyncReply(AtlasService& service,
+            TileFrames& frames,
+            std::shared_ptr<const wire::Envelope> request,
+            bool is_large = false);
 
-  const wire::SyncRequest& message() const { return envelope_.sync_request(); }
-  std::uint64_t request_id() const { return envelope_.request_id(); }
+  const wire::SyncRequest& message() const { return envelope_->sync_request(); }
+  std::uint64_t request_id() const { return envelope_->request_id(); }
 
   // Appends the next frames. An error ends the reply; kInvalidArgument: a request that makes no
   // sense.
@@ -62,7 +66,8 @@ class SyncReply {
 
   AtlasService& service_;
   ReplyTiles tiles_;
-  const wire::Envelope envelope_;
+  const std::shared_ptr<const wire::Envelope> envelope_;
+  const bool is_large_;
   std::optional<SyncRequest> request_;  // from Begin() on
   std::optional<Clock::time_point> deadline_;
   SyncPlan plan_;
@@ -70,6 +75,7 @@ class SyncReply {
   SyncCursor last_;       // of the items so far
   wire::SyncManifest holdings_;
   bool has_begun_ = false;
+  bool is_for_pool_ = false;  // the plan takes the disk, or long: known from trying
   std::uint32_t sent_tiles_ = 0;
   std::uint64_t sent_bytes_ = 0;
 };

@@ -3,8 +3,9 @@
 // connection.
 #pragma once
 
-#include <cstdint>
-#include <set>
+#include <list>
+#include <utility>
+#include <variant>
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/awaitable.hpp>
@@ -15,21 +16,24 @@
 namespace atlas {
 
 class UploadOrder {
+  using Line = std::list<std::monostate>;  // places, the first of them at the front
+
  public:
-  explicit UploadOrder(boost::asio::any_io_executor executor)
-      : changed_(std::move(executor), boost::asio::steady_timer::time_point::max()) {}
+  explicit UploadOrder(const boost::asio::any_io_executor& executor)
+      : changed_(executor, boost::asio::steady_timer::time_point::max()) {}
 
   // A place in the line; given up when it is destroyed, whatever became of the upload.
   class Turn {
    public:
-    explicit Turn(UploadOrder& order) : order_(order), number_(order.next_++) {}
+    explicit Turn(UploadOrder& order)
+        : order_(order), place_(order.line_.emplace(order.line_.end())) {}
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
     ~Turn() { Leave(); }
 
     // Until all before have left.
     boost::asio::awaitable<void> Come() {
-      while (order_.first_ != number_) {
+      while (order_.line_.begin() != place_) {
         boost::system::error_code ignored;  // woken by cancelling
         co_await order_.changed_.async_wait(
             boost::asio::redirect_error(boost::asio::use_awaitable, ignored));
@@ -38,29 +42,21 @@ class UploadOrder {
     void Leave() {
       if (!has_left_) {
         has_left_ = true;
-        order_.Leave(number_);
+        order_.line_.erase(place_);
+        boost::system::error_code ignored;  // a timer has none
+        order_.changed_.cancel(ignored);
       }
     }
 
    private:
     UploadOrder& order_;
-    const std::uint64_t number_;
+    const Line::iterator place_;
     bool has_left_ = false;
   };
 
  private:
-  void Leave(std::uint64_t number) {
-    left_early_.insert(number);
-    while (left_early_.erase(first_) > 0) {
-      ++first_;
-    }
-    changed_.cancel();
-  }
-
   boost::asio::steady_timer changed_;  // cancelled when somebody left
-  std::uint64_t next_ = 0;
-  std::uint64_t first_ = 0;
-  std::set<std::uint64_t> left_early_;  // before their turn: given up
+  Line line_;
 };
 
 }  // namespace atlas

@@ -16,8 +16,8 @@ namespace atlas {
 // Made and awaited on `executor` (a single thread), by one coroutine.
 class WakeUp : public std::enable_shared_from_this<WakeUp> {
  public:
-  explicit WakeUp(boost::asio::any_io_executor executor)
-      : timer_(std::move(executor), boost::asio::steady_timer::time_point::max()) {}
+  explicit WakeUp(const boost::asio::any_io_executor& executor)
+      : timer_(executor, boost::asio::steady_timer::time_point::max()) {}
 
   // From any thread.
   void Ring() {

@@ -10,7 +10,6 @@
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
-#include "server/net/requests/request_conversion.h"
 #include "server/net/requests/sync_conversion.h"
 #include "server/net/requests/wake_up.h"
 
@@ -23,10 +22,6 @@ using std::chrono::milliseconds;
 // A keyframe changes a dozen tiles one after the other.
 constexpr milliseconds kMinInterval{50};
 constexpr milliseconds kMaxInterval{60'000};
-
-milliseconds IntervalOf(const wire::WatchRequest& watch) {
-  return std::clamp(milliseconds(watch.interval_ms()), kMinInterval, kMaxInterval);
-}
 
 void EventToWire(const TileChanges& changes, wire::WatchEvent& event) {
   for (const TileChanges::Tile& tile : changes.tiles) {
@@ -58,22 +53,26 @@ asio::awaitable<void> Pause(milliseconds time,
 
 }  // namespace
 
+Result<WatchOrder> WatchFromWire(const wire::WatchRequest& message, const MapProfile& profile) {
+  Result<SyncArea> area = AreaFromWire(message.area(), profile);
+  if (!area) {
+    return Error(area.error());
+  }
+  const auto interval = std::clamp(milliseconds(message.interval_ms()), kMinInterval, kMaxInterval);
+  return WatchOrder{{*std::move(area), message.finest_level(), message.coarsest_level()}, interval};
+}
+
 asio::awaitable<Status> SendWatch(AtlasService& service,
-                                  const wire::Envelope& request,
+                                  std::uint64_t request_id,
+                                  WatchOrder order,
                                   std::stop_token cancelled,
                                   ReplyWriter& out) {
-  const wire::WatchRequest& message = request.watch_request();
-  Result<SyncArea> area = AreaFromWire(message.area(), service.identity().profile);
-  if (!area) {
-    co_return area.error();
-  }
   const auto executor = co_await asio::this_coro::executor;
   const auto wake_up = std::make_shared<WakeUp>(executor);
   const auto ring = [wake_up] {
     wake_up->Ring();
   };
-  TileWatch::Scope scope{*std::move(area), message.finest_level(), message.coarsest_level()};
-  const auto watch = service.Watch(std::move(scope), ring);
+  const auto watch = service.Watch(std::move(order.scope), ring);
   if (!watch) {
     co_return watch.error();
   }
@@ -83,14 +82,15 @@ asio::awaitable<Status> SendWatch(AtlasService& service,
   TileChanges changes;  // nothing at first: from here on everything is told
   while (!cancelled.stop_requested() && !peer_left.stop_requested()) {
     const std::uint64_t revision = service.revision();
-    wire::Envelope event = ReplyTo(request);
+    wire::Envelope event;
+    event.set_request_id(request_id);
     event.mutable_watch_event()->set_revision(revision);
     EventToWire(changes, *event.mutable_watch_event());
     const bool is_open = co_await out.Send(std::move(event));
     if (!is_open) {
       break;
     }
-    co_await Pause(IntervalOf(message), cancelled, peer_left);
+    co_await Pause(order.interval, cancelled, peer_left);
     changes = (*watch)->Take();
     while (changes.empty() && !cancelled.stop_requested() && !peer_left.stop_requested()) {
       co_await wake_up->Wait();

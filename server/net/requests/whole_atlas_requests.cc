@@ -1,5 +1,7 @@
 #include "server/net/requests/whole_atlas_requests.h"
 
+#include <utility>
+
 #include "server/net/requests/answer.h"
 #include "server/net/requests/atlas_wait.h"
 #include "server/net/requests/on_pool.h"
@@ -34,6 +36,15 @@ asio::awaitable<Result<AtlasDigest>> ComputeDigest(RequestContext& context,
     return context.service.Digest(patience);
   };
   co_return co_await OnPool(context.reading_pool, compute);
+}
+
+Result<CompactionRequest> ReadCompaction(const AtlasService& service,
+                                         const wire::CompactRequest& message) {
+  CompactionRequest compaction = CompactionFromWire(message);
+  if (Status status = CheckCompaction(compaction, service.identity().profile); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return compaction;
 }
 
 }  // namespace
@@ -95,10 +106,12 @@ asio::awaitable<Status> AnswerVerify(RequestContext& context,
 asio::awaitable<Status> AnswerCompact(RequestContext& context,
                                       const wire::Envelope& request,
                                       ReplyWriter& out) {
-  const CompactionRequest compaction = CompactionFromWire(request.compact_request());
-  Status status = CheckCompaction(compaction, context.service.identity().profile);
-  if (!status.ok()) {
-    co_return status;  // before any wait
+  const Blocking<CompactionRequest> read = [&context, &request] {
+    return ReadCompaction(context.service, request.compact_request());
+  };
+  const Result<CompactionRequest> compaction = co_await OnPool(context.pool, read);
+  if (!compaction) {
+    co_return compaction.error();  // before any wait
   }
   const Result<Places::Place> place = context.places.Take();
   if (!place) {
@@ -110,8 +123,8 @@ asio::awaitable<Status> AnswerCompact(RequestContext& context,
   if (!settled) {
     co_return settled.error();
   }
-  const Blocking<CompactionReport> compact = [&context, compaction, patience] {
-    return context.service.Compact(compaction, patience);
+  const Blocking<CompactionReport> compact = [&context, &compaction, patience] {
+    return context.service.Compact(*compaction, patience);
   };
   const Result<CompactionReport> report = co_await OnPool(context.reading_pool, compact);
   co_return co_await Answer(request, report, &wire::Envelope::mutable_compact_reply,

@@ -1,5 +1,6 @@
 #include "server/net/requests/write_requests.h"
 
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -16,30 +17,34 @@ namespace asio = boost::asio;
 template <typename Request, typename T>
 using Writing = void (AtlasService::*)(Request, AtlasStore::Done<T>);
 
-// Hands a write to the service on the pool; its answer, once it is on disk or refused.
+template <typename Request>
+using Reading = std::function<Result<Request>()>;
+
+// Reads a request on the pool and hands it to the service there; its answer, once it is on disk or
+// refused.
 template <typename Request, typename T>
 asio::awaitable<Result<T>> Write(RequestContext& context,
-                                 Result<Request> request,
+                                 Reading<Request> read,
                                  Writing<Request, T> write) {
-  if (!request) {
-    co_return Error(request.error());
-  }
-  const auto owned = std::make_shared<Request>(*std::move(request));
-  Starting<T> start = [&context, owned, write](auto done) {
-    (context.service.*write)(std::move(*owned), std::move(done));
+  Starting<T> start = [&context, read = std::move(read), write](auto done) {
+    Result<Request> request = read();
+    if (!request) {
+      done(Error(request.error()));
+      return;
+    }
+    (context.service.*write)(*std::move(request), std::move(done));
   };
   co_return co_await StartOnPool(context.pool, std::move(start));
 }
 
 asio::awaitable<Result<NewKeyframe>> CheckUpload(RequestContext& context,
                                                  const wire::UploadKeyframe& message) {
-  Result<UploadRequest> upload = UploadFromWire(message);
-  if (!upload) {
-    co_return Error(upload.error());
-  }
-  const auto unchecked = std::make_shared<UploadRequest>(*std::move(upload));
-  const Blocking<NewKeyframe> check = [&context, unchecked] {
-    return context.service.CheckUpload(std::move(*unchecked));
+  const Blocking<NewKeyframe> check = [&context, &message]() -> Result<NewKeyframe> {
+    Result<UploadRequest> upload = UploadFromWire(message);
+    if (!upload) {
+      return Error(upload.error());
+    }
+    return context.service.CheckUpload(*std::move(upload));
   };
   co_return co_await OnPool(context.pool, check);
 }
@@ -71,24 +76,35 @@ asio::awaitable<Status> AnswerUpload(RequestContext& context,
   context.service.PutKeyframe(*std::move(keyframe), done);
   turn.Leave();
   const Result<PutKeyframeResult> result = co_await put->Take();
-  co_return co_await Answer(request, result, &wire::Envelope::mutable_upload_reply, UploadToWire,
-                            peer.out);
+  if (!result) {
+    co_return result.error();
+  }
+  wire::Envelope reply = ReplyTo(request);
+  UploadToWire(*result, *reply.mutable_upload_reply());
+  co_await peer.out.SendWithOthers(std::move(reply));  // uploads are committed in groups
+  co_return Status();
 }
 
 asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
-                                          const wire::Envelope& request,
+                                          const Request& request,
                                           ReplyWriter& out) {
-  Result<PoseBatchRequest> update = PosesFromWire(request.update_poses());
-  const auto result = co_await Write(context, std::move(update), &AtlasService::UpdatePoses);
-  co_return co_await Answer(request, result, &wire::Envelope::mutable_update_poses_reply,
+  const wire::Envelope& message = *request.message;
+  const auto poses = request.poses;
+  const Reading<PoseBatchRequest> read = [&message, poses] {
+    return poses ? std::move(*poses) : PosesFromWire(message.update_poses());
+  };
+  const auto result = co_await Write(context, read, &AtlasService::UpdatePoses);
+  co_return co_await Answer(message, result, &wire::Envelope::mutable_update_poses_reply,
                             PosesToWire, out);
 }
 
 asio::awaitable<Status> AnswerChangeSession(RequestContext& context,
                                             const wire::Envelope& request,
                                             ReplyWriter& out) {
-  Result<SessionChange> change = SessionChangeFromWire(request.change_session());
-  const auto result = co_await Write(context, std::move(change), &AtlasService::ChangeSession);
+  const Reading<SessionChange> read = [&request] {
+    return SessionChangeFromWire(request.change_session());
+  };
+  const auto result = co_await Write(context, read, &AtlasService::ChangeSession);
   co_return co_await Answer(request, result, &wire::Envelope::mutable_change_session_reply,
                             SessionChangeToWire, out);
 }

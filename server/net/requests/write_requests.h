@@ -5,6 +5,7 @@
 
 #include "proto/wire/envelope.h"
 #include "server/net/requests/peer.h"
+#include "server/net/requests/request.h"
 #include "server/net/requests/request_context.h"
 
 namespace atlas {
@@ -16,7 +17,7 @@ boost::asio::awaitable<Status> AnswerUpload(RequestContext& context,
                                             const wire::Envelope& request,
                                             Peer& peer);
 boost::asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
-                                                 const wire::Envelope& request,
+                                                 const Request& request,
                                                  ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerChangeSession(RequestContext& context,
                                                    const wire::Envelope& request,

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
@@ -109,6 +110,16 @@ asio::awaitable<bool> ReplyWriter::Send(wire::Envelope envelope) {
   const bool is_open = co_await WaitForRoom();
   if (is_open) {
     Push(envelope);
+    Flush();
+  }
+  co_return is_open && !is_closed_;
+}
+
+asio::awaitable<bool> ReplyWriter::SendWithOthers(wire::Envelope envelope) {
+  const bool is_open = co_await WaitForRoom();
+  if (is_open) {
+    Push(envelope);
+    co_await asio::post(stream_.executor(), asio::use_awaitable);  // after what is ready
     Flush();
   }
   co_return is_open && !is_closed_;

@@ -43,6 +43,8 @@ class ReplyWriter {
 
   // Waits for room, queues and flushes. False when the connection is gone: stop replying.
   boost::asio::awaitable<bool> Send(wire::Envelope envelope);
+  // The same; what else is ready to be sent now leaves with it.
+  boost::asio::awaitable<bool> SendWithOthers(wire::Envelope envelope);
   boost::asio::awaitable<bool> SendError(std::uint64_t request_id, Status status);
   boost::asio::awaitable<bool> WaitForRoom();
 

@@ -9,7 +9,8 @@ namespace atlas {
 
 struct KeptSurveys {
   TileSurveys surveys;
-  std::uint64_t revision = 0;  // of the atlas that the tile was last made from
+  std::uint64_t revision = 0;         // of the atlas that the tile was last made from
+  std::uint64_t stored_revision = 0;  // that which went to disk last or came from there, if any did
 };
 
 }  // namespace atlas

@@ -97,7 +97,7 @@ void SurveyCache::Trim() {
 bool SurveyCache::StoreIdle() {
   const Time before = std::chrono::steady_clock::now() - limits_.idle;
   const auto is_idle = [&](const Entry& entry) {
-    return entry.used_at < before && !entry.was_stored && !files_.Has(entry.kept);
+    return entry.used_at < before && entry.kept.stored_revision != entry.kept.revision;
   };
   Lock lock(mutex_);
   for (Shelf* shelf : {&plain_, &packed_}) {
@@ -107,7 +107,9 @@ bool SurveyCache::StoreIdle() {
         const Work work(*this, *idle, lock);
         is_stored = files_.Write(idle->kept);
       }
-      idle->was_stored = is_stored;
+      if (is_stored) {
+        idle->kept.stored_revision = idle->kept.revision;
+      }
       PutOn(*shelf, *std::move(idle));
       return is_stored;
     }

@@ -40,9 +40,9 @@ class SurveyCache {
   // Compresses what is too much as it is, then writes what is too much compressed. Now and then
   // what that left free goes back to the system: the next ones do not fit where these were.
   void Trim();
-  // Writes one of those that were not used for a while and are not on disk as they are, once: there
-  // may be less room on disk than here. False: there is none, or it could not be. So a process that
-  // is killed loses little.
+  // Writes one of those that were not used for a while and did not go to disk as they are, once:
+  // there may be less room on disk than here. False: there is none, or it could not be. So a
+  // process that is killed loses little.
   bool StoreIdle();
   // Writes what is in memory to the files; it is gone from it then. How many bytes are on disk.
   std::size_t MoveToDisk();
@@ -55,7 +55,6 @@ class SurveyCache {
   struct Entry {
     KeptSurveys kept;
     Time used_at;
-    bool was_stored = false;  // by StoreIdle(), since then
   };
   using Shelf = LruList<Entry>;
 

@@ -5,7 +5,6 @@
 #include <iterator>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "core/base/str_cat.h"
 
@@ -13,8 +12,6 @@ namespace atlas {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kSuffix = ".survey";
-constexpr const char* kUnfinished = ".survey-new";
 constexpr std::chrono::minutes kPause{1};
 
 // Whether the atlas went on from the state that it was in when the file was written.
@@ -34,106 +31,104 @@ SurveyFiles::SurveyFiles(const SurveyFilesOptions& options,
                          const MapProfile& profile,
                          ReadLine read_line,
                          LogSink log)
-    : options_(options), profile_(profile), read_line_(std::move(read_line)), log_(std::move(log)) {
+    : options_(options),
+      profile_(profile),
+      read_line_(std::move(read_line)),
+      log_(std::move(log)),
+      folder_(options.directory, options.max_bytes, options.min_free_bytes) {
   if (options_.directory.empty()) {
+    is_sorted_ = true;
     return;
   }
-  if (options_.max_bytes == 0) {
-    FindFiles({});
-    return;
+  AtlasLine line;  // of no atlas, which believes none
+  if (options_.max_bytes > 0) {
+    auto read = read_line_();
+    std::error_code error;
+    std::string why;
+    if (!read) {
+      why = read.error().message();
+    } else if (BuildHash() == 0) {
+      why = "the program's own file cannot be read";
+    } else if (fs::create_directories(options_.directory, error); error) {
+      why = StrCat("cannot make ", options_.directory.string(), ": ", error.message());
+    }
+    if (!why.empty()) {
+      log_(LogLevel::kWarning, "surveys are not kept on disk: " + why);
+      is_sorted_ = true;
+      return;
+    }
+    line = *std::move(read);
+    is_on_ = true;
+  }
+  sorter_ = std::jthread([this, line = std::move(line)](const std::stop_token& stop) {
+    SortFiles(line, stop);
+    is_sorted_ = true;
+  });
+}
+
+// What it throws is the end of no thread, as when one is written.
+void SurveyFiles::SortFiles(const AtlasLine& line, const std::stop_token& stop) {
+  try {
+    const Status status = folder_.Sort(
+        [&](const fs::path& path) {
+          const auto header = ReadSurveyFileHeader(path);
+          // One that was written meanwhile goes on from a start that is not in this line.
+          return header && path == folder_.PathOf(header->key) &&
+                 (IsOfLine(*header, line) || Find(header->key));
+        },
+        stop);
+    if (!status.ok()) {
+      Report(status.message());
+    }
+  } catch (const std::exception& error) {
+    Report(error.what());
+  }
+}
+
+// As the atlas is now.
+std::optional<SurveyFileHeader> SurveyFiles::Find(std::uint64_t key) const {
+  if (!is_on_) {
+    return std::nullopt;
+  }
+  const auto header = ReadSurveyFileHeader(folder_.PathOf(key));
+  if (!header || header->key != key) {
+    return std::nullopt;
   }
   const auto line = read_line_();
-  std::error_code error;
-  std::string why;
-  if (!line) {
-    why = line.error().message();
-  } else if (BuildHash() == 0) {
-    why = "the program's own file cannot be read";
-  } else if (fs::create_directories(options_.directory, error); error) {
-    why = StrCat("cannot make ", options_.directory.string(), ": ", error.message());
-  }
-  if (!why.empty()) {
-    log_(LogLevel::kWarning, "surveys are not kept on disk: " + why);
-    return;
-  }
-  is_on_ = true;
-  FindFiles(*line);
-}
-
-void SurveyFiles::FindFiles(const AtlasLine& line) {
-  struct Found {
-    fs::file_time_type time;
-    SurveyFileHeader header;
-  };
-  std::vector<Found> found;
-  std::error_code error;
-  for (fs::directory_iterator it(options_.directory, error), end; !error && it != end;
-       it.increment(error)) {
-    const fs::path& path = it->path();
-    if (path.extension() != kSuffix && path.extension() != kUnfinished) {
-      continue;  // not ours
-    }
-    std::error_code ignored;
-    const auto header = ReadSurveyFileHeader(path);
-    if (header && path == PathOf(header->key) && header->payload_bytes <= options_.max_bytes &&
-        IsOfLine(*header, line)) {
-      found.push_back({fs::last_write_time(path, ignored), *header});
-    } else {
-      fs::remove(path, ignored);
-    }
-  }
-  if (error && error != std::errc::no_such_file_or_directory) {
-    Report(StrCat("cannot list ", options_.directory.string(), ": ", error.message()));
-  }
-  std::sort(found.begin(), found.end(),
-            [](const Found& a, const Found& b) { return a.time < b.time; });
-  const std::lock_guard lock(mutex_);
-  for (const Found& file : found) {
-    Insert(file.header);
-  }
-}
-
-fs::path SurveyFiles::PathOf(std::uint64_t key) const {
-  return options_.directory / StrCat(key, kSuffix);
+  return line && IsOfLine(*header, *line) ? header : std::nullopt;
 }
 
 std::optional<KeptSurveys> SurveyFiles::Read(const TileId& id) {
-  SurveyFileHeader header;
-  {
-    const std::lock_guard lock(mutex_);
-    const SurveyFileHeader* found = files_.Use(id.Key());
-    if (found == nullptr) {
-      return std::nullopt;
-    }
-    header = *found;
+  if (!is_on_) {
+    return std::nullopt;
   }
-  if (const auto payload = ReadSurveyFile(PathOf(header.key), header)) {
-    auto surveys = TileSurveys::Load(*payload, id, profile_);
-    if (surveys) {
-      std::error_code ignored;  // its age after a restart is a guess then
-      fs::last_write_time(PathOf(header.key), fs::file_time_type::clock::now(), ignored);
-      return KeptSurveys{*std::move(surveys), header.revision};
+  const std::uint64_t key = id.Key();
+  if (const auto header = Find(key)) {
+    if (const auto payload = ReadSurveyFile(folder_.PathOf(key), *header)) {
+      auto surveys = TileSurveys::Load(*payload, id, profile_);
+      if (surveys) {
+        folder_.Touch(key);
+        return KeptSurveys{*std::move(surveys), header->revision, header->revision};
+      }
     }
   }
-  const std::lock_guard lock(mutex_);
-  if (const SurveyFileHeader* now = files_.Use(header.key); now != nullptr && *now == header) {
-    files_.Take(header.key);
-    RemoveFile(header.key);
-  }
+  folder_.Remove(key);
   return std::nullopt;
 }
 
 bool SurveyFiles::Write(const KeptSurveys& kept) {
-  if (!is_on_ || !MayWrite() || !HasRoom()) {
+  if (!is_on_ || !MayWrite() || !folder_.HasRoom()) {
     return false;
   }
+  const std::uint64_t key = kept.surveys.id().Key();
+  std::error_code none_before;
+  const std::uintmax_t before = fs::file_size(folder_.PathOf(key), none_before);
   const auto header = WriteFile(kept);
   if (!header) {
     Report(header.error().message());
     return false;
   }
-  const std::lock_guard lock(mutex_);
-  Insert(*header);
+  folder_.Put(key, SurveyFileBytes(*header), none_before ? 0 : before);
   return true;
 }
 
@@ -150,15 +145,10 @@ Result<SurveyFileHeader> SurveyFiles::WriteFile(const KeptSurveys& kept) {
     const Bytes payload = kept.surveys.Save();
     const SurveyFileHeader header{BuildHash(), line->starts.back().id, kept.revision,
                                   kept.surveys.id().Key(), payload.size()};
-    std::uint64_t number = 0;
-    {
-      const std::lock_guard lock(mutex_);
-      number = writes_++;
-    }
     std::error_code ignored;  // somebody removed it; else writing says what is wrong
     fs::create_directories(options_.directory, ignored);
-    const fs::path unfinished = options_.directory / StrCat(header.key, ".", number, kUnfinished);
-    Status status = WriteSurveyFile(PathOf(header.key), unfinished, header, payload);
+    Status status = WriteSurveyFile(folder_.PathOf(header.key), folder_.UnfinishedOf(header.key),
+                                    header, payload);
     return status.ok() ? Result<SurveyFileHeader>(header) : Error(std::move(status));
   } catch (const std::exception& error) {
     return Error(StatusCode::kInternal, error.what());
@@ -166,9 +156,8 @@ Result<SurveyFileHeader> SurveyFiles::WriteFile(const KeptSurveys& kept) {
 }
 
 bool SurveyFiles::Has(const KeptSurveys& kept) const {
-  const std::lock_guard lock(mutex_);
-  const SurveyFileHeader* found = files_.Find(kept.surveys.id().Key());
-  return found != nullptr && found->revision == kept.revision;
+  const auto header = Find(kept.surveys.id().Key());
+  return header && header->revision == kept.revision;
 }
 
 bool SurveyFiles::MayWrite() const {
@@ -178,48 +167,14 @@ bool SurveyFiles::MayWrite() const {
 
 void SurveyFiles::MakeRoom() {
   if (is_on_) {
-    HasRoom();
+    folder_.HasRoom();
   }
-}
-
-bool SurveyFiles::HasRoom() {
-  const std::lock_guard lock(mutex_);
-  while (true) {
-    std::error_code error;
-    const fs::space_info space = fs::space(options_.directory, error);
-    if (error || space.available >= options_.min_free_bytes) {
-      return true;
-    }
-    const auto oldest = files_.TakeOldestAbove(0);
-    if (!oldest) {
-      return false;
-    }
-    RemoveFile(oldest->key);
-  }
-}
-
-// Under the lock.
-void SurveyFiles::Insert(const SurveyFileHeader& header) {
-  files_.Insert(header.key, header, SurveyFileBytes(header));
-  while (const auto oldest = files_.TakeOldestAbove(options_.max_bytes)) {
-    RemoveFile(oldest->key);
-  }
-}
-
-void SurveyFiles::RemoveFile(std::uint64_t key) const {
-  std::error_code ignored;  // it is not believed, or overwritten, later
-  fs::remove(PathOf(key), ignored);
 }
 
 void SurveyFiles::Report(const std::string& what) {
   const std::lock_guard lock(mutex_);
   not_before_ = std::chrono::steady_clock::now() + kPause;
   log_(LogLevel::kWarning, StrCat("surveys on disk: ", what, "; tried again in a minute"));
-}
-
-std::size_t SurveyFiles::bytes() const {
-  const std::lock_guard lock(mutex_);
-  return files_.bytes();
 }
 
 }  // namespace atlas

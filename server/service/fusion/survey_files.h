@@ -3,10 +3,12 @@
 // out. Disposable: any of them may be damaged or gone at any time, which costs time only.
 // Thread-safe.
 //
-// A file is believed if this very build wrote it, and if the atlas went on from the state that it
-// was in then: not if another one, or an older copy, was put in its place (AtlasLine).
+// Nothing of the files is kept in memory. A file is believed if this very build wrote it, and if
+// the atlas went on from the state that it was in then: not if another one, or an older copy, was
+// put in its place (AtlasLine).
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -14,13 +16,15 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 
-#include "core/base/lru_list.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
 #include "server/service/fusion/kept_surveys.h"
 #include "server/service/fusion/survey_file.h"
+#include "server/service/fusion/survey_folder.h"
 #include "server/service/log_sink.h"
 #include "server/store/store_types.h"
 
@@ -37,7 +41,8 @@ class SurveyFiles {
   // The line of the atlas as it is now.
   using ReadLine = std::function<Result<AtlasLine>()>;
 
-  // Before the atlas changes. Removes the files in the directory that cannot be believed.
+  // Goes on with removing the files in the directory that cannot be believed, on a thread of its
+  // own: after another program ran there may be tens of thousands.
   SurveyFiles(const SurveyFilesOptions& options,
               const MapProfile& profile,
               ReadLine read_line,
@@ -57,16 +62,15 @@ class SurveyFiles {
   void MakeRoom();
 
   bool is_on() const { return is_on_; }
-  std::size_t bytes() const;
+  std::size_t bytes() const { return folder_.bytes(); }
+  // What was there at the start has been looked at.
+  bool is_sorted() const { return is_sorted_; }
 
  private:
-  void FindFiles(const AtlasLine& line);
+  void SortFiles(const AtlasLine& line, const std::stop_token& stop);
+  std::optional<SurveyFileHeader> Find(std::uint64_t key) const;
   Result<SurveyFileHeader> WriteFile(const KeptSurveys& kept);
-  std::filesystem::path PathOf(std::uint64_t key) const;
   bool MayWrite() const;
-  bool HasRoom();
-  void Insert(const SurveyFileHeader& header);
-  void RemoveFile(std::uint64_t key) const;
   void Report(const std::string& what);
 
   SurveyFilesOptions options_;
@@ -74,10 +78,11 @@ class SurveyFiles {
   ReadLine read_line_;
   LogSink log_;
   bool is_on_ = false;
-  mutable std::mutex mutex_;  // of what follows
-  LruList<SurveyFileHeader> files_;
-  std::uint64_t writes_ = 0;
-  std::chrono::steady_clock::time_point not_before_;  // a write failed
+  SurveyFolder folder_;
+  mutable std::mutex mutex_;
+  std::chrono::steady_clock::time_point not_before_;  // a write failed; under the lock
+  std::atomic<bool> is_sorted_ = false;
+  std::jthread sorter_;
 };
 
 }  // namespace atlas

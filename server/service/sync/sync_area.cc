@@ -1,9 +1,10 @@
 #include "server/service/sync/sync_area.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -28,61 +29,6 @@ bool IsFinite(const Vector2d& point) {
 
 Vector2d Clamped(const Vector2d& point) {
   return point.cwiseMax(-kMaxExtent_m).cwiseMin(kMaxExtent_m);
-}
-
-// From a point to a square; 0 inside.
-double Gap(const Vector2d& point, const Vector2d& min_m, const Vector2d& max_m) {
-  return (min_m - point).cwiseMax(point - max_m).cwiseMax(0.0).norm();
-}
-
-struct Nearest {
-  double distance_m = std::numeric_limits<double>::infinity();
-  double part = 0.0;  // of the segment, 0 to 1
-
-  void Take(double distance, double at) {
-    if (distance < distance_m) {
-      *this = {distance, at};
-    }
-  }
-};
-
-// Of a segment to a square.
-Nearest NearestTo(const Vector2d& from,
-                  const Vector2d& to,
-                  const Vector2d& min_m,
-                  const Vector2d& max_m) {
-  Nearest nearest;
-  nearest.Take(Gap(from, min_m, max_m), 0.0);
-  nearest.Take(Gap(to, min_m, max_m), 1.0);
-  const Vector2d step = to - from;
-  const double squared = step.squaredNorm();
-  if (squared == 0.0 || nearest.distance_m == 0.0) {
-    return nearest;
-  }
-  // Where it crosses the square: the part of it that is within both slabs.
-  double enter = 0.0;
-  double leave = 1.0;
-  for (int axis = 0; axis < 2; ++axis) {
-    if (step[axis] == 0.0) {
-      if (from[axis] < min_m[axis] || from[axis] > max_m[axis]) {
-        enter = 2.0;
-      }
-      continue;
-    }
-    const double a = (min_m[axis] - from[axis]) / step[axis];
-    const double b = (max_m[axis] - from[axis]) / step[axis];
-    enter = std::max(enter, std::min(a, b));
-    leave = std::min(leave, std::max(a, b));
-  }
-  if (enter <= leave) {
-    return {0.0, enter};
-  }
-  for (const Vector2d& corner :
-       {min_m, Vector2d(max_m.x(), min_m.y()), Vector2d(min_m.x(), max_m.y()), max_m}) {
-    const double part = std::clamp((corner - from).dot(step) / squared, 0.0, 1.0);
-    nearest.Take((from + part * step - corner).norm(), part);
-  }
-  return nearest;
 }
 
 Status Check(const DiscArea& disc) {
@@ -111,14 +57,18 @@ Status Check(const CorridorArea& corridor) {
   return {};
 }
 
-Status Check(const TilesArea& tiles) {
-  if (tiles.ids.size() > SyncArea::kMaxTiles) {
-    return Refuse(StrCat(tiles.ids.size(), " tiles, expected at most ", SyncArea::kMaxTiles));
+Status CheckTiles(const std::vector<std::uint64_t>& keys) {
+  if (keys.size() > SyncArea::kMaxTiles) {
+    return Refuse(StrCat(keys.size(), " tiles, expected at most ", SyncArea::kMaxTiles));
   }
-  for (std::size_t i = 1; i < tiles.ids.size(); ++i) {
-    if (tiles.ids[i - 1].Key() >= tiles.ids[i].Key()) {
-      return Refuse(
-          StrCat("tile ", tiles.ids[i], " after ", tiles.ids[i - 1], ", expected rising keys"));
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const auto id = TileId::FromKey(keys[i]);
+    if (!id) {
+      return id.error().WithContext("sync area");
+    }
+    if (i > 0 && keys[i - 1] >= keys[i]) {
+      return Refuse(StrCat("tile ", *id, " after ", TileId::FromKey(keys[i - 1]).value(),
+                           ", expected rising keys"));
     }
   }
   return {};
@@ -127,80 +77,112 @@ Status Check(const TilesArea& tiles) {
 }  // namespace
 
 Result<SyncArea> SyncArea::Create(MapArea shape, const MapProfile& profile) {
-  Status status = std::visit([](const auto& s) { return Check(s); }, shape);
+  if (const auto* tiles = std::get_if<TilesArea>(&shape)) {
+    std::vector<std::uint64_t> keys(tiles->ids.size());
+    std::transform(tiles->ids.begin(), tiles->ids.end(), keys.begin(),
+                   [](const TileId& id) { return id.Key(); });
+    return OfTiles(std::move(keys), profile);
+  }
+  Status status;
+  Shape checked;
+  const auto check = [&](auto&& one) {
+    if constexpr (!std::is_same_v<std::decay_t<decltype(one)>, TilesArea>) {
+      status = Check(one);
+      checked = std::forward<decltype(one)>(one);
+    }
+  };
+  std::visit(check, std::move(shape));
   if (!status.ok()) {
     return Error(std::move(status));
   }
-  return SyncArea(std::move(shape), profile);
+  return SyncArea(std::move(checked), profile);
 }
 
-SyncArea::SyncArea(MapArea shape, const MapProfile& profile)
+Result<SyncArea> SyncArea::OfTiles(std::vector<std::uint64_t> keys, const MapProfile& profile) {
+  if (Status status = CheckTiles(keys); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return SyncArea(Tiles{std::move(keys)}, profile);
+}
+
+SyncArea::SyncArea(Shape shape, const MapProfile& profile)
     : shape_(std::move(shape)), tile_m_(profile.tile_size_m()) {
+  std::vector<Vector2d> way_m;
   if (auto* disc = std::get_if<DiscArea>(&shape_)) {
-    way_m_ = {Clamped(disc->center_m)};
+    way_m = {Clamped(disc->center_m)};
     reach_m_ = std::min(disc->radius_m, kMaxExtent_m);
   } else if (auto* box = std::get_if<BoxArea>(&shape_)) {
     *box = {Clamped(box->min_m), Clamped(box->max_m)};
-    way_m_ = {0.5 * (box->min_m + box->max_m)};
+    way_m = {0.5 * (box->min_m + box->max_m)};
   } else if (auto* corridor = std::get_if<CorridorArea>(&shape_)) {
-    for (const Vector2d& point : corridor->route_m) {
-      way_m_.push_back(Clamped(point));
-    }
+    std::transform(corridor->route_m.begin(), corridor->route_m.end(), std::back_inserter(way_m),
+                   &Clamped);
     reach_m_ = std::min(corridor->half_width_m, kMaxExtent_m);
   }
+  if (way_m.size() == 1) {
+    way_m.push_back(way_m[0]);
+  }
   double along_m = 0.0;
-  for (std::size_t i = 0; i < way_m_.size(); ++i) {
-    along_m += i > 0 ? (way_m_[i] - way_m_[i - 1]).norm() : 0.0;
-    along_m_.push_back(along_m);
+  for (std::size_t i = 1; i < way_m.size(); ++i) {
+    legs_.push_back({way_m[i - 1], way_m[i], along_m});
+    along_m += (way_m[i] - way_m[i - 1]).norm();
   }
 }
 
-SyncArea::Square SyncArea::SquareOf(const TileId& id, int bits) const {
-  const double side_m = std::ldexp(tile_m_, id.level);
+const std::vector<SyncArea::Leg>* SyncArea::shaping_legs() const {
+  const bool is_shaped =
+      std::holds_alternative<DiscArea>(shape_) || std::holds_alternative<CorridorArea>(shape_);
+  return is_shaped ? &legs_ : nullptr;
+}
+
+double SyncArea::tile_side_m(std::uint8_t level) const {
+  return std::ldexp(tile_m_, level);
+}
+
+MapSquare SyncArea::SquareOf(const TileId& id, int bits) const {
+  const double side_m = tile_side_m(id.level);
   const Vector2d min_m = side_m * Vector2d(id.x, id.y);
   return {min_m, min_m + Vector2d::Constant(std::ldexp(side_m, bits))};
 }
 
+bool SyncArea::IsWithinReach(const Leg& leg, const TileId& id, int bits) const {
+  const MapSquare square = SquareOf(id, bits);
+  return GapOfBoxes(leg.from_m, leg.to_m, square).maxCoeff() <= reach_m_ &&
+         NearestTo(leg.from_m, leg.to_m, square).distance_m <= reach_m_;
+}
+
 bool SyncArea::Touches(const TileId& id, int bits) const {
-  if (const auto* tiles = std::get_if<TilesArea>(&shape_)) {
+  if (const auto* keys = tile_keys()) {
     const std::uint64_t first = id.Key();
     const std::uint64_t last = first + (std::uint64_t{1} << (2 * bits)) - 1;
-    const auto found = std::partition_point(tiles->ids.begin(), tiles->ids.end(),
-                                            [&](const TileId& tile) { return tile.Key() < first; });
-    return found != tiles->ids.end() && found->Key() <= last;
+    const auto found = std::lower_bound(keys->begin(), keys->end(), first);
+    return found != keys->end() && *found <= last;
   }
-  const Square square = SquareOf(id, bits);
   if (const auto* box = std::get_if<BoxArea>(&shape_)) {
+    const MapSquare square = SquareOf(id, bits);
     return (square.min_m.array() <= box->max_m.array()).all() &&
            (square.max_m.array() >= box->min_m.array()).all();
   }
-  if (way_m_.size() == 1) {
-    return Gap(way_m_[0], square.min_m, square.max_m) <= reach_m_;
-  }
-  for (std::size_t i = 1; i < way_m_.size(); ++i) {
-    if (NearestTo(way_m_[i - 1], way_m_[i], square.min_m, square.max_m).distance_m <= reach_m_) {
-      return true;
-    }
-  }
-  return false;
+  return std::any_of(legs_.begin(), legs_.end(),
+                     [&](const Leg& leg) { return IsWithinReach(leg, id, bits); });
 }
 
 TileRect SyncArea::Bounds(std::uint8_t level) const {
   TileRect rect{level};
-  if (std::holds_alternative<TilesArea>(shape_)) {
+  if (tile_keys() != nullptr) {
     return rect;
   }
-  Vector2d min_m = way_m_[0];
-  Vector2d max_m = way_m_[0];
+  Vector2d min_m = legs_[0].from_m;
+  Vector2d max_m = legs_[0].from_m;
   if (const auto* box = std::get_if<BoxArea>(&shape_)) {
     min_m = box->min_m;
     max_m = box->max_m;
   }
-  for (const Vector2d& point : way_m_) {
-    min_m = min_m.cwiseMin(point);
-    max_m = max_m.cwiseMax(point);
+  for (const Leg& leg : legs_) {
+    min_m = min_m.cwiseMin(leg.to_m);
+    max_m = max_m.cwiseMax(leg.to_m);
   }
-  const double side_m = std::ldexp(tile_m_, level);
+  const double side_m = tile_side_m(level);
   const auto coordinate = [side_m](double position_m) {
     return static_cast<std::int32_t>(std::clamp<double>(
         std::floor(position_m / side_m), TileId::kMinCoordinate, TileId::kMaxCoordinate));
@@ -214,21 +196,38 @@ TileRect SyncArea::Bounds(std::uint8_t level) const {
   return rect;
 }
 
-const std::vector<TileId>* SyncArea::tiles() const {
-  const auto* tiles = std::get_if<TilesArea>(&shape_);
-  return tiles == nullptr ? nullptr : &tiles->ids;
+const std::vector<std::uint64_t>* SyncArea::tile_keys() const {
+  const auto* tiles = std::get_if<Tiles>(&shape_);
+  return tiles == nullptr ? nullptr : &tiles->keys;
+}
+
+std::size_t SyncArea::bytes() const {
+  std::size_t bytes = sizeof(SyncArea) + legs_.capacity() * sizeof(Leg);
+  if (const auto* keys = tile_keys()) {
+    bytes += keys->capacity() * sizeof(std::uint64_t);
+  } else if (const auto* corridor = std::get_if<CorridorArea>(&shape_)) {
+    bytes += corridor->route_m.capacity() * sizeof(Vector2d);
+  }
+  return bytes;
 }
 
 double SyncArea::Distance(const TileId& id) const {
-  if (way_m_.empty()) {
+  if (legs_.empty()) {
     return 0.0;
   }
-  const Square square = SquareOf(id, 0);
-  double best_m = Gap(way_m_[0], square.min_m, square.max_m);
-  for (std::size_t i = 1; i < way_m_.size(); ++i) {
-    const Nearest nearest = NearestTo(way_m_[i - 1], way_m_[i], square.min_m, square.max_m);
-    const double along_m = along_m_[i - 1] + nearest.part * (along_m_[i] - along_m_[i - 1]);
-    best_m = std::min(best_m, nearest.distance_m + kAlongWeight * along_m);
+  const MapSquare square = SquareOf(id, 0);
+  double best_m = std::numeric_limits<double>::infinity();
+  for (const Leg& leg : legs_) {
+    const double start_m = kAlongWeight * leg.along_m;
+    if (start_m >= best_m) {
+      break;  // nor is any other leg nearer
+    }
+    if (start_m + GapOfBoxes(leg.from_m, leg.to_m, square).maxCoeff() >= best_m) {
+      continue;
+    }
+    const Nearest nearest = NearestTo(leg.from_m, leg.to_m, square);
+    const double part_m = nearest.part * (leg.to_m - leg.from_m).norm();
+    best_m = std::min(best_m, start_m + kAlongWeight * part_m + nearest.distance_m);
   }
   return best_m;
 }

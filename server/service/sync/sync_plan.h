@@ -2,6 +2,9 @@
 // of the area, so that there is a map everywhere, then always the tile that removes most error for
 // its bytes, around the vehicle and along its way before what lies off it. A tile never comes
 // before its parent, so that whatever arrived is a map (docs/protocol.md, "Sync").
+//
+// A tile's place depends on the stored tile and on where it is, not on what is held or wanted of it
+// nor on other tiles: what changes between replies moves nothing else past a cursor.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +16,7 @@
 #include "core/base/status.h"
 #include "server/service/sync/held_tiles.h"
 #include "server/service/sync/sync_area.h"
+#include "server/store/tile_block.h"
 #include "server/store/tile_index.h"
 
 namespace atlas {
@@ -20,7 +24,7 @@ namespace atlas {
 // Where the reply before ended.
 struct SyncCursor {
   std::uint64_t revision =
-      0;                  // of the atlas, when the first one began: what changed since comes last
+      0;                  // of the atlas, when the first one began: what changed since comes later
   double priority = 0.0;  // of the last tile
   std::uint64_t key = 0;
 };
@@ -58,8 +62,9 @@ struct SyncLimits {
   std::size_t max_items = 4'096;
   std::size_t max_tiles = 262'144;  // in the area, of all levels
   std::size_t max_blocks = 16'384;  // looked at one by one, a level; larger areas are scanned
-  // Without blocking: blocks of all levels, times the points of the vehicle's way. Some 0.3 ms.
-  std::size_t max_work_at_once = 256;
+  // Without blocking: squares that are compared with a leg of the vehicle's way, those of 256
+  // blocks for one that stands. Some 0.3 ms.
+  std::size_t max_work_at_once = std::size_t{256} << kTileBlockBits;
 };
 
 // kInvalidArgument: levels that the atlas has not, or an area with too many tiles. nullopt: it

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/log_copier.h"
 #include "server/store/sqlite/connection/reader_pool.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/connection/write_queue.h"
@@ -34,6 +35,10 @@ DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem
 
 DatabaseOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
   return {std::move(file), DatabaseOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
+}
+
+DatabaseOptions CopierOptions(std::filesystem::path file) {
+  return {std::move(file), DatabaseOptions::Mode::kReadWrite, 64, 5'000};
 }
 
 std::uint64_t ReadRevision(Connection& connection) {
@@ -76,6 +81,7 @@ class SqliteStore final : public AtlasStore {
       : directory_(std::move(directory)),
         identity_(identity),
         tiles_(options.tile_directory_bytes),
+        log_(CopierOptions(directory_.database_file()), {}, *writer),
         writes_(std::move(writer), {options.max_queued_writes, options.max_group, &ReadRevision}),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
@@ -150,7 +156,14 @@ class SqliteStore final : public AtlasStore {
       return Result<bool>(true);
     }));
   }
-  WriteFigures ReadWriteFigures() const override { return writes_.ReadFigures(); }
+  WriteFigures ReadWriteFigures() const override {
+    WriteFigures figures = writes_.ReadFigures();
+    const auto failure = log_.last_failure();
+    if (failure && (!figures.last_refusal || figures.last_refusal->when < failure->when)) {
+      figures.last_refusal = failure;
+    }
+    return figures;
+  }
   void Flush() override { writes_.Flush(); }
 
   Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override {
@@ -288,7 +301,8 @@ class SqliteStore final : public AtlasStore {
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   StoreIdentity identity_;
   TileDirectory tiles_;  // outlives the writes, which report to it
-  WriteQueue writes_;    // closed last of the connections: only it can empty the write-ahead log
+  LogCopier log_;        // outlives the writer: whoever is closed last empties the write-ahead log
+  WriteQueue writes_;
   ReaderPool readers_;
 };
 

@@ -103,7 +103,7 @@ Status StoreSnapshot::CheckUntouched() const {
                              ": somebody began to write to it meanwhile; try again"));
 }
 
-Status StoreSnapshot::Explained(Status status) const {
+Status StoreSnapshot::Explained(const Status& status) const {
   const std::string advice = AdviceFor(status.code(), files_);
   return Status(status.code(), status.message() + advice)
       .WithContext(StrCat("atlas file ", files_.database.string()));

@@ -50,7 +50,7 @@ class StoreSnapshot {
 
   Status Begin();
   Status CheckUntouched() const;
-  Status Explained(Status status) const;
+  Status Explained(const Status& status) const;
 
   DatabaseFiles files_;
   std::unique_ptr<Connection> connection_;

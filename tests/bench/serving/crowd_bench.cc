@@ -1,5 +1,5 @@
 // A crowd of connections to a daemon, beside which a good client is measured.
-// Usage: crowd_bench PORT IDLE SLOW HOSTILE [tls]
+// Usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much [tls]
 // Says {"open": N} when those that keep to the rules are connected, then lets the hostile ones go
 // until its standard input ends, and checks that the others have lost nothing.
 #include <csignal>
@@ -29,16 +29,19 @@ std::size_t CountOf(const char* text) {
 }
 
 Status Run(int argc, char** argv) {
-  if (argc != 5 && argc != 6) {
-    return {StatusCode::kInvalidArgument, "usage: crowd_bench PORT IDLE SLOW HOSTILE [tls]"};
+  if (argc != 6 && argc != 7) {
+    return {StatusCode::kInvalidArgument,
+            "usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much [tls]"};
   }
+  const auto how =
+      std::string(argv[5]) == "asks_much" ? Hostility::kAskMuch : Hostility::kBreakRules;
   const auto port = static_cast<std::uint16_t>(std::atoi(argv[1]));
   std::optional<LoadTls> tls;
-  const LoadTls* const way = argc == 6 ? &tls.emplace() : nullptr;
+  const LoadTls* const way = argc == 7 ? &tls.emplace() : nullptr;
   QuietCrowd quiet(port, way);
   ATLAS_RETURN_IF_ERROR(quiet.Open(CountOf(argv[2]), CountOf(argv[3])));
   std::cout << "{\"open\": " << CountOf(argv[2]) + CountOf(argv[3]) << "}" << std::endl;
-  HostileCrowd hostile(port, way, CountOf(argv[4]));
+  HostileCrowd hostile(port, way, CountOf(argv[4]), how);
   while (!IsToldToEnd()) {
     ATLAS_RETURN_IF_ERROR(quiet.Tick());
   }

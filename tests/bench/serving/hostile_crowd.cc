@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <optional>
 #include <random>
+#include <span>
 
 #include <poll.h>
 
+#include "tests/bench/serving/heavy_frames.h"
 #include "tests/bench/serving/load_frames.h"
 
 namespace atlas::testing {
@@ -37,6 +40,24 @@ struct Visit {
       ::poll(&wait, 1, 50);
       if (socket.Receive(buffer).is_closed) {
         return;
+      }
+    }
+  }
+  // To the Hello, and to what came after it.
+  void WaitForAReply() {
+    std::array<std::uint8_t, 16'384> buffer{};
+    FrameDecoder replies;
+    int awaited = 2;
+    while (awaited > 0 && !stop.stop_requested()) {
+      pollfd wait{socket.descriptor(), POLLIN, 0};
+      ::poll(&wait, 1, 50);
+      const LoadSocket::Moved came = socket.Receive(buffer);
+      if (came.is_closed) {
+        return;
+      }
+      replies.Push(ByteSpan(buffer).first(came.bytes));
+      while (replies.Next().value_or(std::nullopt)) {
+        --awaited;
       }
     }
   }
@@ -121,16 +142,44 @@ void SendsNoMessage(Visit& visit) {
   visit.WaitForTheEnd();
 }
 
-constexpr void (*kBehaviours[])(Visit&) = {&RandomBytes,     &ClaimsMoreThanThereMayBe,
-                                           &ClaimsAndStalls, &LeavesWithinAFrame,
-                                           &SpoilsAChecksum, &SaysNoHello,
-                                           &SaysNothing,     &LeavesAtOnce,
-                                           &NeverReads,      &SendsNoMessage};
+// All is as it must be, and takes as long as a request can.
+void CorrectsManyPoses(Visit& visit) {
+  static const Bytes kFrame = ManyPosesFrame(2);
+  visit.Greet();
+  visit.Say(kFrame);
+  visit.WaitForAReply();
+}
+
+void HoldsManyTiles(Visit& visit) {
+  static const Bytes kFrame = ManyHeldFrame(2);
+  visit.Greet();
+  visit.Say(kFrame);
+  visit.WaitForAReply();
+}
+
+void WatchesManyTiles(Visit& visit) {
+  static const Bytes kFrame = ManyWatchedFrame(2);
+  visit.Greet();
+  visit.Say(kFrame);
+  visit.WaitForAReply();
+}
+
+using Behaviour = void (*)(Visit&);
+constexpr Behaviour kBreakRules[] = {&RandomBytes,     &ClaimsMoreThanThereMayBe,
+                                     &ClaimsAndStalls, &LeavesWithinAFrame,
+                                     &SpoilsAChecksum, &SaysNoHello,
+                                     &SaysNothing,     &LeavesAtOnce,
+                                     &NeverReads,      &SendsNoMessage};
+constexpr Behaviour kAskMuch[] = {&CorrectsManyPoses, &HoldsManyTiles, &WatchesManyTiles};
+
+std::span<const Behaviour> BehavioursOf(Hostility how) {
+  return how == Hostility::kBreakRules ? std::span<const Behaviour>(kBreakRules) : kAskMuch;
+}
 
 }  // namespace
 
-HostileCrowd::HostileCrowd(std::uint16_t port, const LoadTls* tls, std::size_t peers)
-    : port_(port), tls_(tls) {
+HostileCrowd::HostileCrowd(std::uint16_t port, const LoadTls* tls, std::size_t peers, Hostility how)
+    : port_(port), tls_(tls), how_(how) {
   for (std::size_t i = 0; i < peers; ++i) {
     threads_.emplace_back([this, i](const std::stop_token& stop) { Misbehave(i, stop); });
   }
@@ -145,8 +194,8 @@ void HostileCrowd::Stop() {
 
 void HostileCrowd::Misbehave(std::size_t number, const std::stop_token& stop) {
   std::mt19937_64 random(number);
-  const std::size_t behaviours = std::size(kBehaviours);
-  const bool is_shaking_hands = tls_ != nullptr && (number / behaviours) % 2 == 0;
+  const std::span<const Behaviour> behaviours = BehavioursOf(how_);
+  const bool is_shaking_hands = tls_ != nullptr && (number / behaviours.size()) % 2 == 0;
   while (!stop.stop_requested()) {
     ++visits_;
     const auto socket = LoadSocket::Connect(port_, is_shaking_hands ? tls_ : nullptr);
@@ -155,7 +204,7 @@ void HostileCrowd::Misbehave(std::size_t number, const std::stop_token& stop) {
       continue;
     }
     Visit visit{**socket, random, stop};
-    kBehaviours[number % behaviours](visit);
+    behaviours[number % behaviours.size()](visit);
   }
 }
 

@@ -1,5 +1,6 @@
-// Connections that break every rule there is, each on a thread of its own: when the daemon has done
-// with one, or it gave up, it comes again at once.
+// Connections that break every rule there is, or keep to all of them and cost as much as they can,
+// each on a thread of its own: when the daemon has done with one, or it gave up, it comes again at
+// once.
 #pragma once
 
 #include <atomic>
@@ -12,10 +13,12 @@
 
 namespace atlas::testing {
 
+enum class Hostility { kBreakRules, kAskMuch };
+
 class HostileCrowd {
  public:
   // `tls`: every second one shakes hands first, the others do not even do that.
-  HostileCrowd(std::uint16_t port, const LoadTls* tls, std::size_t peers);
+  HostileCrowd(std::uint16_t port, const LoadTls* tls, std::size_t peers, Hostility how);
   HostileCrowd(const HostileCrowd&) = delete;
   HostileCrowd& operator=(const HostileCrowd&) = delete;
   ~HostileCrowd() { Stop(); }
@@ -31,6 +34,7 @@ class HostileCrowd {
 
   std::uint16_t port_;
   const LoadTls* tls_;
+  const Hostility how_;
   std::atomic<std::uint64_t> visits_ = 0;
   std::atomic<std::uint64_t> refused_ = 0;
   std::vector<std::jthread> threads_;

@@ -12,6 +12,7 @@ struct UploadFigures {
   std::uint64_t bytes = 0;    // of their blobs
   double seconds = 0.0;
   std::vector<double> acknowledged_ms;  // each, where each was waited for
+  std::vector<double> map_age_s;        // meanwhile, where that was asked for
 };
 
 }  // namespace atlas::testing

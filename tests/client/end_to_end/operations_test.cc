@@ -35,7 +35,7 @@ TEST_F(OperationsEndToEndTest, AGoodFileTakesEffectAndABadOneDoesNot) {
   Write(file, "log_format = 'json'\nworkers = 7\n[map]\ncell_size = 0.2\n");
   daemon.Signal(SIGHUP);
   EXPECT_EQ(Message(daemon.ReadLogUntil("configuration")),
-            "signal 1: configuration read again, log_format changed");
+            "signal 1: configuration and its files read again, log_format changed");
   EXPECT_EQ(Message(daemon.ReadLogUntil("restart")),
             "signal 1: changes that need a restart: workers");
 

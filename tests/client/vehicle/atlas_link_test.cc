@@ -17,6 +17,7 @@ class LinkWorld {
  public:
   std::deque<Status> failures;
   double random = 0.999999;
+  milliseconds retry_after{0};  // that failures ask for
   std::vector<milliseconds> pauses;
   std::vector<milliseconds> timeouts;
 
@@ -27,11 +28,12 @@ class LinkWorld {
               now_ += pause;
             },
             [this] { return random; },
-            [this](const ConnectionOptions& options) -> Result<AtlasClient> {
+            [this](const ConnectionOptions& options, milliseconds& asked) -> Result<AtlasClient> {
               timeouts.push_back(options.connect_timeout);
               if (failures.empty()) return AtlasClient::Connect(peer_.options());
               const Status failure = failures.front();
               failures.pop_front();
+              asked = retry_after;
               return Error(failure);
             }};
   }
@@ -67,6 +69,54 @@ TEST(AtlasLinkTest, JitterIsFull) {
   AtlasLink link({}, world.environment());
   ASSERT_TRUE(link.Wait(milliseconds(10)));
   EXPECT_TRUE(world.pauses.empty());
+}
+
+// The random part comes on top: a fleet that was refused together does not come back together.
+TEST(AtlasLinkTest, ABusyDaemonIsLeftAloneForAsLongAsItAsks) {
+  LinkWorld world;
+  world.retry_after = milliseconds(5'000);
+  world.failures.assign(2, {StatusCode::kUnavailable, "busy"});
+  AtlasLink link({.connection = {}, .first_delay = milliseconds(100)}, world.environment());
+  world.random = 0.0;
+  ASSERT_FALSE(link.Client(milliseconds(50)));
+  world.Pass(milliseconds(4'999));
+  EXPECT_FALSE(link.Client(milliseconds(50)));
+  EXPECT_EQ(world.timeouts.size(), 1U);
+  world.random = 0.5;
+  ASSERT_TRUE(link.Wait(milliseconds(60'000)));
+  EXPECT_EQ(world.pauses, (std::vector{milliseconds(1), milliseconds(5'100)}));
+}
+
+TEST(AtlasLinkTest, WhatARefusedRequestAskedForHoldsForTheNextConnection) {
+  TestPeer busy([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    const auto request = socket.ReadRequest();
+    wire::Envelope reply;
+    reply.mutable_error()->set_code(static_cast<int>(StatusCode::kUnavailable));
+    reply.mutable_error()->set_retry(true);
+    reply.mutable_error()->set_retry_after_ms(~0U);
+    socket.Reply(request->request_id(), std::move(reply));
+    socket.Drain();
+  });
+  LinkWorld world;
+  world.random = 0.0;
+  LinkEnvironment environment = world.environment();
+  environment.connect = [&busy](const ConnectionOptions&, milliseconds& retry_after) {
+    return AtlasClient::Connect(busy.options(), retry_after);
+  };
+  AtlasLink link({}, environment);
+  const auto client = link.Client(milliseconds(50));
+  ASSERT_TRUE(client) << client.error().message();
+  EXPECT_EQ((*client)->retry_after(), milliseconds(0));
+  const auto status = (*client)->ReadStatus();
+  ASSERT_FALSE(status);
+  // Bounded, by the clock of the connection, of which some has passed.
+  EXPECT_LE((*client)->retry_after(), milliseconds(60'000));
+  EXPECT_GE((*client)->retry_after(), milliseconds(30'000));
+  link.Report(status.error());
+  world.Pass(milliseconds(29'000));
+  EXPECT_FALSE(link.Client(milliseconds(50)));
+  EXPECT_FALSE(link.is_connected());
 }
 
 TEST(AtlasLinkTest, WithoutWaitingAnAttemptIsMadeOnlyWhenItIsDue) {

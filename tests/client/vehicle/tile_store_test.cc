@@ -237,6 +237,44 @@ TEST(TileStoreTest, WhatIsOnDiskOutlivesTheStoreAndItsMemory) {
   EXPECT_LE(again.memory_bytes(), 2'000U);
 }
 
+// Whatever the order of the folders, and also when the clock was set back in between.
+TEST(TileStoreTest, TheAtlasThatWasOpenedLastIsTheFirstKnown) {
+  const TestFolder folder;
+  const TileStoreOptions options{.folder = folder.path()};
+  std::vector<AtlasKey> atlases;
+  for (const std::uint8_t id : Bytes{7, 3, 9, 1}) {
+    atlases.push_back({Bytes(16, id), TinyProfile()});
+  }
+  for (const std::size_t last : {0U, 1U, 2U, 3U, 1U, 0U, 0U, 2U}) {
+    ASSERT_TRUE(TileStore::Open(atlases[last], options));
+    EXPECT_EQ(TileFiles::Known(folder.path()).at(0), atlases[last]);
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path())) {
+    if (entry.path().filename() != "atlas") continue;
+    fs::last_write_time(entry.path(), fs::last_write_time(entry.path()) + std::chrono::hours(24));
+  }
+  ASSERT_TRUE(TileStore::Open(atlases[3], options));
+  EXPECT_EQ(TileFiles::Known(folder.path()),
+            (std::vector{atlases[3], atlases[2], atlases[0], atlases[1]}));
+}
+
+TEST(TileStoreTest, WithoutAFolderThatCanBeMadeItWorksInMemory) {
+  const TestFolder folder;
+  std::ofstream(folder.path() / "file") << "no folder can be made below it";
+  TileStoreOptions options;
+  options.folder = folder.path() / "file" / "tiles";
+  auto store = TileStore::Open(TinyAtlas(), options);
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_FALSE(store->disk_problem().ok());
+  const TinyWorld world = SquareWorld(2);
+  ASSERT_TRUE(SyncOnce(world, *store));
+  ExpectHolds(*store, world);
+  EXPECT_EQ(store->disk_failures(), store->size());
+  EXPECT_EQ(store->disk_bytes(), 0U);
+  EXPECT_EQ(TileStore::Open({Bytes(3, 1), TinyProfile()}, options).error().code(),
+            StatusCode::kInvalidArgument);
+}
+
 TEST(TileStoreTest, DiskIsBounded) {
   const TestFolder folder;
   const TinyWorld world = SquareWorld(6);

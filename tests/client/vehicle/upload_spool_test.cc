@@ -171,6 +171,48 @@ TEST(UploadSpoolTest, WhatIsRefusedForGoodIsSetAsideWithItsReason) {
   EXPECT_EQ(OpenSpool(folder).waiting(), 0U);
 }
 
+// The daemon's clock has caught up with the vehicle's, which was fast.
+TEST(UploadSpoolTest, WhatWasRefusedIsSentWhenItIsPutBack) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  const std::uint64_t bytes = spool.waiting_bytes();
+  const Status ahead(StatusCode::kInvalidData, "a time ahead of the daemon's clock");
+  UploadPeer strict({{0, ahead}, {1, ahead}, {2, ahead}, {3, ahead}});
+  ASSERT_TRUE(strict.Take(spool));
+  UploadSpool again = OpenSpool(folder);
+  EXPECT_EQ(again.refused(), 4U);
+  ASSERT_TRUE(PutOne(again, 4).ok());
+  fs::remove(FilesOf(again.refused_folder()).at(2));  // a keyframe, not its reason
+  EXPECT_EQ(*again.RetryRefused(), 3U);
+  EXPECT_EQ(again.refused(), 0U);
+  EXPECT_EQ(again.waiting(), 4U);
+  EXPECT_EQ(again.waiting_bytes(), bytes);
+  EXPECT_TRUE(FilesOf(again.refused_folder()).empty());
+  EXPECT_EQ(*again.RetryRefused(), 0U);
+  UploadPeer peer;
+  ASSERT_TRUE(peer.Take(again));
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{0, 2, 3, 4}));
+}
+
+TEST(UploadSpoolTest, WhatWasRefusedStaysWhereThereIsNoRoomForIt) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  const std::uint64_t bytes_of_one = spool.waiting_bytes() / 2;
+  UploadPeer strict({{0, {StatusCode::kInvalidData, "no"}}, {1, {StatusCode::kInvalidData, "no"}}});
+  ASSERT_TRUE(strict.Take(spool));
+  UploadSpool small = OpenSpool(folder, bytes_of_one);
+  EXPECT_EQ(*small.RetryRefused(), 1U);
+  EXPECT_EQ(small.refused(), 1U);
+  EXPECT_EQ(small.RetryRefused().error().code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(FilesOf(small.refused_folder()).size(), 2U);
+}
+
 TEST(UploadSpoolTest, WhatMayPassLaterIsKept) {
   for (const StatusCode code : {StatusCode::kResourceExhausted, StatusCode::kUnavailable,
                                 StatusCode::kInternal, StatusCode::kPermissionDenied}) {
@@ -186,6 +228,34 @@ TEST(UploadSpoolTest, WhatMayPassLaterIsKept) {
     ASSERT_TRUE(peer.Take(spool));
     EXPECT_EQ(peer.came(), UpTo(3));
   }
+}
+
+TEST(UploadSpoolTest, ADaemonThatWantsToBeLeftAloneIs) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  ASSERT_TRUE(PutOne(spool, 0).ok());
+  int requests = 0;
+  {
+    TestPeer full([&requests](PeerSocket& socket) {
+      AnswerHello(socket, {});
+      while (const auto request = socket.ReadRequest()) {
+        ++requests;
+        wire::Envelope reply;
+        *reply.mutable_error() = ErrorToWire({StatusCode::kResourceExhausted, "a full disk"});
+        reply.mutable_error()->set_retry_after_ms(60'000);
+        socket.Reply(request->request_id(), std::move(reply));
+      }
+    });
+    auto client = AtlasClient::Connect(full.options());
+    ASSERT_TRUE(client) << client.error().message();
+    EXPECT_EQ(spool.Send(*client).error().code(), StatusCode::kResourceExhausted);
+    const auto again = spool.Send(*client);
+    ASSERT_TRUE(again) << again.error().message();
+    EXPECT_GT(again->retry_after, std::chrono::milliseconds(0));
+    EXPECT_EQ(again->acknowledged, 0U);
+  }
+  EXPECT_EQ(requests, 1);
+  EXPECT_EQ(spool.waiting(), 1U);
 }
 
 TEST(UploadSpoolTest, WhatAKilledProgramLeavesIsPutInOrder) {
@@ -215,6 +285,85 @@ TEST(UploadSpoolTest, WhatAKilledProgramLeavesIsPutInOrder) {
   EXPECT_EQ(report->set_aside, 4U);
   EXPECT_EQ(spool.waiting(), 0U);
   EXPECT_TRUE(fs::exists(folder.path() / "notes"));
+}
+
+TEST(UploadSpoolTest, AFileThatVanishedIsToldAndTheOthersAreSent) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  fs::remove(FilesOf(folder.path()).at(1));
+  UploadPeer peer;
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{0, 2, 3}));
+  EXPECT_EQ(report->vanished, 1U);
+  EXPECT_EQ(report->problem.code(), StatusCode::kNotFound);
+  EXPECT_EQ(spool.waiting(), 0U);
+  EXPECT_EQ(spool.waiting_bytes(), 0U);
+  EXPECT_TRUE(FilesOf(spool.refused_folder()).empty());
+}
+
+TEST(UploadSpoolTest, AFileThatIsTooLargeIsSetAsideAndTheOthersAreSent) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  fs::resize_file(FilesOf(folder.path()).at(0), std::uintmax_t{17} << 20);
+  UploadPeer peer;
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{1, 2}));
+  EXPECT_EQ(report->set_aside, 1U);
+  EXPECT_EQ(spool.waiting(), 0U);
+  EXPECT_EQ(FilesOf(spool.refused_folder()).size(), 2U);
+}
+
+// Each file is tried again by the next Send.
+TEST(UploadSpoolTest, AFileThatCannotBeReadWaitsAndTheOthersAreSent) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  const fs::path path = FilesOf(folder.path()).at(0);
+  const fs::path elsewhere = folder.path() / "elsewhere";
+  fs::rename(path, elsewhere);
+  fs::create_directory(path);  // opens, and every read fails, as on a bad sector
+  UploadPeer peer;
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{1, 2}));
+  EXPECT_EQ(report->skipped, 1U);
+  EXPECT_FALSE(report->problem.ok());
+  EXPECT_EQ(spool.waiting(), 1U);
+  fs::remove(path);
+  fs::rename(elsewhere, path);
+  UploadPeer later;
+  ASSERT_TRUE(later.Take(spool));
+  EXPECT_EQ(later.came(), UpTo(1));
+  EXPECT_EQ(spool.waiting(), 0U);
+}
+
+TEST(UploadSpoolTest, WhatCannotBeSetAsideWaitsAndTheOthersAreSent) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  fs::resize_file(FilesOf(folder.path()).at(0), 20);
+  fs::remove(spool.refused_folder());
+  std::ofstream(spool.refused_folder()) << "in the way";
+  UploadPeer peer({{2, {StatusCode::kInvalidData, "of another profile"}}});
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{1, 3}));
+  EXPECT_EQ(report->set_aside, 0U);
+  EXPECT_EQ(report->skipped, 2U);
+  EXPECT_FALSE(report->problem.ok());
+  EXPECT_EQ(spool.waiting(), 2U);
 }
 
 // A file at every length that a write can stop at.

@@ -225,12 +225,10 @@ TEST_F(LocalGridTest, AHitStaysAHitWhereOtherRaysPass) {
   EXPECT_EQ(At(grid, 5.05, -0.05).occupancy, Occupancy::kFree);
 }
 
-TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
-  // Any scan: a cell is driven below the vehicle, else an obstacle if a ray ends in it at one or
-  // something is seen to stand in it behind, else free if a ray passed it, else unknown.
-  std::mt19937 random(81);
-  std::uniform_real_distribution<float> coordinate(-21.0F, 21.0F);
-  for (int round = 0; round < 5; ++round) {
+class AnyScanTest : public LocalGridTest {
+ protected:
+  static LeveledScan RandomScan(std::mt19937& random) {
+    std::uniform_real_distribution<float> coordinate(-21.0F, 21.0F);
     LeveledScan scan;
     for (int i = 0; i < 3000; ++i) {
       const bool is_ground = random() % 3 != 0;
@@ -240,28 +238,50 @@ TEST_F(LocalGridTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
                 is_ground);
     }
     scan.column_spacing_rad = 0.005F;
+    return scan;
+  }
+
+  // Up to where the ray ends its cells are free; where it ends at an obstacle is a hit.
+  void Follow(int ray,
+              const RayProfile& profile,
+              std::vector<Occupancy>& cells,
+              std::set<std::uint32_t>& hits) const {
+    for (int step = 0; step < rays_.steps(); ++step) {
+      const float begin_m = static_cast<float>(step) * rays_.step_m();
+      const float end_m = begin_m + rays_.step_m();
+      const std::uint32_t cell = rays_.Cells(ray)[step];
+      if (profile.end.is_obstacle && profile.end.range_m >= begin_m &&
+          profile.end.range_m < end_m) {
+        hits.insert(cell);
+      } else if (end_m <= profile.end.range_m) {
+        cells[cell] = Occupancy::kFree;
+      }
+    }
+  }
+
+  // Whether the return is of something that stands, behind the end of its ray.
+  bool StandsBehind(const LeveledScan& scan, std::size_t i, const RayProfile& profile) const {
+    const float height_m = scan.z[i] - profile.GroundAt(scan.range_m[i]);
+    return scan.range_m[i] < rays_.radius_m() && scan.range_m[i] >= profile.end.range_m &&
+           height_m > 0.25F && height_m <= 2.5F;
+  }
+};
+
+TEST_F(AnyScanTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
+  // A cell is driven below the vehicle, else an obstacle if a ray ends in it at one or something is
+  // seen to stand in it behind, else free if a ray passed it, else unknown.
+  std::mt19937 random(81);
+  for (int round = 0; round < 5; ++round) {
+    const LeveledScan scan = RandomScan(random);
     const LocalGrid grid = Build(scan);
     const GroundProfiles profiles(scan, rays_, contact_, options_);
     std::vector<Occupancy> expected(grid.cells.size(), Occupancy::kUnknown);
     std::set<std::uint32_t> hits;
     for (int ray = 0; ray < rays_.rays(); ++ray) {
-      const RayProfile profile = profiles.Ray(ray);
-      for (int step = 0; step < rays_.steps(); ++step) {
-        const float begin_m = static_cast<float>(step) * rays_.step_m();
-        const float end_m = begin_m + rays_.step_m();
-        if (profile.end.is_obstacle && profile.end.range_m >= begin_m &&
-            profile.end.range_m < end_m) {
-          hits.insert(rays_.Cells(ray)[step]);
-        } else if (end_m <= profile.end.range_m) {
-          expected[rays_.Cells(ray)[step]] = Occupancy::kFree;
-        }
-      }
+      Follow(ray, profiles.Ray(ray), expected, hits);
     }
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const RayProfile profile = profiles.Ray(rays_.Ray(scan.azimuth_rad[i]));
-      const float height_m = scan.z[i] - profile.GroundAt(scan.range_m[i]);
-      if (scan.range_m[i] < rays_.radius_m() && scan.range_m[i] >= profile.end.range_m &&
-          height_m > 0.25F && height_m <= 2.5F) {
+      if (StandsBehind(scan, i, profiles.Ray(rays_.Ray(scan.azimuth_rad[i])))) {
         hits.insert(static_cast<std::uint32_t>(Index(scan.x[i], scan.y[i])));
       }
     }

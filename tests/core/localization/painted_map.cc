@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/base/integer_math.h"
 #include "core/geometry/nibble.h"
@@ -51,6 +52,30 @@ std::uint64_t ColumnAt(const ShapeWorld& world,
   return column & span.mask;
 }
 
+// What a ground at (x, y) shows of the boxes between it and the next one above, if there is one.
+bool HasWall(
+    const ShapeWorld& world, double x, double y, double ground_m, std::optional<double> above_m) {
+  return std::any_of(world.boxes.begin(), world.boxes.end(), [&](const Box& box) {
+    return HasFaceAt(box, x, y) && box.high.z() > ground_m + 0.05 &&
+           (!above_m || box.low.z() < *above_m - 0.05);
+  });
+}
+bool IsHidden(const ShapeWorld& world, double x, double y, double ground_m) {
+  return std::any_of(world.boxes.begin(), world.boxes.end(),
+                     [&](const Box& box) { return IsInside(box, x, y, ground_m + 0.5); });
+}
+
+std::vector<double> GroundsAt(const ShapeWorld& world, double x, double y) {
+  std::vector<double> grounds_m;
+  for (const Patch& patch : world.patches) {
+    if (patch.surface == Surface::kGround && patch.Covers(x, y)) {
+      grounds_m.push_back(patch.HeightAt(x, y));
+    }
+  }
+  std::sort(grounds_m.begin(), grounds_m.end());
+  return grounds_m;
+}
+
 PaintedMap Painted(const ShapeWorld& world, double half_m) {
   PaintedMap map;
   map.Paint(world, half_m);
@@ -67,37 +92,28 @@ void PaintedMap::Paint(const ShapeWorld& world, double half_m) {
   const auto half = static_cast<std::int64_t>(std::lround(half_m / kCell_m));
   for (std::int64_t cy = -half; cy < half; ++cy) {
     for (std::int64_t cx = -half; cx < half; ++cx) {
-      const double x = (static_cast<double>(cx) + 0.5) * kCell_m;
-      const double y = (static_cast<double>(cy) + 0.5) * kCell_m;
-      std::vector<double> grounds;
-      for (const Patch& patch : world.patches) {
-        if (patch.surface == Surface::kGround && patch.Covers(x, y)) {
-          grounds.push_back(patch.HeightAt(x, y));
-        }
-      }
-      std::sort(grounds.begin(), grounds.end());
-      for (std::size_t i = 0; i < grounds.size(); ++i) {
-        TileLayer layer = GroundLayer(grounds[i]);
-        const std::int32_t next_mm =
-            i + 1 < grounds.size() ? static_cast<std::int32_t>(1000.0 * grounds[i + 1]) : 0;
-        const ColumnSpan span =
-            ColumnSpanOf(layer.altitude_mm, i + 1 < grounds.size() ? &next_mm : nullptr, profile_);
-        layer.column = ColumnAt(world, x, y, span, profile_);
-        const bool is_wall =
-            std::any_of(world.boxes.begin(), world.boxes.end(), [&](const Box& box) {
-              return HasFaceAt(box, x, y) && box.high.z() > grounds[i] + 0.05 &&
-                     (i + 1 == grounds.size() || box.low.z() < grounds[i + 1] - 0.05);
-            });
-        const bool is_hidden =
-            std::any_of(world.boxes.begin(), world.boxes.end(),
-                        [&](const Box& box) { return IsInside(box, x, y, grounds[i] + 0.5); });
-        if (is_wall) {
-          layer.flags = TileLayer::kMeasured;
-        }
-        if (is_wall || !is_hidden) {
-          Put(cx, cy, layer);
-        }
-      }
+      PaintCell(world, cx, cy);
+    }
+  }
+}
+
+void PaintedMap::PaintCell(const ShapeWorld& world, std::int64_t cell_x, std::int64_t cell_y) {
+  const double x = (static_cast<double>(cell_x) + 0.5) * kCell_m;
+  const double y = (static_cast<double>(cell_y) + 0.5) * kCell_m;
+  const std::vector<double> grounds_m = GroundsAt(world, x, y);
+  for (std::size_t i = 0; i < grounds_m.size(); ++i) {
+    const auto above_m = i + 1 < grounds_m.size() ? std::optional(grounds_m[i + 1]) : std::nullopt;
+    const auto above_mm = static_cast<std::int32_t>(1000.0 * above_m.value_or(0.0));
+    TileLayer layer = GroundLayer(grounds_m[i]);
+    const ColumnSpan span =
+        ColumnSpanOf(layer.altitude_mm, above_m ? &above_mm : nullptr, profile_);
+    layer.column = ColumnAt(world, x, y, span, profile_);
+    const bool is_wall = HasWall(world, x, y, grounds_m[i], above_m);
+    if (is_wall) {
+      layer.flags = TileLayer::kMeasured;
+    }
+    if (is_wall || !IsHidden(world, x, y, grounds_m[i])) {
+      Put(cell_x, cell_y, layer);
     }
   }
 }

@@ -29,6 +29,8 @@ class PaintedMap {
   MapWindow Window(const Eigen::Vector3d& center, double radius_m) const;
 
  private:
+  void PaintCell(const ShapeWorld& world, std::int64_t cell_x, std::int64_t cell_y);
+
   MapProfile profile_;
   std::map<TileId, std::vector<std::vector<TileLayer>>> cells_;
 };

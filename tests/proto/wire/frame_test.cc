@@ -1,6 +1,7 @@
 // The framing state machine: golden bytes, pieces of any size, and bytes that are no frames.
 #include "proto/wire/frame.h"
 
+#include <algorithm>
 #include <random>
 #include <string>
 #include <string_view>
@@ -39,6 +40,60 @@ TEST(FrameTest, GoldenHelloFrame) {
 TEST(FrameTest, GoldenEmptyPayload) {
   // XXH64 of nothing, seed 0, is ef46db3751d8e999.
   EXPECT_EQ(Hex(EncodeFrameHeader({})), "524146310000000099e9d851");
+}
+
+TEST(FrameTest, ALargeOneIsTakenByItself) {
+  const Bytes small(10, 1);
+  const Bytes large(1'000, 2);
+  Bytes stream;
+  for (const Bytes& payload : {small, large, large, small}) {
+    const Bytes frame = Frame(payload);
+    stream.insert(stream.end(), frame.begin(), frame.end());
+  }
+  for (const std::size_t piece : {1u, 500u, 1'035u, 5'000u}) {
+    FrameDecoder decoder;
+    std::vector<Bytes> payloads;
+    for (std::size_t at = 0; at < stream.size(); at += piece) {
+      decoder.Push(ByteSpan(stream).subspan(at, std::min(piece, stream.size() - at)));
+      while (true) {
+        if (const auto frame = decoder.TakeLarge(10)) {
+          EXPECT_EQ(frame->size(), large.size() + kFrameHeaderBytes);
+          const ByteSpan payload = frame->Payload().value();
+          payloads.emplace_back(payload.begin(), payload.end());
+          continue;
+        }
+        const auto next = decoder.Next();
+        ASSERT_TRUE(next.has_value()) << next.error().message();
+        if (!*next) {
+          break;
+        }
+        payloads.emplace_back((*next)->begin(), (*next)->end());
+      }
+    }
+    EXPECT_EQ(payloads, (std::vector<Bytes>{small, large, large, small})) << piece;
+    EXPECT_EQ(decoder.pending_bytes(), 0u);
+  }
+}
+
+TEST(FrameTest, ALargeOneIsNotCheckedBeforeItIsLookedInto) {
+  Bytes frame = Frame(Bytes(1'000, 2));
+  frame.back() ^= 1;
+  FrameDecoder decoder;
+  decoder.Push(frame);
+  const auto large = decoder.TakeLarge(999);
+  ASSERT_TRUE(large.has_value());
+  EXPECT_EQ(large->Payload().error().code(), StatusCode::kInvalidData);
+}
+
+TEST(FrameTest, WhatIsNoFrameIsNotTaken) {
+  Bytes frame = Frame(Bytes(1'000, 2));
+  for (const bool is_spoiled : {false, true}) {
+    FrameDecoder decoder(is_spoiled ? 2'000 : 999);
+    frame[0] = is_spoiled ? 'X' : 'R';
+    decoder.Push(frame);
+    EXPECT_FALSE(decoder.TakeLarge(10).has_value());
+    EXPECT_FALSE(decoder.Next().has_value()) << "of another protocol, or too large";
+  }
 }
 
 TEST(FrameTest, DecodesByteByByte) {

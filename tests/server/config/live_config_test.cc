@@ -66,6 +66,17 @@ TEST_F(LiveConfigTest, WhatIsSaidInOtherWordsIsNoChange) {
   EXPECT_THAT(committed_, ElementsAre("info"));  // files that settings name may have changed
 }
 
+TEST_F(LiveConfigTest, SettingsThatNeedEachOtherChangeTogether) {
+  LiveConfig config = Start({"--tls-certificate", "a.pem", "--tls-key", "a.key"});
+  arguments_ = {"--tls-certificate", "b.pem", "--tls-key", "b.key", "--tls-client-ca", "ca.pem"};
+  const auto outcome = config.Reload();
+  ASSERT_TRUE(outcome.has_value()) << outcome.error().message();
+  EXPECT_THAT(outcome->changed, ElementsAre("tls.certificate", "tls.client_ca", "tls.key"));
+  EXPECT_EQ(config.config().tls_certificate, "b.pem");
+  EXPECT_EQ(config.config().tls_key, "b.key");
+  EXPECT_EQ(config.config().tls_client_ca, "ca.pem");
+}
+
 TEST_F(LiveConfigTest, ASettingThatIsGoneHasItsDefaultAgain) {
   LiveConfig config = Start({"--log-level", "error", "--log-format", "json"});
   arguments_ = {};

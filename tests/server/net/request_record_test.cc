@@ -43,7 +43,7 @@ class RequestRecordTest : public testing::Test {
 
   NetCounters counters_;
   LineBudget lines_{2};
-  PeerRecord peer_{"1.2.3.4:5", "", counters_, lines_, std::chrono::hours(1)};
+  PeerRecord peer_{"1.2.3.4:5", "", "", counters_, lines_, std::chrono::hours(1)};
 
  private:
   std::ostringstream log_;
@@ -61,13 +61,15 @@ TEST_F(RequestRecordTest, WhatGoesWellIsCountedAndNotInTheLog) {
 
 TEST_F(RequestRecordTest, AFailureIsInTheLogWithItsIds) {
   peer_.client = "demo\"\n";
+  peer_.name = "car.7";
   RequestRecord(peer_, StatusOf(77)).End(Status(StatusCode::kNotFound, "it is \"gone\""));
   EXPECT_EQ(Counted(RequestKind::kStatus, StatusCode::kNotFound), 1u);
   EXPECT_THAT(log(), HasSubstr(R"("level":"info")"));
   EXPECT_THAT(log(),
               HasSubstr(R"("message":"request 77 (status) failed: not_found: it is \"gone\"")"));
-  EXPECT_THAT(log(), HasSubstr(R"("peer":"1.2.3.4:5","client":"demo\"\u000a","request_id":77,)"
-                               R"("kind":"status","code":"not_found","duration_ms":0)"));
+  EXPECT_THAT(log(),
+              HasSubstr(R"("peer":"1.2.3.4:5","client":"demo\"\u000a","name":"car.7",)"
+                        R"("request_id":77,"kind":"status","code":"not_found","duration_ms":0)"));
   EXPECT_THAT(log(), EndsWith("}\n"));
 }
 

@@ -1,6 +1,7 @@
 #include "server/net/requests/sync_reply.h"
 
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "core/tile/tile_delta.h"
@@ -24,7 +25,7 @@ class SyncReplyTest : public ServiceTest {
     auto& disc = *envelope.mutable_sync_request()->mutable_area()->mutable_disc();
     disc.set_radius_um(100'000'000);
     envelope.mutable_sync_request()->set_budget_bytes(budget_bytes);
-    return {*service_, frames_, envelope};
+    return {*service_, frames_, std::make_shared<wire::Envelope>(envelope)};
   }
   static Bytes BytesOf(const std::vector<ReplyFrame>& frames) {
     ByteWriter out;
@@ -73,6 +74,29 @@ TEST_F(SyncReplyTest, FromMemoryIsTheSameBytes) {
   EXPECT_EQ(Run(second, false), bytes);
 }
 
+// All of it is in memory, but each tile is compared with each leg.
+TEST_F(SyncReplyTest, ALongWayIsNotPlannedWithoutThePool) {
+  SyncReply disc = ReplyTo();
+  Run(disc, true);
+  wire::Envelope envelope;
+  envelope.set_request_id(9);
+  auto& corridor = *envelope.mutable_sync_request()->mutable_area()->mutable_corridor();
+  for (int i = 0; i < 256; ++i) {
+    auto& point = *corridor.add_route();
+    point.set_x_um(i % 2 * 25'000'000);
+    point.set_y_um(i * 100'000);
+  }
+  SyncReply reply(*service_, frames_, std::make_shared<wire::Envelope>(envelope));
+  std::vector<ReplyFrame> frames;
+  for (int i = 0; i < 2; ++i) {
+    const auto step = reply.Next(false, frames);
+    ASSERT_TRUE(step.has_value());
+    EXPECT_EQ(*step, SyncReply::Step::kBlocked);
+    EXPECT_TRUE(frames.empty());
+  }
+  EXPECT_FALSE(Run(reply, true).empty());
+}
+
 TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
   SyncReply whole = ReplyTo();
   const Bytes expected = Run(whole, true);
@@ -81,7 +105,7 @@ TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
   wire::Envelope envelope;
   envelope.set_request_id(9);
   envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(100'000'000);
-  SyncReply reply(*service_, few, envelope);
+  SyncReply reply(*service_, few, std::make_shared<wire::Envelope>(envelope));
   std::uint64_t tiles = 0;
   std::uint64_t ends = 0;
   std::vector<ReplyFrame> frames;
@@ -115,7 +139,7 @@ class SyncDeltaTest : public SyncReplyTest {
       group.add_keys(key);
       group.add_payload_hashes(tile->id().payload_hash);
     }
-    SyncReply reply(*service_, frames, envelope);
+    SyncReply reply(*service_, frames, std::make_shared<wire::Envelope>(envelope));
     std::vector<ReplyFrame> out;
     Result<SyncReply::Step> step = SyncReply::Step::kMore;
     while (step && *step == SyncReply::Step::kMore) {

@@ -219,6 +219,34 @@ TEST_F(TlsTest, ACertificateThatIsTakenBackClosesItsConnectionsAndOpensNothing) 
   EXPECT_TRUE(other.Greet().has_hello_reply());
 }
 
+TEST_F(TlsTest, WhoeverIsTakenBackBeforeItsGreetingStaysOutside) {
+  ServeTls();
+  const CertificateFiles stolen = ca_->Issue("car.7");
+  BlockingPeer thief(port_, {ca_->certificate(), stolen});
+  BlockingPeer car(port_, As("car.8"));
+  ASSERT_TRUE(thief.is_encrypted());
+  ca_->Revoke(stolen);
+  server_->ChangeSecurity(SecurityOf("renewed", security_.access));
+  EXPECT_EQ(CodeOf(thief.Greet()), StatusCode::kPermissionDenied);
+  EXPECT_TRUE(thief.IsClosed());
+  EXPECT_TRUE(car.Greet().has_hello_reply());
+}
+
+TEST_F(TlsTest, WhoeverExpiresIsClosed) {
+  net_.identity_check = std::chrono::milliseconds(50);
+  ServeTls();
+  std::string dated = std::string("alice admin") + kTokenLine;
+  dated.replace(dated.find("never"), 5, "2099-12-31");
+  server_->ChangeSecurity({security_.tls, AccessOf(dated)});
+  BlockingPeer alice(port_, Anonymous());
+  ASSERT_TRUE(alice.Greet(kProtocolMajor, "", "open sesame").has_hello_reply());
+  BlockingPeer car(port_, As("car.7"));
+  ASSERT_TRUE(car.Greet().has_hello_reply());
+  now_ms_ = std::int64_t{4'102'444'800'000};  // the next day begins
+  EXPECT_TRUE(alice.IsClosed());
+  EXPECT_EQ(Ask(car, StatusOf(1)), StatusCode::kOk);
+}
+
 TEST_F(TlsTest, AnAuthorityThatIsTakenBackTakesItsVehiclesWithIt) {
   ServeTls();
   BlockingPeer car(port_, As("car.7"));
@@ -304,6 +332,21 @@ TEST_F(TlsTest, WhoeverAsksTooOftenWaitsAndTheOthersDoNot) {
   // 40 at once are 20 too many: a second in which nothing more is read.
   EXPECT_EQ(Ask(eager, StatusOf(99)), StatusCode::kOk);
   EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(900));
+}
+
+TEST_F(TlsTest, WhoeverComesAgainGoesOnFromWhereItWas) {
+  net_.of_name.requests_per_s = 20;
+  ServeTls();
+  const auto begin = std::chrono::steady_clock::now();
+  for (int visit = 0; visit < 6; ++visit) {
+    BlockingPeer eager(port_, As("car.7"));
+    eager.Greet();
+    for (std::uint64_t id = 1; id <= 10; ++id) {
+      ASSERT_EQ(Ask(eager, StatusOf(id)), StatusCode::kOk);
+    }
+  }
+  // 66 with the greetings: 46 more than a second's.
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(1'500));
 }
 
 TEST_F(TlsTest, FilesThatAreOfNoUseAreNamed) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -87,7 +88,7 @@ class ServiceTest : public ::testing::Test {
     service.past_cache_bytes = 1u << 20;
     service.scratch_directory = directory_;
     service_ = std::make_unique<AtlasService>(
-        *store_, [] { return kTestNow_ms; }, [](LogLevel, const std::string&) {}, service);
+        *store_, [this] { return now_ms_.load(); }, [](LogLevel, const std::string&) {}, service);
   }
   void Close() {
     service_.reset();
@@ -131,6 +132,7 @@ class ServiceTest : public ::testing::Test {
   SurveyCacheLimits surveys_{100'000, 100'000};
   SurveyFilesOptions survey_files_;  // none
   std::filesystem::path directory_;
+  std::atomic<std::int64_t> now_ms_{kTestNow_ms};
   std::unique_ptr<AtlasStore> store_;
   std::unique_ptr<AtlasService> service_;
 };

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -31,6 +32,12 @@ class SurveyFilesTest : public ::testing::Test {
   SurveyFilesOptions survey_files_;
 };
 
+void WaitUntilSorted(const SurveyFiles& files) {
+  while (!files.is_sorted()) {
+    std::this_thread::yield();
+  }
+}
+
 // Files of its own in a directory, without a service.
 class FilesAlone {
  public:
@@ -39,7 +46,9 @@ class FilesAlone {
             options,
             MapProfile(),
             [line] { return line; },
-            [this](LogLevel, const std::string& text) { lines_.push_back(text); }) {}
+            [this](LogLevel, const std::string& text) { lines_.push_back(text); }) {
+    WaitUntilSorted(files_);
+  }
 
   bool Write(const TileId& id, std::uint64_t revision) {
     return files_.Write({TileSurveys(id), revision});
@@ -75,8 +84,9 @@ TEST_F(SurveyFilesTest, AFileIsBelievedWhileTheAtlasGoesOnFromIt) {
     fs::remove_all(saved);
     fs::copy(survey_files_.directory, saved);
     FilesAlone files(survey_files_, line);
+    const bool stays = !FilesIn(survey_files_.directory).empty();
     const bool has = files.Has(kTile);
-    EXPECT_EQ(has, !FilesIn(survey_files_.directory).empty()) << "others are removed";
+    EXPECT_EQ(has, stays) << "others are removed";
     fs::remove_all(survey_files_.directory);
     fs::copy(saved, survey_files_.directory);
     return has;
@@ -191,6 +201,41 @@ TEST_F(SurveyFilesTest, AnAtlasThatCannotBeReadIsTold) {
   EXPECT_FALSE(files.files().is_on());
   ASSERT_EQ(files.lines().size(), 1u);
   EXPECT_NE(files.lines()[0].find("bent"), std::string::npos);
+}
+
+// The same line as it is when the atlas has changed.
+TEST_F(SurveyFilesTest, TheLineIsThatOfNow) {
+  AtlasLine line = kLine;
+  SurveyFiles files(
+      survey_files_, MapProfile(), [&] { return Result<AtlasLine>(line); },
+      [](LogLevel, const std::string& text) { ADD_FAILURE() << text; });
+  WaitUntilSorted(files);  // which asks for the line, too
+  ASSERT_TRUE(files.Write({TileSurveys(kTile), 9}));
+  EXPECT_TRUE(files.Read(kTile).has_value());
+  line = {{Start(1, 0), Start(2, 9)}, 10};
+  EXPECT_TRUE(files.Read(kTile).has_value()) << "the atlas went on from it";
+  ASSERT_TRUE(files.Write({TileSurveys(kTile), 10}));
+  EXPECT_EQ(files.Read(kTile)->revision, 10u);
+  line = {{Start(1, 0)}, 9};
+  EXPECT_FALSE(files.Read(kTile).has_value());
+}
+
+// Thousands of files may be removed at the start, and what is written meanwhile stays.
+TEST_F(SurveyFilesTest, WhatIsWrittenWhileOthersAreRemovedStays) {
+  constexpr int kOld = 2'000;
+  fs::create_directories(survey_files_.directory);
+  for (int i = 0; i < kOld; ++i) {
+    Overwrite(survey_files_.directory / (std::to_string(i) + ".survey"), "of a program before");
+  }
+  SurveyFiles files(
+      survey_files_, MapProfile(), [] { return Result<AtlasLine>(kLine); },
+      [](LogLevel, const std::string& text) { ADD_FAILURE() << text; });
+  std::int32_t written = 0;
+  for (; !files.is_sorted() || written < 10; ++written) {
+    ASSERT_TRUE(files.Write({TileSurveys({0, written, 0}), 7}));
+  }
+  EXPECT_EQ(FilesIn(survey_files_.directory).size(), static_cast<std::size_t>(written));
+  EXPECT_EQ(files.Read({0, 0, 0})->revision, 7u);
 }
 
 TEST_F(SurveyFilesTest, WhatIsOnDiskOfOthersStays) {

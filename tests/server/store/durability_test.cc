@@ -1,9 +1,11 @@
 // What the disk does to the store: reopening, locks, other schemas, damage, no room, no right.
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <fstream>
 #include <future>
+#include <thread>
 
 #include <sys/mount.h>
 #include <sys/wait.h>
@@ -294,6 +296,28 @@ TEST_F(DiskTest, WhatAFullDiskRefusedComesBeforeWhatIsBehindIt) {
     const auto put = send(sequence);
     EXPECT_TRUE(put.has_value()) << put.error().message();
   }
+}
+
+// The log has them: they were acknowledged, and stay.
+TEST_F(DiskTest, WhatFindsNoRoomInTheDatabaseIsTold) {
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=10m"), 0);
+  Open();
+  constexpr std::uintmax_t kLogThatIsCopied = 1'000 * (8'192 + 24);
+  std::uint32_t accepted = 0;
+  while (std::filesystem::file_size(Database().string() + "-wal") < kLogThatIsCopied) {
+    ASSERT_TRUE(Put(Big(accepted)).has_value());
+    ++accepted;
+  }
+  std::optional<WriteRefusal> refusal;
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!refusal && std::chrono::steady_clock::now() < patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    refusal = store_->ReadWriteFigures().last_refusal;
+  }
+  ASSERT_TRUE(refusal.has_value());
+  EXPECT_EQ(refusal->why.code(), StatusCode::kResourceExhausted) << refusal->why.message();
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, accepted);
 }
 
 TEST_F(DiskTest, AnAtlasOnAFullDiskIsOpened) {

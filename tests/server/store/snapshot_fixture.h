@@ -25,8 +25,9 @@ struct FolderState {
   static FolderState Of(const fs::path& folder) {
     FolderState state;
     for (const auto& entry : fs::directory_iterator(folder)) {
-      if (entry.path().string().ends_with("-shm"))
+      if (entry.path().string().ends_with("-shm")) {
         continue;  // SQLite's index of a log, its to keep
+      }
       std::ifstream in(entry.path(), std::ios::binary);
       state.files[entry.path().filename()] = {std::string(std::istreambuf_iterator<char>(in), {}),
                                               entry.last_write_time()};

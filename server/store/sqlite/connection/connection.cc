@@ -114,6 +114,29 @@ bool Connection::is_in_transaction() const {
   return sqlite3_get_autocommit(database_.getHandle()) == 0;
 }
 
+void Connection::LeaveLogTo(std::function<void(int)> on_commit) {
+  on_commit_ = std::move(on_commit);
+  const auto hook = [](void* self, sqlite3*, const char*, int pages) {
+    static_cast<Connection*>(self)->on_commit_(pages);
+    return SQLITE_OK;
+  };
+  sqlite3_wal_hook(database_.getHandle(), hook, this);
+}
+
+std::optional<int> Connection::CopyLog() {
+  int copied = 0;
+  sqlite3* handle = database_.getHandle();
+  const int code =
+      sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, &copied);
+  if (code == SQLITE_BUSY) {
+    return std::nullopt;
+  }
+  if (code != SQLITE_OK) {
+    throw SQLite::Exception(handle, code);
+  }
+  return copied;
+}
+
 Snapshot::~Snapshot() {
   try {
     if (connection_.is_in_transaction()) {

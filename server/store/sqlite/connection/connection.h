@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -88,8 +89,16 @@ class Connection {
   // False after SQLite rolled the transaction back by itself (full disk, I/O error).
   bool is_in_transaction() const;
 
+  // From now on this connection does not copy the log into the database by itself; `on_commit` is
+  // told after each commit how many pages the log has. It must not throw.
+  void LeaveLogTo(std::function<void(int)> on_commit);
+  // Copies as much of the log as readers let it, beside them and a writer. How many of its pages
+  // are in the database now; none: another connection is at it.
+  std::optional<int> CopyLog();
+
  private:
   std::array<std::uint8_t, 16> id_{};
+  std::function<void(int)> on_commit_;
   SQLite::Database database_;
   std::unordered_map<const char*, std::unique_ptr<SQLite::Statement>> statements_;
 };

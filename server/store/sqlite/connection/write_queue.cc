@@ -168,7 +168,7 @@ Status WriteQueue::RollBack(Status failure) {
 Status WriteQueue::RunOne(Operation& operation) {
   Status status;
   try {
-    connection_->Execute("SAVEPOINT operation");
+    connection_->Prepare("SAVEPOINT operation").Run();
     status = operation.run(*connection_);
   } catch (const std::exception& error) {
     status = StatusFromException(error);
@@ -178,7 +178,7 @@ Status WriteQueue::RunOne(Operation& operation) {
     connection_->Execute("ROLLBACK TO operation");
   }
   if (connection_->is_in_transaction()) {
-    connection_->Execute("RELEASE operation");
+    connection_->Prepare("RELEASE operation").Run();
   }
   return status;
 }

@@ -10,6 +10,17 @@ namespace {
 
 constexpr std::size_t kMaxRanges = 64;
 
+// A statement a row is a fifth slower than one for eight.
+constexpr std::size_t kRowsAtOnce = 8;
+constexpr const char* kAddOne =
+    "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
+    "VALUES (?,?,?,1) "
+    "ON CONFLICT DO UPDATE SET revision = excluded.revision, is_current = 1";
+constexpr const char* kAddEight =
+    "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
+    "VALUES (?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1) "
+    "ON CONFLICT DO UPDATE SET revision = excluded.revision, is_current = 1";
+
 // Keys that no tile has are left out: nothing is fused for them.
 std::vector<TileId> ReadKeys(Query& row) {
   std::vector<TileId> tiles;
@@ -38,6 +49,18 @@ Result<std::optional<TileId>> NextTile(Connection& connection, std::int64_t afte
   return *id;
 }
 
+void AddRows(Connection& connection,
+             const char* sql,
+             std::span<const TileId> tiles,
+             std::int64_t keyframe_id,
+             std::uint64_t revision) {
+  Query insert = connection.Prepare(sql);
+  for (const TileId& tile : tiles) {
+    insert.Bind(tile.Key()).Bind(keyframe_id).Bind(revision);
+  }
+  insert.Run();
+}
+
 }  // namespace
 
 std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id) {
@@ -59,16 +82,12 @@ void WriteFootprint(Connection& connection,
       .Bind(revision)
       .Bind(keyframe_id)
       .Run();
-  for (const TileId& tile : footprint) {
-    connection
-        .Prepare(
-            "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
-            "VALUES (?,?,?,1) ON CONFLICT DO UPDATE SET revision = excluded.revision, "
-            "is_current = 1")
-        .Bind(tile.Key())
-        .Bind(keyframe_id)
-        .Bind(revision)
-        .Run();
+  while (footprint.size() >= kRowsAtOnce) {
+    AddRows(connection, kAddEight, footprint.first(kRowsAtOnce), keyframe_id, revision);
+    footprint = footprint.subspan(kRowsAtOnce);
+  }
+  for (; !footprint.empty(); footprint = footprint.subspan(1)) {
+    AddRows(connection, kAddOne, footprint.first(1), keyframe_id, revision);
   }
 }
 

@@ -58,6 +58,32 @@ TEST(SyncAreaTest, ABoxAndTilesTouchWhatTheyHold) {
   EXPECT_TRUE(tiles.Touches({2, 0, 0}));
 }
 
+TEST(SyncAreaTest, TilesTakeAKeyEach) {
+  std::vector<std::uint64_t> keys;
+  for (std::int32_t x = 0; x < 1'000; ++x) {
+    keys.push_back(TileId{0, 0, x}.Key());
+  }
+  const SyncArea tiles = SyncArea::OfTiles(keys, MapProfile()).value();
+  EXPECT_EQ(*tiles.tile_keys(), keys);
+  EXPECT_GE(tiles.bytes(), keys.size() * sizeof(std::uint64_t));
+  EXPECT_LT(tiles.bytes(), keys.size() * sizeof(std::uint64_t) + 512);
+  EXPECT_GE(Make(CorridorArea{std::vector<Vector2d>(256, Vector2d(1, 1)), 5.0}).bytes(), 256u * 56);
+  EXPECT_LT(Make(DiscArea{{0, 0}, 5.0}).bytes(), 512u);
+}
+
+TEST(SyncAreaTest, KeysThatNoTilesHaveAreRefused) {
+  const std::uint64_t key = TileId{0, 0, 0}.Key();
+  const auto code = [](std::vector<std::uint64_t> keys) {
+    const auto area = SyncArea::OfTiles(std::move(keys), MapProfile());
+    return area ? StatusCode::kOk : area.error().code();
+  };
+  EXPECT_EQ(code({key, key + 1}), StatusCode::kOk);
+  EXPECT_EQ(code({key + 1, key}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code({key, std::uint64_t{1} << 63}), StatusCode::kInvalidData);
+  EXPECT_EQ(code(std::vector<std::uint64_t>(SyncArea::kMaxTiles + 1, key)),
+            StatusCode::kInvalidArgument);
+}
+
 // Against points on the shape and in the tile, for random routes and tiles.
 TEST(SyncAreaTest, DistancesAreThoseOfTheirPoints) {
   std::mt19937 random(1);

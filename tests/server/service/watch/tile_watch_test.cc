@@ -98,5 +98,17 @@ TEST(TileWatchTest, AHubForgetsWatchesThatAreGone) {
   EXPECT_EQ(first->Take().tiles.at(0).revision, 2u);
 }
 
+TEST(TileWatchTest, AHubForgetsThemWhereNothingEverChanges) {
+  WatchHub hub;
+  const auto stays = hub.Open(Everywhere(), [] {});
+  for (int i = 0; i < 10'000; ++i) {
+    hub.Open(Everywhere(), [] {});
+  }
+  EXPECT_LE(hub.listed(), 64u);
+  hub.Publish({0, 0, 0}, 1);
+  EXPECT_EQ(hub.listed(), 1u);
+  EXPECT_FALSE(stays->Take().empty());
+}
+
 }  // namespace
 }  // namespace atlas

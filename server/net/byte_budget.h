@@ -1,5 +1,5 @@
-// What all connections together may hold of requests, so that many peers cannot fill the memory
-// that each of them alone may not. Thread-safe.
+// What may be held of something by many together, so that they cannot fill the memory that each of
+// them alone may not. Thread-safe.
 #pragma once
 
 #include <atomic>

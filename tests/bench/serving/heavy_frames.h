@@ -1,0 +1,18 @@
+// Requests that keep to every rule and cost as much as one can.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/bytes.h"
+
+namespace atlas::testing {
+
+// Corrections of as many poses as there may be in one, some 20 MB; the last one is impossible, so
+// that all are read and nothing changes.
+Bytes ManyPosesFrame(std::uint64_t request_id);
+// A sync of little, by somebody who holds as many tiles and blocks as there may be.
+Bytes ManyHeldFrame(std::uint64_t request_id);
+// A watch of as many tiles as there may be.
+Bytes ManyWatchedFrame(std::uint64_t request_id);
+
+}  // namespace atlas::testing
