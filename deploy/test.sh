@@ -31,13 +31,13 @@ report_property() {
     }' "build/$1/Testing/Temporary/LastTest.log"
 }
 
-# run PRESET CTEST_ARGUMENT...: configures, builds, tests.
+# run PRESET TARGET CTEST_ARGUMENT...: configures, builds, tests.
 run() {
-  local preset=$1
-  shift
+  local preset=$1 target=$2
+  shift 2
   echo "== $preset"
   cmake --preset "$preset" >/dev/null
-  cmake --build "build/$preset"
+  cmake --build "build/$preset" --target "$target"
   ctest --test-dir "build/$preset" --output-on-failure --no-tests=error --timeout 900 -j 2 "$@"
   report_property "$preset"
 }
@@ -46,11 +46,11 @@ scale=1
 ((long)) && scale=10
 unset ATLAS_PROPERTY_CASES  # how many there are is the script's to say
 export ATLAS_TEST_SCALE=$scale
-run dev
+run dev all
 if ((sanitize)); then
   export ATLAS_TEST_SCALE=0.1
-  run asan -L 'unit|integration' -LE data
-  run tsan -L threads
+  run asan all -L 'unit|integration' -LE data
+  run tsan threads_tests -L threads
 fi
 if ((long)); then
   deploy/compilers.sh

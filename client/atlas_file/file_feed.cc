@@ -74,7 +74,7 @@ class Filling {
       is_cut_ = true;
       return {};
     }
-    ATLAS_RETURN_IF_ERROR(store_.PutWhole(tile));
+    ATLAS_RETURN_IF_ERROR(store_.Put(tile));
     ++report_.tiles;
     report_.bytes = bytes;
     return {};

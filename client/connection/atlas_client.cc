@@ -13,10 +13,16 @@ namespace atlas {
 namespace {
 
 using Body = wire::Envelope;
+using Clock = RpcChannel::Clock;
 using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithPast = 2;
 constexpr std::uint32_t kMinorWithSync = 4;
+
+// Of a call that is given up after this; 0: never.
+Clock::time_point EndAfter(milliseconds give_up) {
+  return give_up.count() > 0 ? Clock::now() + give_up : Clock::time_point::max();
+}
 
 std::uint32_t TimeoutField(milliseconds timeout) {
   return static_cast<std::uint32_t>(
@@ -121,6 +127,19 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
 
 }  // namespace
 
+// A sync between its request and its end.
+struct SyncRest {
+  SyncRest(const SyncQuery& asked, std::weak_ptr<RpcChannel> where, std::uint64_t number)
+      : query(asked), channel(std::move(where)), id(number), exchange(query) {}
+  SyncRest(const SyncRest&) = delete;  // the exchange refers to the query
+  SyncRest& operator=(const SyncRest&) = delete;
+
+  const SyncQuery query;
+  const std::weak_ptr<RpcChannel> channel;
+  const std::uint64_t id;
+  SyncExchange exchange;
+};
+
 AtlasClient::AtlasClient(std::unique_ptr<RpcChannel> channel,
                          const MapProfile& profile,
                          AtlasIdentity atlas)
@@ -206,22 +225,44 @@ Result<SyncSummary> AtlasClient::Sync(const SyncQuery& query, const TileCallback
   if (Status status = CheckSync(); !status.ok()) return Error(std::move(status));
   Result<wire::Envelope> request = SyncRequestOf(query);
   if (!request) return Error(request.error());
-  const Result<std::uint64_t> id = channel_->Send(*request);
+  const Clock::time_point latest = EndAfter(query.give_up);
+  const Result<std::uint64_t> id = channel_->Send(*request, latest);
   if (!id) return Error(id.error());
-  SyncExchange exchange(query);
+  return Follow(std::make_shared<SyncRest>(query, channel_, *id), latest, on_tile);
+}
+
+Result<SyncSummary> AtlasClient::Continue(std::shared_ptr<SyncRest> rest,
+                                          milliseconds give_up,
+                                          const TileCallback& on_tile) {
+  if (rest == nullptr || rest->channel.lock() != channel_ || rest->id != channel_->last_id()) {
+    return Error(StatusCode::kNotFound, "sync: nothing of it is on its way here any more");
+  }
+  return Follow(std::move(rest), EndAfter(give_up), on_tile);
+}
+
+Result<SyncSummary> AtlasClient::Follow(std::shared_ptr<SyncRest> rest,
+                                        Clock::time_point latest,
+                                        const TileCallback& on_tile) {
+  SyncExchange& exchange = rest->exchange;
   while (true) {
-    const Result<wire::Envelope> reply = channel_->ReceiveAnyFor(*id, query.timeout);
+    const auto reply = channel_->PollFor(rest->id, rest->query.timeout, latest);
     if (!reply) return Error(reply.error());
+    if (!*reply) {
+      SyncSummary came = exchange.so_far();
+      came.rest = std::move(rest);
+      return came;
+    }
+    const wire::Envelope& frame = **reply;
     const std::uint64_t frame_bytes = channel_->last_frame_bytes();
-    if (reply->has_sync_end()) return exchange.OnEnd(reply->sync_end(), frame_bytes);
+    if (frame.has_sync_end()) return exchange.OnEnd(frame.sync_end(), frame_bytes);
     Status status;
-    if (reply->has_sync_manifest()) {
-      status = exchange.OnManifest(reply->sync_manifest(), frame_bytes);
-    } else if (reply->has_tile()) {
-      Result<TileBlob> tile = exchange.OnTile(reply->tile(), frame_bytes);
+    if (frame.has_sync_manifest()) {
+      status = exchange.OnManifest(frame.sync_manifest(), frame_bytes);
+    } else if (frame.has_tile()) {
+      Result<TileBlob> tile = exchange.OnTile(frame.tile(), frame_bytes);
       status = tile ? on_tile(*std::move(tile)) : tile.error();
     } else {
-      status = channel_->Unexpected(*reply);
+      status = channel_->Unexpected(frame);
     }
     if (!status.ok()) return Error(std::move(status));
   }

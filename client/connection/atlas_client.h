@@ -63,6 +63,12 @@ class AtlasClient {
   // callback ends it with its status. A daemon that pauses for longer than the query's timeout and
   // `request_timeout` together is kTimeout. kUnsupported when the daemon is too old for syncs.
   Result<SyncSummary> Sync(const SyncQuery& query, const TileCallback& on_tile);
+  // Goes on with a reply that was left on its way, for `give_up` at most (0: to its end), as Sync
+  // would have. Its summary is of the whole reply. kNotFound: another request was sent since, or it
+  // is of another connection; what still comes of it is thrown away.
+  Result<SyncSummary> Continue(std::shared_ptr<SyncRest> rest,
+                               std::chrono::milliseconds give_up,
+                               const TileCallback& on_tile);
   Result<AtlasStatus> ReadStatus();
   // Returns when no tile is dirty; kTimeout after `timeout`.
   Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
@@ -95,8 +101,11 @@ class AtlasClient {
 
   Status CheckPast(const std::optional<std::uint64_t>& at_revision) const;
   Status CheckSync() const;
+  Result<SyncSummary> Follow(std::shared_ptr<SyncRest> rest,
+                             std::chrono::steady_clock::time_point latest,
+                             const TileCallback& on_tile);
 
-  std::unique_ptr<RpcChannel> channel_;
+  std::shared_ptr<RpcChannel> channel_;  // a SyncRest knows it
   MapProfile profile_;
   AtlasIdentity atlas_;
 };

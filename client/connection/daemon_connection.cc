@@ -42,10 +42,16 @@ Status UseFiles(const ConnectionTls& tls, asio::ssl::context& context) {
 class DaemonConnection::Impl {
  public:
   explicit Impl(Endpoint endpoint) : endpoint_(std::move(endpoint)), socket_(io_) {}
+  ~Impl() { Close(); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  Impl(Impl&&) = delete;
+  Impl& operator=(Impl&&) = delete;
 
   Status Open(milliseconds timeout, const std::optional<ConnectionTls>& tls);
   Status Send(ByteSpan frame, milliseconds timeout);
   Result<Bytes> Receive(milliseconds timeout);
+  Result<std::optional<Bytes>> Poll(milliseconds timeout);
 
   const Endpoint& endpoint() const { return endpoint_; }
   std::uint64_t bytes_sent() const { return bytes_sent_; }
@@ -54,15 +60,20 @@ class DaemonConnection::Impl {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Runs what was started until `done` is set; kTimeout, with the socket closed, if that is too
-  // late.
+  // Runs what was started until `done` is set or the time is over.
+  void Run(const std::optional<error_code>& done, Clock::time_point deadline);
+  // The same; kTimeout, with the socket closed, if it was not done in time.
   Status Finish(const std::optional<error_code>& done,
                 Clock::time_point deadline,
                 const char* what);
-  Status ReadSome(Clock::time_point deadline);
+  void StartRead();
+  // False when nothing came: the read goes on.
+  Result<bool> ReadSome(Clock::time_point deadline);
   Status Encrypt(const ConnectionTls& tls, Clock::time_point deadline);
   Result<asio::ip::tcp::resolver::results_type> Resolve(Clock::time_point deadline);
   Status Fail(StatusCode code, const std::string& what);
+  // With all that was started: it refers to our buffers.
+  void Close();
 
   Endpoint endpoint_;
   asio::io_context io_;
@@ -70,30 +81,42 @@ class DaemonConnection::Impl {
   asio::ssl::context tls_context_{asio::ssl::context::tlsv13_client};
   std::optional<asio::ssl::stream<asio::ip::tcp::socket&>> tls_;
   FrameDecoder decoder_;
+  // One read at a time; it may outlive the call that started it.
   Bytes chunk_ = Bytes(kChunkBytes);
+  bool is_reading_ = false;
+  std::optional<error_code> read_;
+  std::size_t read_bytes_ = 0;
   std::uint64_t bytes_sent_ = 0;
   std::uint64_t bytes_received_ = 0;
   Status failure_;
 };
 
 Status DaemonConnection::Impl::Fail(StatusCode code, const std::string& what) {
-  error_code ignored;  // closing is all that is left to do
-  socket_.close(ignored);
+  Close();
   failure_ = Status(code, StrCat("daemon at ", endpoint_.ToText(), ": ", what));
   return failure_;
+}
+
+void DaemonConnection::Impl::Close() {
+  error_code ignored;  // closing is all that is left to do
+  socket_.close(ignored);
+  io_.restart();
+  io_.run();
+}
+
+void DaemonConnection::Impl::Run(const std::optional<error_code>& done,
+                                 Clock::time_point deadline) {
+  io_.restart();
+  io_.poll();  // what is there already, however late it is
+  while (!done && io_.run_one_until(deadline) > 0) {
+  }
 }
 
 Status DaemonConnection::Impl::Finish(const std::optional<error_code>& done,
                                       Clock::time_point deadline,
                                       const char* what) {
-  io_.restart();
-  io_.run_until(deadline);
-  if (!done) {
-    Status status = Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
-    io_.restart();
-    io_.run();  // the cancelled operation still refers to our buffers
-    return status;
-  }
+  Run(done, deadline);
+  if (!done) return Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
   if (*done) return Fail(StatusCode::kUnavailable, StrCat(what, ": ", done->message()));
   return {};
 }
@@ -160,33 +183,53 @@ Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
   return {};
 }
 
-Status DaemonConnection::Impl::ReadSome(Clock::time_point deadline) {
-  std::optional<error_code> done;
-  std::size_t size = 0;
-  const auto finish = [&](const error_code& error, std::size_t bytes) {
-    done = error;
-    size = bytes;
+void DaemonConnection::Impl::StartRead() {
+  is_reading_ = true;
+  read_.reset();
+  const auto finish = [this](const error_code& error, std::size_t bytes) {
+    read_ = error;
+    read_bytes_ = bytes;
   };
   if (tls_) {
     tls_->async_read_some(asio::buffer(chunk_), finish);
   } else {
     socket_.async_read_some(asio::buffer(chunk_), finish);
   }
-  ATLAS_RETURN_IF_ERROR(Finish(done, deadline, "waiting for a reply"));
-  bytes_received_ += size;
-  decoder_.Push(ByteSpan(chunk_).first(size));
-  return {};
 }
 
-Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
+Result<bool> DaemonConnection::Impl::ReadSome(Clock::time_point deadline) {
+  if (!is_reading_) StartRead();
+  Run(read_, deadline);
+  if (!read_) return false;
+  is_reading_ = false;
+  if (*read_) {
+    return Error(Fail(StatusCode::kUnavailable, StrCat("waiting for a reply: ", read_->message())));
+  }
+  bytes_received_ += read_bytes_;
+  decoder_.Push(ByteSpan(chunk_).first(read_bytes_));
+  return true;
+}
+
+Result<std::optional<Bytes>> DaemonConnection::Impl::Poll(milliseconds timeout) {
   if (!failure_.ok()) return Error(failure_);
   const Clock::time_point deadline = Clock::now() + timeout;
   while (true) {
     const Result<std::optional<ByteSpan>> payload = decoder_.Next();
     if (!payload) return Error(Fail(payload.error().code(), payload.error().message()));
     if (*payload) return Bytes((*payload)->begin(), (*payload)->end());
-    if (Status status = ReadSome(deadline); !status.ok()) return Error(std::move(status));
+    const Result<bool> came = ReadSome(deadline);
+    if (!came) return Error(came.error());
+    if (!*came) return std::nullopt;
   }
+}
+
+Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
+  Result<std::optional<Bytes>> payload = Poll(timeout);
+  if (!payload) return Error(payload.error());
+  if (!*payload) {
+    return Error(Fail(StatusCode::kTimeout, "timed out while waiting for a reply"));
+  }
+  return **std::move(payload);
 }
 
 DaemonConnection::DaemonConnection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -208,6 +251,10 @@ Status DaemonConnection::Send(ByteSpan frame, milliseconds timeout) {
 
 Result<Bytes> DaemonConnection::Receive(milliseconds timeout) {
   return impl_->Receive(timeout);
+}
+
+Result<std::optional<Bytes>> DaemonConnection::Poll(milliseconds timeout) {
+  return impl_->Poll(timeout);
 }
 
 const Endpoint& DaemonConnection::endpoint() const {

@@ -43,6 +43,9 @@ class DaemonConnection {
   // The payload of the next frame. kUnavailable when the peer closed, kTimeout when the frame was
   // not whole in time, kInvalidData when it is not a frame.
   Result<Bytes> Receive(std::chrono::milliseconds timeout);
+  // The same, but nullopt when the frame was not whole in time: the connection goes on, and what
+  // came of the frame is kept.
+  Result<std::optional<Bytes>> Poll(std::chrono::milliseconds timeout);
 
   const Endpoint& endpoint() const;
   std::uint64_t bytes_sent() const;

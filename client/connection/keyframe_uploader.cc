@@ -1,6 +1,8 @@
 #include "client/connection/keyframe_uploader.h"
 
 #include <algorithm>
+#include <thread>
+#include <utility>
 
 #include "client/connection/rpc_channel.h"
 #include "core/base/str_cat.h"
@@ -8,6 +10,9 @@
 
 namespace atlas {
 namespace {
+
+// Of a daemon that is busy and does not say for how long.
+constexpr std::chrono::milliseconds kLeastPause{50};
 
 wire::Envelope UploadRequest(const KeyframeUpload& upload) {
   wire::Envelope request;
@@ -38,28 +43,65 @@ bool KeyframeUploader::IsFull(std::size_t next_bytes) const {
 }
 
 Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
-  while (IsFull(upload.blob.size())) {
+  InFlight next{next_number_++, 0, upload, upload.blob.size(), {}};
+  if (options_.patience.count() > 0) {
+    if (next.number == 0) taken_ = Clock::now();
+    next.blob.assign(upload.blob.begin(), upload.blob.end());
+    next.upload.blob = next.blob;
+  }
+  while (IsFull(next.size_bytes)) {
     ATLAS_RETURN_IF_ERROR(ReceiveOne());
   }
+  ATLAS_RETURN_IF_ERROR(SendBusyAgain());
   ATLAS_RETURN_IF_ERROR(first_refusal_);
-  wire::Envelope request = UploadRequest(upload);
+  return Transmit(std::move(next));
+}
+
+Status KeyframeUploader::Transmit(InFlight upload) {
+  while (IsFull(upload.size_bytes)) {
+    ATLAS_RETURN_IF_ERROR(ReceiveOne());
+  }
+  wire::Envelope request = UploadRequest(upload.upload);
   const std::uint64_t bytes_before = client_.bytes_sent();
   const Result<std::uint64_t> id = client_.channel_->Send(request);
-  if (!id) return id.error().WithContext(StrCat("keyframe ", upload.key));
-  in_flight_.push_back({*id, upload.key, upload.blob.size()});
-  in_flight_bytes_ += upload.blob.size();
+  if (!id) return id.error().WithContext(StrCat("keyframe ", upload.upload.key));
+  upload.request_id = *id;
+  in_flight_bytes_ += upload.size_bytes;
   totals_.bytes_sent += client_.bytes_sent() - bytes_before;
   ++totals_.sent;
+  in_flight_.push_back(std::move(upload));
   return {};
 }
 
-void KeyframeUploader::NoteRefusal(const InFlight& upload, const Status& refusal) {
-  const Status named = Named(refusal, upload.key);
-  if (options_.on_answer) {
-    options_.on_answer(upload.key, named);
+void KeyframeUploader::NoteRefusal(InFlight upload, const Status& refusal) {
+  const Status named = Named(refusal, upload.upload.key);
+  const bool is_busy = refusal.code() == StatusCode::kUnavailable;
+  if (is_busy && Clock::now() - taken_ < options_.patience) {
+    busy_.push_back(std::move(upload));
+  } else if (options_.on_answer) {
+    options_.on_answer(upload.upload.key, named);
   } else if (first_refusal_.ok()) {
     first_refusal_ = named;
   }
+}
+
+// All that it refused, before anything behind it: it takes them in no other order.
+Status KeyframeUploader::SendBusyAgain() {
+  while (!busy_.empty()) {
+    while (!in_flight_.empty()) {
+      ATLAS_RETURN_IF_ERROR(ReceiveOne());
+    }
+    const auto pause = std::max(client_.retry_after(), kLeastPause);
+    std::this_thread::sleep_for(std::min(pause, options_.patience));
+    std::vector<InFlight> again;
+    again.swap(busy_);
+    std::sort(again.begin(), again.end(),
+              [](const InFlight& a, const InFlight& b) { return a.number < b.number; });
+    for (InFlight& upload : again) {
+      ATLAS_RETURN_IF_ERROR(Transmit(std::move(upload)));
+    }
+  }
+  return {};
 }
 
 Status KeyframeUploader::ReceiveOne() {
@@ -69,27 +111,31 @@ Status KeyframeUploader::ReceiveOne() {
       in_flight_.begin(), in_flight_.end(),
       [&reply](const InFlight& upload) { return upload.request_id == reply->request_id(); });
   if (entry == in_flight_.end()) return {};  // of a request that was given up
+  InFlight answered = std::move(*entry);
+  in_flight_.erase(entry);
+  in_flight_bytes_ -= answered.size_bytes;
+  const KeyframeKey& key = answered.upload.key;
   if (reply->has_error()) {
-    NoteRefusal(*entry, ErrorFromWire(reply->error()).status);
+    NoteRefusal(std::move(answered), ErrorFromWire(reply->error()).status);
   } else if (!reply->has_upload_reply()) {
     return {StatusCode::kInvalidData,
-            StrCat("keyframe ", entry->key, ": the daemon answered with something else")};
+            StrCat("keyframe ", key, ": the daemon answered with something else")};
   } else {
     const wire::UploadReply& ack = reply->upload_reply();
+    taken_ = Clock::now();
     ++totals_.acked;
     totals_.duplicates += ack.duplicate() ? 1U : 0U;
     totals_.tiles_marked += ack.tiles_marked();
     totals_.revision = std::max(totals_.revision, ack.revision());
-    if (options_.on_answer) options_.on_answer(entry->key, {});
+    if (options_.on_answer) options_.on_answer(key, {});
   }
-  in_flight_bytes_ -= entry->size_bytes;
-  in_flight_.erase(entry);
   return {};
 }
 
 Status KeyframeUploader::Finish() {
-  while (!in_flight_.empty()) {
-    ATLAS_RETURN_IF_ERROR(ReceiveOne());
+  while (!in_flight_.empty() || !busy_.empty()) {
+    ATLAS_RETURN_IF_ERROR(SendBusyAgain());
+    if (!in_flight_.empty()) ATLAS_RETURN_IF_ERROR(ReceiveOne());
   }
   return first_refusal_;
 }

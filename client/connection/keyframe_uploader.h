@@ -3,11 +3,13 @@
 // else.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "client/connection/atlas_client.h"
 
@@ -18,10 +20,13 @@ struct UploadOptions {
   std::size_t max_in_flight_bytes = std::size_t{16} << 20;
   // Told of each keyframe once it is answered, in any order. With it a refusal stops nothing.
   std::function<void(const KeyframeKey&, const Status&)> on_answer = {};
+  // With a daemon that is busy (kUnavailable): what it refused is sent again, in the same order and
+  // not before the daemon wants it, until it has taken nothing for so long. 0: not at all.
+  std::chrono::milliseconds patience{0};
 };
 
 struct UploadTotals {
-  std::uint64_t sent = 0;
+  std::uint64_t sent = 0;        // again and again, too
   std::uint64_t acked = 0;       // on disk, duplicates among them
   std::uint64_t duplicates = 0;  // were there already
   std::uint64_t tiles_marked = 0;
@@ -36,7 +41,7 @@ class KeyframeUploader {
 
   // Sends; waits for an acknowledgement first when the window is full. A refusal of this or of an
   // earlier keyframe names that keyframe; its code is the daemon's (kConflict: other content under
-  // the key).
+  // the key). Sleeps only with patience.
   Status Upload(const KeyframeUpload& upload);
   // Waits for every acknowledgement. Returns the first refusal, after the others have been counted.
   Status Finish();
@@ -44,15 +49,21 @@ class KeyframeUploader {
   const UploadTotals& totals() const { return totals_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   struct InFlight {
+    std::uint64_t number = 0;  // in the order of Upload
     std::uint64_t request_id = 0;
-    KeyframeKey key;
+    KeyframeUpload upload;
     std::size_t size_bytes = 0;
+    Bytes blob;  // with patience: what `upload` refers to
   };
 
-  void NoteRefusal(const InFlight& upload, const Status& refusal);
+  Status Transmit(InFlight upload);
+  void NoteRefusal(InFlight upload, const Status& refusal);
   // Link failures only; refusals are remembered.
   Status ReceiveOne();
+  Status SendBusyAgain();
   bool IsFull(std::size_t next_bytes) const;
 
   AtlasClient& client_;
@@ -60,6 +71,9 @@ class KeyframeUploader {
   UploadTotals totals_;
   std::deque<InFlight> in_flight_;
   std::size_t in_flight_bytes_ = 0;
+  std::vector<InFlight> busy_;  // refused, to be sent again
+  std::uint64_t next_number_ = 0;
+  Clock::time_point taken_ = Clock::now();  // when the daemon took one last
   Status first_refusal_;
 };
 

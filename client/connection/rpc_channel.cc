@@ -7,6 +7,16 @@
 #include "proto/wire/convert.h"
 
 namespace atlas {
+namespace {
+
+using std::chrono::milliseconds;
+
+milliseconds Until(std::chrono::steady_clock::time_point time) {
+  const auto left = std::chrono::ceil<milliseconds>(time - std::chrono::steady_clock::now());
+  return std::max(left, milliseconds(0));
+}
+
+}  // namespace
 
 RpcChannel::RpcChannel(DaemonConnection connection,
                        Milliseconds frame_timeout,
@@ -15,21 +25,29 @@ RpcChannel::RpcChannel(DaemonConnection connection,
       frame_timeout_(frame_timeout),
       max_retry_after_(max_retry_after) {}
 
-Result<std::uint64_t> RpcChannel::Send(wire::Envelope& request) {
+Result<std::uint64_t> RpcChannel::Send(wire::Envelope& request, Clock::time_point latest) {
   request.set_request_id(last_id_ + 1);
   const Result<Bytes> frame = EncodeEnvelopeFrame(request);
   if (!frame) return Error(frame.error());
-  if (Status status = connection_.Send(*frame, frame_timeout_); !status.ok()) {
+  const bool is_bounded = latest != Clock::time_point::max();
+  const Milliseconds time = is_bounded ? std::min(Until(latest), frame_timeout_) : frame_timeout_;
+  if (Status status = connection_.Send(*frame, time); !status.ok()) {
     return Error(std::move(status));
   }
+  waiting_since_ = Clock::now();
   return ++last_id_;
 }
 
 Result<wire::Envelope> RpcChannel::Receive(Milliseconds extra) {
   const Result<Bytes> payload = connection_.Receive(frame_timeout_ + extra);
   if (!payload) return Error(payload.error());
-  last_frame_bytes_ = kFrameHeaderBytes + payload->size();
-  Result<wire::Envelope> reply = ParseEnvelope(*payload);
+  return Read(*payload);
+}
+
+Result<wire::Envelope> RpcChannel::Read(ByteSpan payload) {
+  waiting_since_ = Clock::now();
+  last_frame_bytes_ = kFrameHeaderBytes + payload.size();
+  Result<wire::Envelope> reply = ParseEnvelope(payload);
   if (!reply) {
     return Error(reply.error().WithContext("daemon at " + connection_.endpoint().ToText()));
   }
@@ -53,14 +71,37 @@ RpcChannel::Milliseconds RpcChannel::retry_after() const {
   return now < retry_at_ ? std::chrono::ceil<Milliseconds>(retry_at_ - now) : Milliseconds(0);
 }
 
+Result<std::optional<wire::Envelope>> RpcChannel::AnswerTo(std::uint64_t id,
+                                                           wire::Envelope reply) const {
+  if (reply.request_id() < id) return std::nullopt;
+  if (reply.request_id() != id) return Error(Unexpected(reply));
+  if (reply.has_error()) return Error(ErrorFromWire(reply.error()).status);
+  return reply;
+}
+
 Result<wire::Envelope> RpcChannel::ReceiveAnyFor(std::uint64_t id, Milliseconds extra) {
   while (true) {
     Result<wire::Envelope> reply = Receive(extra);
     if (!reply) return reply;
-    if (reply->request_id() < id) continue;
-    if (reply->request_id() != id) return Error(Unexpected(*reply));
-    if (reply->has_error()) return Error(ErrorFromWire(reply->error()).status);
-    return reply;
+    Result<std::optional<wire::Envelope>> answer = AnswerTo(id, *std::move(reply));
+    if (!answer) return Error(answer.error());
+    if (*answer) return **std::move(answer);
+  }
+}
+
+Result<std::optional<wire::Envelope>> RpcChannel::PollFor(std::uint64_t id,
+                                                          Milliseconds extra,
+                                                          Clock::time_point latest) {
+  while (true) {
+    const Clock::time_point overdue = waiting_since_ + frame_timeout_ + extra;
+    Result<std::optional<Bytes>> payload =
+        latest < overdue ? connection_.Poll(Until(latest)) : connection_.Receive(Until(overdue));
+    if (!payload) return Error(payload.error());
+    if (!*payload) return std::nullopt;
+    Result<wire::Envelope> reply = Read(**payload);
+    if (!reply) return Error(reply.error());
+    Result<std::optional<wire::Envelope>> answer = AnswerTo(id, *std::move(reply));
+    if (!answer || *answer) return answer;
   }
 }
 

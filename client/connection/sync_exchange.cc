@@ -285,6 +285,14 @@ bool SyncExchange::IsHeld(const wire::TileMessage& tile) const {
   });
 }
 
+SyncSummary SyncExchange::so_far() const {
+  SyncSummary came;
+  came.tiles = summary_.tiles;
+  came.deltas = summary_.deltas;
+  came.bytes = summary_.bytes;
+  return came;
+}
+
 Result<SyncSummary> SyncExchange::OnEnd(const wire::SyncEnd& end, std::uint64_t frame_bytes) {
   Status status = Count(frame_bytes);
   if (status.ok()) status = CheckAllCame();

@@ -25,6 +25,8 @@ class SyncExchange {
   Status OnManifest(const wire::SyncManifest& manifest, std::uint64_t frame_bytes);
   Result<TileBlob> OnTile(const wire::TileMessage& tile, std::uint64_t frame_bytes);
   Result<SyncSummary> OnEnd(const wire::SyncEnd& end, std::uint64_t frame_bytes);
+  // What came, before the end.
+  SyncSummary so_far() const;
 
  private:
   struct Announced {

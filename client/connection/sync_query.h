@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/base/bytes.h"
@@ -43,12 +44,19 @@ struct SyncQuery {
   std::uint64_t budget_bytes = 0;  // of the whole reply; 0: none
   // Of the reply, and of the wait in it; 0: no end to the one, and none of the other.
   std::chrono::milliseconds timeout{0};
+  // Of the call, whatever the link does: what has not come then is left on its way (`rest` of the
+  // summary). 0: the call ends with the reply.
+  std::chrono::milliseconds give_up{0};
   std::uint64_t wait_revision = 0;  // until the tiles reflect it; 0: do not wait
   Bytes cursor;                     // of the summary before, with area and levels as they were
   bool takes_deltas = false;        // to held tiles that are told one by one
 };
 
+struct SyncRest;  // of a reply that is on its way (AtlasClient::Continue)
+
 struct SyncSummary {
+  // Null: the reply is whole. Else it says what came so far, and no more than that.
+  std::shared_ptr<SyncRest> rest;
   std::uint64_t tiles = 0;
   std::uint64_t deltas = 0;  // of these
   std::uint64_t bytes = 0;   // of the reply's frames

@@ -1,6 +1,7 @@
 // A recorded drive into an atlas: survey, select, build keyframes, upload them.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -25,7 +26,7 @@ struct IngestOptions {
   double start_s = 0.0;  // added to the scans' times
   double now_s = 0.0;    // since 1970: later scans than a minute from now are refused
   std::optional<std::uint64_t> shuffle_seed;
-  UploadOptions upload;
+  UploadOptions upload = {.patience = std::chrono::minutes(1)};
 
   // kInvalidArgument naming the first option out of range, those aside that depend on the atlas.
   Status Validate() const;
@@ -42,8 +43,8 @@ struct IngestReport {
 };
 
 // `progress` (may be empty) is called with the number of keyframes sent. A scan that is bad is
-// named and nothing is uploaded. Fails at the first keyframe that the daemon refuses, naming it;
-// what was acknowledged until then stays.
+// named and nothing is uploaded. A daemon that is busy is waited for. Fails at the first keyframe
+// that the daemon refuses otherwise, naming it; what was acknowledged until then stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
                                  AtlasClient& client,

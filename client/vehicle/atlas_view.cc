@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <utility>
 
 #include "client/map/tile_cache.h"
@@ -134,6 +135,8 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
   Status status = CheckOptions(options, store_.atlas().profile);
   if (status.ok()) status = CheckDisc(disc);
   if (!status.ok()) return Error(std::move(status));
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end = Clock::now() + options.deadline;
   MapAround map;
   NoteSync(feed_->Sync(store_, disc, options), map);
   // Each tile that was damaged on disk is gone after the pass that met it.
@@ -143,6 +146,11 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
   }
   if (!is_damaged || !map.sync.ok()) return map;
   AroundOptions rest = options;
+  rest.deadline = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+  if (rest.deadline.count() <= 0) {
+    map.is_current = false;
+    return map;
+  }
   if (rest.budget_bytes != 0) {
     rest.budget_bytes -= std::min(rest.budget_bytes, map.transfer.bytes);
     map.is_current = false;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/vehicle/store_sync.h"
-
 namespace atlas {
 
 Result<StoreSyncReport> LinkFeed::Sync(TileStore& store,
@@ -22,8 +20,10 @@ Result<StoreSyncReport> LinkFeed::Sync(TileStore& store,
   query.finest_level = options.finest_level;
   query.sections = options.sections;
   query.budget_bytes = options.budget_bytes;
-  query.timeout = std::max(options.deadline - spent, milliseconds(1));
-  Result<StoreSyncReport> report = SyncStore(**client, store, std::move(query));
+  // The daemon stops earlier than the call, so that what it sent until then arrives in time.
+  query.give_up = std::max(options.deadline - spent, milliseconds(1));
+  query.timeout = std::max(query.give_up * 3 / 4, milliseconds(1));
+  Result<StoreSyncReport> report = SyncStore(**client, store, std::move(query), rest_);
   link_->Report(report ? Status() : report.error());
   return report;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "client/vehicle/atlas_link.h"
+#include "client/vehicle/store_sync.h"
 #include "client/vehicle/tile_feed.h"
 
 namespace atlas {
@@ -18,6 +19,7 @@ class LinkFeed final : public TileFeed {
 
  private:
   AtlasLink* link_;
+  StoreSyncRest rest_;
 };
 
 }  // namespace atlas

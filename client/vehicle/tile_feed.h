@@ -14,8 +14,8 @@ struct AroundOptions {
   std::uint8_t finest_level = 0;
   SectionBits sections = kEverySection;  // contributors and surface among them
   std::uint64_t budget_bytes = 0;        // of the replies; 0: none
-  // For connecting and for what the daemon sends; a link that goes silent holds a call up to the
-  // connection's request timeout longer.
+  // For connecting and for what the daemon sends: a silent or a slow link does not hold a call any
+  // longer, and what it had on its way comes first in the next call. At least 1 ms.
   std::chrono::milliseconds deadline{2'000};
 };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <chrono>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,15 +19,12 @@ namespace {
 namespace fs = std::filesystem;
 
 // Frozen.
-constexpr std::uint32_t kTileMagic = 0x54564152;   // "RAVT"
-constexpr std::uint32_t kAtlasMagic = 0x41564152;  // "RAVA"
+constexpr std::uint32_t kTileMagic = 0x54564152;  // "RAVT"
 constexpr std::uint8_t kVersion = 1;
 constexpr std::size_t kAtlasIdBytes = 16;
 constexpr std::string_view kTileSuffix = ".tile";
-constexpr const char* kAtlasName = "atlas";
 
 constexpr std::size_t kDigits = 16;
-constexpr std::size_t kMaxAtlasBytes = 4096;
 constexpr std::size_t kMaxFileBytes = kMaxTileBytes + 256;
 
 std::string Hex(std::uint64_t value) {
@@ -66,78 +62,9 @@ std::optional<TileFacts> FactsFrom(std::string_view name) {
   return TileFacts{*id, numbers[2], numbers[1], numbers[3]};
 }
 
-std::string FolderName(const Bytes& atlas_id) {
-  std::string name;
-  for (const std::uint8_t byte : atlas_id) {
-    name += Hex(byte).substr(kDigits - 2);
-  }
-  return name;
-}
-
-Bytes EncodeAtlas(const AtlasKey& atlas) {
-  ByteWriter out;
-  const Bytes profile = atlas.profile.Encode();
-  out.U32(kAtlasMagic);
-  out.U8(kVersion);
-  out.Raw(atlas.atlas_id);
-  out.U32(static_cast<std::uint32_t>(profile.size()));
-  out.Raw(profile);
-  return WithChecksum(out.Take());
-}
-
-std::optional<AtlasKey> ReadAtlas(const fs::path& folder) {
-  const Result<Bytes> file = LoadFile(folder / kAtlasName, kMaxAtlasBytes);
-  if (!file) return std::nullopt;
-  const Result<ByteSpan> content = WithoutChecksum(*file);
-  if (!content) return std::nullopt;
-  ByteReader in(*content);
-  const bool is_ours = in.U32() == kAtlasMagic && in.U8() == kVersion;
-  const ByteSpan id = in.Raw(kAtlasIdBytes);
-  const Result<MapProfile> profile = MapProfile::Decode(in.Raw(in.U32()));
-  if (!is_ours || !in.ok() || in.remaining() != 0 || !profile) return std::nullopt;
-  return AtlasKey{Bytes(id.begin(), id.end()), *profile};
-}
-
 void RemoveFile(const fs::path& path) {
   std::error_code ignored;  // it is bounded by its bytes, and never believed without its checksum
   fs::remove(path, ignored);
-}
-
-struct KnownAtlas {
-  fs::file_time_type opened;
-  AtlasKey atlas;
-};
-
-// By name, so that those opened at the same time have an order.
-std::vector<KnownAtlas> KnownBelow(const fs::path& root) {
-  std::map<std::string, KnownAtlas> known;
-  std::error_code error;
-  for (fs::directory_iterator entry(root, error), end; !error && entry != end;
-       entry.increment(error)) {
-    auto atlas = ReadAtlas(entry->path());
-    const std::string name = entry->path().filename().string();
-    if (!atlas || name != FolderName(atlas->atlas_id)) continue;
-    std::error_code unknown;  // then the time is the earliest there is
-    known[name] = {fs::last_write_time(entry->path() / kAtlasName, unknown), *std::move(atlas)};
-  }
-  std::vector<KnownAtlas> all;
-  all.reserve(known.size());
-  for (auto& [name, atlas] : known) {
-    all.push_back(std::move(atlas));
-  }
-  return all;
-}
-
-// The time of writing of `atlas` says when it was opened. It is later than that of all others even
-// where the vehicle's clock was set back.
-void NoteOpened(const fs::path& root, const AtlasKey& atlas) {
-  fs::file_time_type now = fs::file_time_type::clock::now();
-  for (const KnownAtlas& other : KnownBelow(root)) {
-    const bool is_later = other.atlas.atlas_id != atlas.atlas_id && other.opened >= now;
-    if (is_later) now = other.opened + std::chrono::milliseconds(1);
-  }
-  std::error_code ignored;  // a read-only disk: what it says stays as it is
-  fs::last_write_time(root / FolderName(atlas.atlas_id) / kAtlasName, now, ignored);
 }
 
 // Files of the folder with their time of writing.
@@ -151,40 +78,10 @@ struct Dated {
 TileFiles::TileFiles(fs::path folder, Bytes atlas_id)
     : folder_(std::move(folder)), atlas_id_(std::move(atlas_id)) {}
 
-std::vector<AtlasKey> TileFiles::Known(const fs::path& root) {
-  std::vector<KnownAtlas> by_time = KnownBelow(root);
-  std::stable_sort(by_time.begin(), by_time.end(),
-                   [](const KnownAtlas& a, const KnownAtlas& b) { return a.opened > b.opened; });
-  std::vector<AtlasKey> known;
-  known.reserve(by_time.size());
-  for (KnownAtlas& one : by_time) {
-    known.push_back(std::move(one.atlas));
-  }
-  return known;
-}
-
 Result<TileFiles> TileFiles::Open(const fs::path& root, const AtlasKey& atlas) {
-  if (atlas.atlas_id.size() != kAtlasIdBytes) {
-    return Error(StatusCode::kInvalidArgument,
-                 StrCat("tile files: an atlas id of ", atlas.atlas_id.size(), " bytes, expected ",
-                        kAtlasIdBytes));
-  }
-  TileFiles files(root / FolderName(atlas.atlas_id), atlas.atlas_id);
-  if (Status status = MakeFolder(files.folder_); !status.ok()) return Error(std::move(status));
-  const auto known = ReadAtlas(files.folder_);
-  if (!known || *known != atlas) {
-    if (known) files.RemoveAll();
-    Status status = StoreFile(files.folder_ / kAtlasName, EncodeAtlas(atlas), Durability::kWhole);
-    if (!status.ok()) return Error(std::move(status));
-  }
-  NoteOpened(root, atlas);
-  return files;
-}
-
-void TileFiles::RemoveAll() {
-  for (const Found& found : List()) {
-    Remove(found.facts);
-  }
+  Result<fs::path> folder = OpenAtlasFolder(root, atlas);
+  if (!folder) return Error(folder.error());
+  return TileFiles(*std::move(folder), atlas.atlas_id);
 }
 
 fs::path TileFiles::PathOf(const TileFacts& facts) const {

@@ -8,19 +8,12 @@
 #include <vector>
 
 #include "client/connection/sync_query.h"
+#include "client/vehicle/atlas_folder.h"
 #include "core/base/bytes.h"
 #include "core/base/status.h"
-#include "core/geometry/map_profile.h"
 #include "core/geometry/tile_id.h"
 
 namespace atlas {
-
-struct AtlasKey {
-  Bytes atlas_id;  // 16 bytes
-  MapProfile profile;
-
-  friend bool operator==(const AtlasKey&, const AtlasKey&) = default;
-};
 
 struct TileFacts {
   TileId id;
@@ -36,12 +29,7 @@ class TileFiles {
     std::uint64_t bytes = 0;
   };
 
-  // The atlases with a folder below `root`, the one that was opened last first: where a vehicle
-  // without a connection begins.
-  static std::vector<AtlasKey> Known(const std::filesystem::path& root);
-
-  // Makes the folder if there is none, and is the last one opened then, as far as the disk lets it
-  // be written down. A folder of another profile is emptied.
+  // As OpenAtlasFolder.
   static Result<TileFiles> Open(const std::filesystem::path& root, const AtlasKey& atlas);
 
   // By when they were written, the last one last. Removes what writes that never ended left, and
@@ -52,11 +40,12 @@ class TileFiles {
   // kInvalidData: damaged, or of another tile or atlas than its name says.
   Result<Bytes> Read(const TileFacts& facts) const;
   void Remove(const TileFacts& facts);
+  const std::filesystem::path& folder() const { return folder_; }
 
  private:
   TileFiles(std::filesystem::path folder, Bytes atlas_id);
+
   std::filesystem::path PathOf(const TileFacts& facts) const;
-  void RemoveAll();
 
   std::filesystem::path folder_;
   Bytes atlas_id_;

@@ -31,6 +31,14 @@ Status CheckBlob(ByteSpan blob,
   return {};
 }
 
+// What was held when it was asked for may be gone since.
+SectionBits SectionsThatCame(const TileBlob& tile, const AskedSections& asked) {
+  const auto held = asked.but_held.find(tile.id.Key());
+  const bool is_rest =
+      held != asked.but_held.end() && held->second.payload_hash == tile.payload_hash;
+  return is_rest ? asked.sections & ~held->second.sections : asked.sections;
+}
+
 }  // namespace
 
 TileStore::TileStore(AtlasKey atlas, const TileStoreOptions& options)
@@ -51,6 +59,7 @@ Status TileStore::OpenFolder() {
   Result<TileFiles> files = TileFiles::Open(options_.folder, atlas_);
   if (!files) return files.error();
   files_ = *std::move(files);
+  others_ = OtherAtlases(options_.folder, files_->folder());
   for (const TileFiles::Found& found : files_->List()) {
     disk_.Insert(found.facts.id, found.bytes);
     tiles_[found.facts.id.Key()] = {found.facts, nullptr, true};
@@ -83,12 +92,6 @@ std::shared_ptr<const Bytes> TileStore::Read(const TileId& id) {
   return shared;
 }
 
-SectionBits TileStore::SectionsThatCame(const TileBlob& tile, SectionBits asked) const {
-  const auto told = told_.find(tile.id.Key());
-  const bool is_rest = told != told_.end() && told->second.payload_hash == tile.payload_hash;
-  return is_rest ? asked & ~told->second.sections : asked;
-}
-
 // What came, made of what is held where it is a delta.
 Result<Bytes> TileStore::Whole(const TileBlob& tile) {
   if (tile.base_hash == 0) return tile.blob;
@@ -104,6 +107,7 @@ Result<Bytes> TileStore::Whole(const TileBlob& tile) {
 // The blob with what is held of the same content, whose sections are added to those of the blob.
 Result<Bytes> TileStore::Joined(const TileBlob& tile, SectionBits& sections) {
   if (tile.base_hash != 0) return Whole(tile);
+  if (sections == kEverySection) return tile.blob;
   const TileFacts* held = Find(tile.id);
   if (held == nullptr || held->payload_hash != tile.payload_hash) return tile.blob;
   const SectionBits held_sections = held->sections;
@@ -113,7 +117,7 @@ Result<Bytes> TileStore::Joined(const TileBlob& tile, SectionBits& sections) {
   return MergeSections(*blob, tile.blob);
 }
 
-Status TileStore::Put(const TileBlob& tile, SectionBits asked) {
+Status TileStore::Put(const TileBlob& tile, const AskedSections& asked) {
   SectionBits sections = SectionsThatCame(tile, asked);
   Result<Bytes> blob = Joined(tile, sections);
   Status status = blob ? CheckBlob(*blob, tile, atlas_.profile, sections) : blob.error();
@@ -122,16 +126,6 @@ Status TileStore::Put(const TileBlob& tile, SectionBits asked) {
     return Status(StatusCode::kInvalidData, status.message()).WithContext(StrCat("tile ", tile.id));
   }
   Keep({tile.id, tile.revision, tile.payload_hash, sections}, *std::move(blob));
-  return {};
-}
-
-Status TileStore::PutWhole(const TileBlob& tile) {
-  const Status status = CheckBlob(tile.blob, tile, atlas_.profile, kEverySection);
-  Remove(tile.id);
-  if (!status.ok()) {
-    return Status(StatusCode::kInvalidData, status.message()).WithContext(StrCat("tile ", tile.id));
-  }
-  Keep({tile.id, tile.revision, tile.payload_hash, kEverySection}, tile.blob);
   return {};
 }
 
@@ -154,6 +148,9 @@ void TileStore::Trim() {
     const auto entry = tiles_.find(id->Key());
     entry->second.blob = nullptr;
     if (!entry->second.is_on_disk) tiles_.erase(entry);
+  }
+  if (disk_bytes() > options_.max_disk_bytes) {
+    others_.Remove(disk_bytes() - options_.max_disk_bytes);
   }
   while (const auto id = disk_.TakeAbove(options_.max_disk_bytes)) {
     const auto entry = tiles_.find(id->Key());
@@ -187,10 +184,11 @@ void TileStore::Apply(const SyncSummary& summary) {
 
 std::vector<HeldGroup> TileStore::Held(const MapArea& area,
                                        std::uint8_t finest,
-                                       std::uint8_t coarsest) {
+                                       std::uint8_t coarsest,
+                                       HeldInPart& in_part) const {
   const AreaBounds bounds(area, atlas_.profile);
   HeldSummary summary(differing_);
-  told_.clear();
+  in_part.clear();
   const std::uint64_t first = std::uint64_t{finest} << 58U;
   const std::uint64_t last = (std::uint64_t{coarsest} + 1) << 58U;
   for (auto entry = tiles_.lower_bound(first); entry != tiles_.end() && entry->first < last;
@@ -198,7 +196,7 @@ std::vector<HeldGroup> TileStore::Held(const MapArea& area,
     const TileFacts& facts = entry->second.facts;
     if (!bounds.MayTouchBlock(facts.id)) continue;
     summary.Add(facts);
-    if (facts.sections != kEverySection) told_[entry->first] = facts;
+    if (facts.sections != kEverySection) in_part[entry->first] = facts;
   }
   return summary.Take();
 }

@@ -13,6 +13,7 @@
 
 #include "client/connection/requests.h"
 #include "client/vehicle/eviction_order.h"
+#include "client/vehicle/other_atlases.h"
 #include "client/vehicle/tile_files.h"
 #include "core/base/status.h"
 
@@ -21,7 +22,17 @@ namespace atlas {
 struct TileStoreOptions {
   std::size_t max_memory_bytes = std::size_t{256} << 20;
   std::filesystem::path folder = {};  // empty: nothing outlives the store
+  // Of all atlases in the folder: the others' tiles go first.
   std::uint64_t max_disk_bytes = std::uint64_t{4} << 30;
+};
+
+// By key: tiles that are held with some of their sections.
+using HeldInPart = std::map<std::uint64_t, TileFacts>;
+
+// With which sections the tiles of a sync come.
+struct AskedSections {
+  SectionBits sections = kEverySection;
+  HeldInPart but_held = {};  // of the same content: these sections are left out
 };
 
 class TileStore {
@@ -39,7 +50,7 @@ class TileStore {
   const AtlasKey& atlas() const { return atlas_; }
   std::size_t size() const { return tiles_.size(); }
   std::size_t memory_bytes() const { return memory_.bytes(); }
-  std::size_t disk_bytes() const { return disk_.bytes(); }
+  std::uint64_t disk_bytes() const { return disk_.bytes() + others_.bytes(); }
   // Tiles that the disk had no room for, or would not take: held in memory only.
   std::uint64_t disk_failures() const { return disk_failures_; }
   // Ok, or why nothing outlives the store although it was given a folder.
@@ -49,19 +60,20 @@ class TileStore {
   const TileFacts* Find(const TileId& id) const;
   // The blob; null when it is not held, or was damaged on disk, and then is not held any more.
   std::shared_ptr<const Bytes> Read(const TileId& id);
-  // A tile that came with the sections `asked` of it, but for those that Held told of the same
-  // content; or a delta to what is held. kInvalidData, and that tile not held, when the blob is not
-  // what the hash says, or the delta's base is not held any more.
-  Status Put(const TileBlob& tile, SectionBits asked);
-  // The same of a tile with all its sections, whatever Held told.
-  Status PutWhole(const TileBlob& tile);
+  // A tile that came with the sections `asked` of it, or as a delta to what is held. Sections that
+  // are held of the same content are kept. kInvalidData, and that tile not held, when the blob is
+  // not what the hash says, or the delta's base is not held any more.
+  Status Put(const TileBlob& tile, const AskedSections& asked = {});
   void Remove(const TileId& id);
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
   void Apply(const SyncSummary& summary);
 
   // What to tell a daemon in a sync of this area: blocks where there are many tiles, single ones
-  // where there are few. What is told now is what later Puts are the rest of.
-  std::vector<HeldGroup> Held(const MapArea& area, std::uint8_t finest, std::uint8_t coarsest);
+  // where there are few. `in_part`: those of them that come without what is held, if they do.
+  std::vector<HeldGroup> Held(const MapArea& area,
+                              std::uint8_t finest,
+                              std::uint8_t coarsest,
+                              HeldInPart& in_part) const;
   // Of these levels, in key order: finest first.
   std::vector<TileId> TilesIn(const DiscArea& disc, std::uint8_t finest) const;
   std::vector<TileId> Tiles() const;
@@ -76,7 +88,6 @@ class TileStore {
 
   TileStore(AtlasKey atlas, const TileStoreOptions& options);
   Status OpenFolder();
-  SectionBits SectionsThatCame(const TileBlob& tile, SectionBits asked) const;
   Result<Bytes> Whole(const TileBlob& tile);
   Result<Bytes> Joined(const TileBlob& tile, SectionBits& sections);
   void Keep(const TileFacts& facts, Bytes blob);
@@ -86,12 +97,11 @@ class TileStore {
   AtlasKey atlas_;
   TileStoreOptions options_;
   std::optional<TileFiles> files_;
+  OtherAtlases others_;
   Entries tiles_;
   EvictionOrder memory_;
   EvictionOrder disk_;
   std::set<std::uint64_t> differing_;  // blocks to be told tile by tile
-  // Told as held in part: they may be gone before the rest of them comes.
-  std::map<std::uint64_t, TileFacts> told_;
   std::uint64_t disk_failures_ = 0;
   Status disk_problem_;
 };

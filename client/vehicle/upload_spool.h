@@ -26,9 +26,11 @@ struct SpoolOptions {
 struct SpoolReport {
   std::uint64_t acknowledged = 0;  // and gone from the disk; duplicates among them
   std::uint64_t set_aside = 0;     // refused for good or damaged; with a .reason beside each
-  std::uint64_t skipped = 0;       // could not be read, or set aside, this time: they wait
-  std::uint64_t vanished = 0;      // removed by somebody else: forgotten
-  Status problem;                  // the first file's of those skipped or vanished
+  // Could not be read or set aside, or the daemon failed at them and not at others: they wait, the
+  // last kind for two more times.
+  std::uint64_t skipped = 0;
+  std::uint64_t vanished = 0;  // removed by somebody else: forgotten
+  Status problem;              // the first file's of those skipped or vanished
   // Not 0: nothing was sent, the daemon wants to be left alone for so long.
   std::chrono::milliseconds retry_after{0};
 };
@@ -76,6 +78,7 @@ class UploadSpool {
   SpoolOptions options_;
   std::map<Number, std::uint64_t> waiting_;  // with the bytes of each
   std::map<Number, std::uint64_t> refused_;
+  std::map<Number, int> failures_;  // of the daemon, at waiting ones
   std::uint64_t waiting_bytes_ = 0;
   std::uint64_t refused_bytes_ = 0;
   Number next_ = 1;

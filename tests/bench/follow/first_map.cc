@@ -77,7 +77,7 @@ class Vehicle {
     query.area = DiscArea{options_.place_m.head<2>(), options_.radius_m};
     query.sections = options_.sections;
     const auto reply = (*client)->Sync(query, [&](const TileBlob& tile) {
-      ATLAS_RETURN_IF_ERROR(store->Put(tile, query.sections));
+      ATLAS_RETURN_IF_ERROR(store->Put(tile, {query.sections}));
       Count(tile);
       return Look(view, profile);
     });

@@ -106,6 +106,64 @@ TEST(KeyframeUploaderTest, RefusalNamesItsKeyframeAndTheOthersAreCounted) {
   EXPECT_EQ(uploader.totals().acked, 2U);
 }
 
+// Refuses a keyframe so often, and all behind it until it came (protocol.md, "UploadKeyframe").
+void ServeBusy(PeerSocket& socket, std::uint32_t at, int times, std::vector<std::uint32_t>& taken) {
+  AnswerHello(socket, {});
+  while (const auto request = socket.ReadRequest()) {
+    const std::uint32_t sequence = request->upload_keyframe().key().sequence();
+    const bool is_missing = taken.size() <= at && sequence > at;
+    if (is_missing || (sequence == at && times-- > 0)) {
+      wire::Envelope reply;
+      *reply.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "busy"});
+      reply.mutable_error()->set_retry_after_ms(20);
+      socket.Reply(request->request_id(), std::move(reply));
+    } else {
+      taken.push_back(sequence);
+      Acknowledge(socket, request->request_id(), false);
+    }
+  }
+}
+
+TEST(KeyframeUploaderTest, ABusyDaemonGetsAllOfThemInOrderInTheEnd) {
+  constexpr std::uint32_t kCount = 40;
+  for (const std::uint32_t at : {0U, 5U, kCount - 1}) {
+    std::vector<std::uint32_t> taken;
+    {
+      TestPeer peer([&](PeerSocket& socket) { ServeBusy(socket, at, 3, taken); });
+      auto client = AtlasClient::Connect(peer.options());
+      ASSERT_TRUE(client);
+      KeyframeUploader uploader(*client,
+                                {.max_in_flight = 8, .patience = std::chrono::seconds(20)});
+      for (std::uint32_t i = 0; i < kCount; ++i) {
+        const Bytes blob(10, static_cast<std::uint8_t>(i));  // gone when it is sent again
+        ASSERT_TRUE(uploader.Upload(Upload(i, blob)).ok());
+      }
+      const Status status = uploader.Finish();
+      EXPECT_TRUE(status.ok()) << status.message();
+      EXPECT_EQ(uploader.totals().acked, kCount);
+    }
+    ASSERT_EQ(taken.size(), kCount) << at;
+    EXPECT_TRUE(std::is_sorted(taken.begin(), taken.end()));
+  }
+}
+
+TEST(KeyframeUploaderTest, PatienceHasAnEnd) {
+  std::vector<std::uint32_t> taken;
+  TestPeer peer([&](PeerSocket& socket) { ServeBusy(socket, 2, 1 << 30, taken); });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client, {.patience = std::chrono::milliseconds(300)});
+  const auto start = std::chrono::steady_clock::now();
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    ASSERT_TRUE(uploader.Upload(Upload(i, Bytes(10))).ok());
+  }
+  const Status status = uploader.Finish();
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+  EXPECT_NE(status.message().find("car/monday/2"), std::string::npos) << status.message();
+  EXPECT_EQ(uploader.totals().acked, 2U);
+  EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(300));
+}
+
 TEST(KeyframeUploaderTest, RefusalThatNamesItsKeyframeIsNotNamedTwice) {
   TestPeer peer([](PeerSocket& socket) {
     AnswerHello(socket, {});

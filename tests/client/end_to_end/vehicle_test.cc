@@ -63,7 +63,7 @@ TEST_F(VehicleTest, AWarmStartSendsNotOneTileAgain) {
   }
   ASSERT_GT(tiles, 10U);
   DaemonProcess restarted(data, {});
-  TileStore store = *TileStore::Open(TileFiles::Known(kept).at(0), {.folder = kept});
+  TileStore store = *TileStore::Open(KnownAtlases(kept).at(0), {.folder = kept});
   AtlasLink link = LinkTo(*Endpoint::Parse(restarted.address()));
   AtlasView view(store, &link);
   EXPECT_EQ(drive(view), 0U);

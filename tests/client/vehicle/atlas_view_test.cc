@@ -108,7 +108,7 @@ TEST(AtlasViewTest, OfflineItAnswersFromWhatIsHeld) {
     TileStore store = *TileStore::Open(TinyAtlas(), options);
     ASSERT_TRUE(AtlasView(store, &link).Prefetch({{0.0, 0.0}, {6.0, 6.0}}, 3.0, {}));
   }
-  TileStore store = *TileStore::Open(TileFiles::Known(folder.path()).at(0), options);
+  TileStore store = *TileStore::Open(KnownAtlases(folder.path()).at(0), options);
   AtlasView view(store, nullptr);
   const auto map = view.Around({3.2, 3.2}, 10.0);
   ASSERT_TRUE(map) << map.error().message();

@@ -306,9 +306,34 @@ void SyncPeer::Serve(PeerSocket& socket) {
     for (wire::Envelope& frame : Reply(world_, *request)) {
       if (frames_left_-- <= 0) return;
       tiles_sent_ += frame.has_tile() ? 1 : 0;
-      socket.Reply(request->request_id(), std::move(frame));
+      frame.set_request_id(request->request_id());
+      if (!Send(socket, frame)) return;
     }
   }
+}
+
+bool SyncPeer::Send(PeerSocket& socket, const wire::Envelope& frame) {
+  const Bytes bytes = *EncodeEnvelopeFrame(frame);
+  std::unique_lock lock(mutex_);
+  if (frames_until_silence_-- > 0) {
+    lock.unlock();
+    return socket.Write(bytes);
+  }
+  const std::size_t half = bytes.size() / 2;
+  const bool is_sent = socket.Write(ByteSpan(bytes).first(half));
+  released_.wait_for(lock, std::chrono::seconds(10), [this] { return frames_until_silence_ >= 0; });
+  lock.unlock();
+  return is_sent && socket.Write(ByteSpan(bytes).subspan(half));
+}
+
+void SyncPeer::FallSilentAfter(int frames) {
+  const std::scoped_lock lock(mutex_);
+  frames_until_silence_ = frames;
+}
+
+void SyncPeer::Release() {
+  FallSilentAfter(kNever);
+  released_.notify_all();
 }
 
 }  // namespace atlas

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <random>
 #include <vector>
 
@@ -45,13 +47,23 @@ class TinyWorld {
   std::uint64_t revision_ = 0;
 };
 
-// One connection to a daemon with this world. Change the world only while nothing is asked.
+// One connection to a daemon with this world. Change the world only while nothing is asked. All its
+// waits end after 10 s.
 class SyncPeer {
  public:
   static constexpr int kNever = 1 << 30;
 
   // Closes the connection when so many frames of replies were sent.
   explicit SyncPeer(const TinyWorld& world, int frames_until_cut = kNever);
+  ~SyncPeer() { Release(); }
+  SyncPeer(const SyncPeer&) = delete;
+  SyncPeer& operator=(const SyncPeer&) = delete;
+  SyncPeer(SyncPeer&&) = delete;
+  SyncPeer& operator=(SyncPeer&&) = delete;
+
+  // In the middle of the frame after `frames` more it falls silent, until it is released.
+  void FallSilentAfter(int frames);
+  void Release();
 
   ConnectionOptions options() const { return peer_.options(); }
   int syncs() const { return syncs_; }
@@ -59,8 +71,12 @@ class SyncPeer {
 
  private:
   void Serve(PeerSocket& socket);
+  bool Send(PeerSocket& socket, const wire::Envelope& frame);
 
   const TinyWorld& world_;
+  std::mutex mutex_;
+  std::condition_variable released_;
+  int frames_until_silence_ = kNever;
   int frames_left_;
   std::atomic<int> syncs_{0};
   std::atomic<int> tiles_sent_{0};

@@ -87,7 +87,9 @@ TEST(TileStoreTest, ManyTilesAreToldAsBlocksFewOneByOne) {
   const TinyWorld world = SquareWorld(9);
   TileStore store = OpenStore({});
   ASSERT_TRUE(SyncOnce(world, store));
-  const auto held = store.Held(Everywhere().area, 0, 3);
+  HeldInPart in_part;
+  const auto held = store.Held(Everywhere().area, 0, 3, in_part);
+  EXPECT_TRUE(in_part.empty());
   ASSERT_EQ(held.size(), 1U);
   EXPECT_LT(24 * held[0].blocks.size() + 16 * held[0].tiles.size(), 4 * store.size());
   EXPECT_FALSE(held[0].tiles.empty());
@@ -150,11 +152,11 @@ TEST(TileStoreTest, ADeltaIsOfNoUseWithoutItsBase) {
   const TileBlob delta{id, 2, target.payload_hash, *EncodeTileDelta(base.blob, target.blob),
                        base.payload_hash};
   TileStore store = OpenStore({});
-  EXPECT_EQ(store.Put(delta, kEverySection).code(), StatusCode::kInvalidData) << "nothing held";
-  ASSERT_TRUE(store.Put({id, 1, base.payload_hash, base.blob}, kEverySection).ok());
-  ASSERT_TRUE(store.Put(delta, kEverySection).ok());
+  EXPECT_EQ(store.Put(delta).code(), StatusCode::kInvalidData) << "nothing held";
+  ASSERT_TRUE(store.Put({id, 1, base.payload_hash, base.blob}).ok());
+  ASSERT_TRUE(store.Put(delta).ok());
   EXPECT_EQ(*store.Read(id), target.blob);
-  EXPECT_EQ(store.Put(delta, kEverySection).code(), StatusCode::kInvalidData) << "another base";
+  EXPECT_EQ(store.Put(delta).code(), StatusCode::kInvalidData) << "another base";
   EXPECT_EQ(store.Find(id), nullptr) << "it comes as a whole the next time";
 }
 
@@ -200,10 +202,10 @@ TEST(TileStoreTest, ABlobThatIsNotWhatItsHashSaysIsNotKept) {
                                TileBlob{{0, 1, 0}, 1, encoded.payload_hash, encoded.blob},
                                TileBlob{id, 1, encoded.payload_hash, damaged},
                                TileBlob{id, 1, encoded.payload_hash, {}}}) {
-    EXPECT_EQ(store.Put(tile, kEverySection).code(), StatusCode::kInvalidData);
+    EXPECT_EQ(store.Put(tile).code(), StatusCode::kInvalidData);
     EXPECT_EQ(store.size(), 0U);
   }
-  EXPECT_TRUE(store.Put({id, 1, encoded.payload_hash, encoded.blob}, kEverySection).ok());
+  EXPECT_TRUE(store.Put({id, 1, encoded.payload_hash, encoded.blob}).ok());
 }
 
 TEST(TileStoreTest, MemoryIsBoundedAndCoarseTilesGoLast) {
@@ -228,7 +230,7 @@ TEST(TileStoreTest, WhatIsOnDiskOutlivesTheStoreAndItsMemory) {
     ASSERT_TRUE(SyncOnce(world, store));
     ExpectHolds(store, world);
   }
-  ASSERT_EQ(TileFiles::Known(folder.path()), std::vector{TinyAtlas()});
+  ASSERT_EQ(KnownAtlases(folder.path()), std::vector{TinyAtlas()});
   TileStore again = OpenStore(options);
   const auto report = SyncOnce(world, again);
   ASSERT_TRUE(report);
@@ -247,14 +249,14 @@ TEST(TileStoreTest, TheAtlasThatWasOpenedLastIsTheFirstKnown) {
   }
   for (const std::size_t last : {0U, 1U, 2U, 3U, 1U, 0U, 0U, 2U}) {
     ASSERT_TRUE(TileStore::Open(atlases[last], options));
-    EXPECT_EQ(TileFiles::Known(folder.path()).at(0), atlases[last]);
+    EXPECT_EQ(KnownAtlases(folder.path()).at(0), atlases[last]);
   }
   for (const auto& entry : fs::recursive_directory_iterator(folder.path())) {
     if (entry.path().filename() != "atlas") continue;
     fs::last_write_time(entry.path(), fs::last_write_time(entry.path()) + std::chrono::hours(24));
   }
   ASSERT_TRUE(TileStore::Open(atlases[3], options));
-  EXPECT_EQ(TileFiles::Known(folder.path()),
+  EXPECT_EQ(KnownAtlases(folder.path()),
             (std::vector{atlases[3], atlases[2], atlases[0], atlases[1]}));
 }
 

@@ -230,6 +230,51 @@ TEST(UploadSpoolTest, WhatMayPassLaterIsKept) {
   }
 }
 
+TEST(UploadSpoolTest, AKeyframeThatTheDaemonFailsAtStopsNoOther) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  std::uint32_t next = 0;
+  while (next < 3) {
+    ASSERT_TRUE(PutOne(spool, next++).ok());
+  }
+  for (int send = 0; send < 2; ++send) {
+    UploadPeer peer({{1, {StatusCode::kInternal, "stumbles"}}});
+    const auto report = peer.Take(spool);
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->skipped, 1U);
+    EXPECT_EQ(report->set_aside, 0U);
+    EXPECT_EQ(report->problem.code(), StatusCode::kInternal);
+    EXPECT_EQ(spool.waiting(), 1U);
+    // Alone it says nothing of itself: the daemon may fail at all.
+    UploadPeer alone({{1, {StatusCode::kInternal, "stumbles"}}});
+    EXPECT_EQ(alone.Take(spool).error().code(), StatusCode::kInternal);
+    EXPECT_EQ(spool.waiting(), 1U);
+    ASSERT_TRUE(PutOne(spool, next++).ok());
+  }
+  UploadPeer peer({{1, {StatusCode::kInternal, "stumbles"}}});
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->set_aside, 1U);
+  EXPECT_EQ(spool.waiting(), 0U);
+  EXPECT_EQ(spool.refused(), 1U);
+}
+
+TEST(UploadSpoolTest, ADaemonThatFailsAtEverythingIsNotSentEverything) {
+  const TestFolder folder;
+  SpoolOptions options;
+  options.folder = folder.path();
+  options.upload.max_in_flight = 1;
+  UploadSpool spool = *UploadSpool::Open(options);
+  std::map<std::uint32_t, Status> failures;
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+    failures[i] = {StatusCode::kInternal, "stumbles"};
+  }
+  UploadPeer peer(failures, 10);  // it would leave then
+  EXPECT_EQ(peer.Take(spool).error().code(), StatusCode::kInternal);
+  EXPECT_EQ(spool.waiting(), 50U);
+}
+
 TEST(UploadSpoolTest, ADaemonThatWantsToBeLeftAloneIs) {
   const TestFolder folder;
   UploadSpool spool = OpenSpool(folder);
