@@ -85,11 +85,16 @@ void KeyframeUploader::NoteRefusal(InFlight upload, const Status& refusal) {
   }
 }
 
-// All that it refused, before anything behind it: it takes them in no other order.
+// All that it refused, before anything behind it: it takes them in no other order. None behind a
+// keyframe that it refused for another reason: it never takes those.
 Status KeyframeUploader::SendBusyAgain() {
   while (!busy_.empty()) {
     while (!in_flight_.empty()) {
       ATLAS_RETURN_IF_ERROR(ReceiveOne());
+    }
+    if (!first_refusal_.ok()) {
+      busy_.clear();
+      return {};
     }
     const auto pause = std::max(client_.retry_after(), kLeastPause);
     std::this_thread::sleep_for(std::min(pause, options_.patience));

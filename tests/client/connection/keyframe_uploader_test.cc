@@ -164,6 +164,31 @@ TEST(KeyframeUploaderTest, PatienceHasAnEnd) {
   EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(300));
 }
 
+// As a daemon whose disk is full: what is behind a refused keyframe is refused for now.
+TEST(KeyframeUploaderTest, ARefusalThatLastsEndsThePatienceWithThoseBehindIt) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    while (const auto request = socket.ReadRequest()) {
+      const bool is_first = request->upload_keyframe().key().sequence() == 0;
+      wire::Envelope reply;
+      *reply.mutable_error() = ErrorToWire(
+          is_first ? Status(StatusCode::kResourceExhausted, "the disk is full")
+                   : Status(StatusCode::kUnavailable, "waits for keyframe car/monday/0"));
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client, {.max_in_flight = 3, .patience = std::chrono::hours(1)});
+  Status status;
+  for (std::uint32_t i = 0; i < 6 && status.ok(); ++i) {
+    status = uploader.Upload(Upload(i, Bytes(10)));
+  }
+  EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(uploader.Finish().code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(uploader.totals().acked, 0U);
+}
+
 TEST(KeyframeUploaderTest, RefusalThatNamesItsKeyframeIsNotNamedTwice) {
   TestPeer peer([](PeerSocket& socket) {
     AnswerHello(socket, {});

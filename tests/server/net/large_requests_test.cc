@@ -116,7 +116,7 @@ TEST_F(LargeRequestTest, PosesAreCheckedToTheLastOne) {
   EXPECT_NE(CodeOf(peer->Receive()), StatusCode::kOk) << "one keyframe named twice, and unknown";
   peer->Send(CancelOf(6));  // by then the others are over
   EXPECT_TRUE(peer->Receive()->has_cancel_reply());
-  EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+  ExpectHoldsNothing();
 }
 
 // Poses take more room than they do on their way.
@@ -135,7 +135,7 @@ TEST_F(LargeRequestTest, CountsAsWhatIsMadeOfIt) {
   EXPECT_EQ(reply->request_id(), 4u);
   peer->Send(CancelOf(5));
   EXPECT_TRUE(peer->Receive()->has_cancel_reply()) << "the connection goes on";
-  EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+  ExpectHoldsNothing();
 }
 
 TEST_F(LargeRequestTest, ASyncThatTellsMuchGetsWhatASmallOneGets) {
@@ -179,7 +179,7 @@ TEST_F(LargeRequestTest, EveryKindIsAnsweredAsIfItWereSmall) {
   EXPECT_TRUE(peer->Receive()->has_watch_event());
   peer->Send(CancelOf(23));
   EXPECT_TRUE(peer->Receive()->has_cancel_reply());
-  EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+  ExpectHoldsNothing();
 }
 
 TEST_F(LargeRequestTest, ABrokenOneClosesItsConnection) {
@@ -196,7 +196,7 @@ TEST_F(LargeRequestTest, ABrokenOneClosesItsConnection) {
   senseless->SendBytes(frame);
   EXPECT_EQ(LastWords(*senseless), StatusCode::kInvalidData);
   ExpectServes();
-  EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+  ExpectHoldsNothing();
 }
 
 TEST_F(LargeRequestTest, WhoLeavesMeanwhileLeavesNothingBehind) {
@@ -209,7 +209,7 @@ TEST_F(LargeRequestTest, WhoLeavesMeanwhileLeavesNothingBehind) {
   EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kInvalidData) << "it comes after the others";
   server_->Stop();
   EXPECT_TRUE(HasDrained());
-  EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+  ExpectHoldsNothing();
 }
 
 TEST_F(LargeRequestTest, IsAnsweredWhenTheDaemonStops) {

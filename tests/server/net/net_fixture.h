@@ -5,6 +5,7 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "proto/wire/convert.h"
 #include "server/net/tcp_server.h"
@@ -56,6 +57,14 @@ class NetTest : public ServiceTest {
     ASSERT_TRUE(reply.has_value());
     EXPECT_EQ(reply->request_id(), 77u);
     EXPECT_EQ(reply->body_case(), wire::Envelope::kStatusReply);
+  }
+  // Nothing is left of any request, a moment after the reply to the last one.
+  void ExpectHoldsNothing() const {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (server_->ReadFigures().held_bytes > 0 && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
   }
   // `count` queries, padded with a field that the daemon does not know: few of them fill a socket.
   static Bytes PaddedQueries(std::uint64_t count) {

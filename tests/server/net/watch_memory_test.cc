@@ -92,7 +92,7 @@ TEST_F(WatchMemoryTest, ItsMessageIsNotKept) {
   Serve();
   const auto peer = Connect();
   EXPECT_EQ(Begin(*peer, 1), StatusCode::kOk);
-  EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+  ExpectHoldsNothing();
   EXPECT_EQ(server_->ReadFigures().in_flight, 1u);
 }
 
