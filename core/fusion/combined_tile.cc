@@ -75,7 +75,7 @@ void CombinedTile::CombineWhole(std::size_t cell,
     return;
   }
   SortByStretch(segments_);
-  combiner.Combine(segments_, {}, out.tile_.layers);
+  combiner.Combine(segments_, nullptr, out.tile_.layers);
   for (const CellLayer& layer : combiner.layers()) {
     out.references_mm_.push_back(layer.reference_mm);
   }
@@ -85,8 +85,7 @@ void CombinedTile::CombineWhole(std::size_t cell,
 // Combines only the part of the cell that the revised segments are in, and copies the others'
 // layers. False, and nothing is done, where it is all of it, or can reach further: a layer's
 // altitude, the mean of what was seen, is far from its segments; there are as many layers as a cell
-// may have; the column below ends elsewhere; or nothing was measured elsewhere in the cell, so that
-// guesses may or may not count there.
+// may have; or the column below ends elsewhere.
 bool CombinedTile::CombinePart(std::size_t cell,
                                const TileSegments& from,
                                CellCombiner& combiner,
@@ -95,16 +94,14 @@ bool CombinedTile::CombinePart(std::size_t cell,
   if (!part) {
     return false;
   }
-  const CellCombiner::Others others = CollectPart(cell, *part, from);
-  if (!others.has_strong) {
-    return false;
-  }
+  CollectPart(*part, from);
+  const auto layers = tile_.Layers(cell);
   layers_.clear();
-  combiner.Combine(segments_, others, layers_);
+  combiner.Combine(segments_, part->end < layers.size() ? &layers[part->end].altitude_mm : nullptr,
+                   layers_);
   if (!IsCopyable(cell, *part, combiner.profile())) {
     return false;
   }
-  const auto layers = tile_.Layers(cell);
   const auto references_mm = References(cell);
   const auto copy = [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
@@ -165,23 +162,15 @@ bool CombinedTile::IsAtHome(std::size_t cell, const Part& part, const MapProfile
   return true;
 }
 
-// The part's segments into segments_; what the others are to them.
-CellCombiner::Others CombinedTile::CollectPart(std::size_t cell,
-                                               const Part& part,
-                                               const TileSegments& from) {
-  const auto layers = tile_.Layers(cell);
-  CellCombiner::Others others;
+// The part's segments into segments_.
+void CombinedTile::CollectPart(const Part& part, const TileSegments& from) {
   segments_.clear();
   for (const CellSegment& s : plain_) {
     if (part.altitudes.Contains(s.altitude_mm)) {
       segments_.push_back(ViewOf(*s.segment, s.stretch, from.stretches));
-    } else {
-      others.has_strong |= s.segment->is_strong;
     }
   }
   SortByStretch(segments_);
-  others.above_mm = part.end < layers.size() ? &layers[part.end].altitude_mm : nullptr;
-  return others;
 }
 
 // Whether the other layers stay as they are beside the part's new ones.

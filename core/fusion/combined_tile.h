@@ -61,7 +61,7 @@ class CombinedTile {
                                const TileSegments& from,
                                const MapProfile& profile);
   bool IsAtHome(std::size_t cell, const Part& part, const MapProfile& profile) const;
-  CellCombiner::Others CollectPart(std::size_t cell, const Part& part, const TileSegments& from);
+  void CollectPart(const Part& part, const TileSegments& from);
   bool IsCopyable(std::size_t cell, const Part& part, const MapProfile& profile) const;
   CellPart CollectPlainly(std::size_t cell, const TileSegments& from);
   void SetCombined(const TileSegments& from, const CellCombiner& combiner);

@@ -53,7 +53,7 @@ class TileFuser {
     if (segments_.empty()) {
       return;
     }
-    combiner_.Combine(segments_, {}, out);
+    combiner_.Combine(segments_, nullptr, out);
     for (std::size_t i = 0; i < segments_.size(); ++i) {
       if (combiner_.IsUsed(i)) {
         contributed_[stretches[segments_[i].stretch].session] = true;

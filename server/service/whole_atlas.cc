@@ -3,12 +3,6 @@
 #include <utility>
 
 namespace atlas {
-namespace {
-
-// What is found between two uploads is looked for again so often.
-constexpr int kCompactionAttempts = 3;
-
-}  // namespace
 
 Result<std::uint64_t> WholeAtlas::CleanRevision(const FusionWait::Limit& limit) const {
   const auto clean = wait_.UntilCleanInTime(limit);
@@ -89,25 +83,23 @@ Result<VerifyReport> WholeAtlas::Verify(bool rebuild, const Patience& patience) 
 }
 
 Result<CompactionReport> WholeAtlas::Compact(const CompactionRequest& request,
-                                             const Patience& patience) const {
+                                             const Patience& patience) {
   if (Status status = CheckCompaction(request, store_.identity().profile); !status.ok()) {
     return Error(std::move(status));
   }
   const FusionWait::Limit limit(patience);
-  const auto check_stop = wait_.Check(limit, "the atlas was not compacted in time");
-  for (int attempt = 0; attempt < kCompactionAttempts; ++attempt) {
-    const auto revision = CleanRevision(limit);
-    if (!revision) {
-      return Error(revision.error());
-    }
-    auto report = CompactAt(store_, *revision, request, check_stop);
-    if (report || report.error().code() != StatusCode::kConflict) {
-      changes_.Notify();
-      return report;
-    }
+  const std::unique_lock only_one(compacting_, std::try_to_lock);
+  if (!only_one) {
+    return Error(StatusCode::kUnavailable, "another compaction is under way");
   }
-  return Error(StatusCode::kUnavailable,
-               "the atlas keeps changing: try again while nothing is uploaded");
+  const std::uint64_t revision = store_.revision();
+  if (Status status = wait_.ForRevision(revision, limit); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const auto check_stop = wait_.Check(limit, "the atlas was not compacted in time");
+  auto report = CompactAt(store_, revision, request, check_stop);
+  changes_.Notify();
+  return report;
 }
 
 }  // namespace atlas

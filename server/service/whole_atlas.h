@@ -1,11 +1,13 @@
-// What takes the whole atlas, standing still: its digest, its verification, its compaction. Each
-// waits until nothing is dirty, and is done again when the atlas changed meanwhile.
+// What takes the whole atlas: its digest, its verification, its compaction. The first two wait
+// until nothing is dirty and are done again when it changed meanwhile, the third waits for what was
+// there when it was asked for.
 //
 // Thread-safe. `patience` bounds all of it, kTimeout; kUnavailable when it is stopped, or the
 // daemon ends.
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 
 #include "core/base/status.h"
 #include "server/service/change_signal.h"
@@ -27,10 +29,9 @@ class WholeAtlas {
   // `rebuild` waits and reports what is damaged; a plain check does not wait.
   Result<VerifyReport> Verify(bool rebuild, const Patience& patience) const;
   // Drops the keyframes that matter nowhere any more (preset bounded); the tiles stay as they are.
-  // kUnavailable when uploads do not let it finish, kInvalidData names what is damaged; errors of
-  // the request as CheckCompaction. Without success everything is as it was.
-  Result<CompactionReport> Compact(const CompactionRequest& request,
-                                   const Patience& patience) const;
+  // kUnavailable while another one is under way, kInvalidData names what is damaged; errors as
+  // CheckCompaction and CompactAt. Without success everything is as it was.
+  Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience);
 
  private:
   // Of an atlas without dirty tiles, nor damage.
@@ -39,6 +40,7 @@ class WholeAtlas {
   AtlasStore& store_;
   ChangeSignal& changes_;
   const FusionWait& wait_;
+  std::mutex compacting_;
 };
 
 }  // namespace atlas

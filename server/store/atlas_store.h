@@ -49,8 +49,9 @@ class AtlasStore : public TileIndex {
 
   // One transaction: the keyframes go with their poses and footprints, tombstones stay, and no
   // revision before this one can be read any more. Marks nothing: whoever asks knows that the tiles
-  // stay as they are. Without any keyframe nothing is written. kConflict: the atlas is at another
-  // revision than the one that this was found out at. kInvalidData: one is not there, or damaged.
+  // stay as they are. Without any keyframe nothing is written. kConflict: a tile that one of them
+  // touches changed since the revision that this was found out at. kInvalidData: one is not there,
+  // or damaged.
   virtual void Compact(Compaction compaction, Done<CompactionResult> done) = 0;
 
   // Leases up to `max_tiles` dirty tiles of the lowest level in the wave: a level starts when the

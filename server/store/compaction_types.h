@@ -8,7 +8,7 @@
 namespace atlas {
 
 struct Compaction {
-  std::uint64_t at_revision = 0;      // of the atlas in which `dropped` was found to be unneeded
+  std::uint64_t at_revision = 0;      // at which tiles were found not to need `dropped`
   std::int64_t before_ms = 0;         // what was asked for, kept for people
   std::vector<std::int64_t> dropped;  // ids of keyframes, each once
   std::string author;

@@ -3,13 +3,13 @@
 namespace atlas {
 
 void CellCombiner::Combine(std::span<SegmentView> segments,
-                           const Others& others,
+                           const std::int32_t* above_mm,
                            std::vector<TileLayer>& out) {
   if (profile_.preset == FusionPreset::kBounded) {
     segments = segments.first(choice_.MoveLatestToFront(segments));
   }
-  layer_builder_.Build(segments, others.has_strong);
-  folder_.Fold(segments, layer_builder_.labels(), layer_builder_.layers(), others.above_mm, out);
+  layer_builder_.Build(segments);
+  folder_.Fold(segments, layer_builder_.labels(), layer_builder_.layers(), above_mm, out);
 }
 
 }  // namespace atlas

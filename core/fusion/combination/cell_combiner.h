@@ -20,15 +20,12 @@ class CellCombiner {
   CellCombiner(const SigmaTable& sigmas, const MapProfile& profile)
       : profile_(profile), choice_(profile), layer_builder_(sigmas, profile), folder_(profile) {}
 
-  // What there is in the cell besides the segments that are combined.
-  struct Others {
-    bool has_strong = false;                 // some of its other segments
-    const std::int32_t* above_mm = nullptr;  // the altitude of its next layer above
-  };
-
-  // Appends the layers of a cell, or of a part of it (CellPart), to `out`. Segments in canonical
-  // order; those that do not count come to stand behind those that do (preset bounded).
-  void Combine(std::span<SegmentView> segments, const Others& others, std::vector<TileLayer>& out);
+  // Appends the layers of a cell, or of a part of it (CellPart) above which `above_mm` is the
+  // altitude of the cell's next layer, if there is one, to `out`. Segments in canonical order;
+  // those that do not count come to stand behind those that do (preset bounded).
+  void Combine(std::span<SegmentView> segments,
+               const std::int32_t* above_mm,
+               std::vector<TileLayer>& out);
   const MapProfile& profile() const { return profile_; }
   // What they were made of.
   std::span<const CellLayer> layers() const { return layer_builder_.layers(); }

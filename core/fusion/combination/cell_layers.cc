@@ -9,12 +9,7 @@
 
 namespace atlas {
 
-void CellLayerBuilder::Build(std::span<const SegmentView> segments, bool has_other_strong) {
-  const auto is_strong = [](const SegmentView& s) {
-    return s.segment->is_strong;
-  };
-  all_make_ = profile_.preset == FusionPreset::kPaper ||
-              (!has_other_strong && std::none_of(segments.begin(), segments.end(), is_strong));
+void CellLayerBuilder::Build(std::span<const SegmentView> segments) {
   LabelMakers(segments);
   Sum(segments);
   Publish();
@@ -23,7 +18,7 @@ void CellLayerBuilder::Build(std::span<const SegmentView> segments, bool has_oth
 }
 
 // An obstacle stands on something, even where the height of its foot is a guess: on a layer of its
-// own where every measured one is of another deck.
+// own where no other is measured within its deck. Free space at a guessed height is no surface.
 bool CellLayerBuilder::IsMaker(const Segment& segment,
                                std::span<const SegmentView> segments) const {
   const auto is_near = [&](const SegmentView& other) {
@@ -31,7 +26,7 @@ bool CellLayerBuilder::IsMaker(const Segment& segment,
         std::abs(std::int64_t{other.segment->altitude_mm} - segment.altitude_mm);
     return other.segment->is_strong && distance_mm < profile_.other_layer_mm;
   };
-  return all_make_ || segment.is_strong ||
+  return profile_.preset == FusionPreset::kPaper || segment.is_strong ||
          (segment.occupancy > 0 && std::none_of(segments.begin(), segments.end(), is_near));
 }
 
@@ -50,7 +45,7 @@ void CellLayerBuilder::LabelMakers(std::span<const SegmentView> segments) {
       highest_mm = std::max(highest_mm, segments[i].segment->altitude_mm);
     }
   }
-  if (makers_.empty()) {  // of a part of a cell
+  if (makers_.empty()) {
     sums_.clear();
     return;
   }
@@ -164,16 +159,18 @@ void CellLayerBuilder::Relabel() {
   }
 }
 
-// Weak segments beside strong ones lend their occupancy and columns to the nearest layer.
+// Weak segments that make none lend their occupancy and columns to the nearest layer.
 void CellLayerBuilder::AdoptWeak(std::span<const SegmentView> segments) {
-  if (all_make_) {
+  if (profile_.preset == FusionPreset::kPaper) {  // there all make layers
     return;
   }
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (!segments[i].segment->is_strong && labels_[i] == kNoLayer) {
       labels_[i] = NearestLayer(segments[i].segment->altitude_mm);
       if (labels_[i] != kNoLayer) {
-        layers_[labels_[i]].observations += segments[i].segment->observations;
+        CellLayer& layer = layers_[labels_[i]];
+        layer.observations += segments[i].segment->observations;
+        layer.last_time_ms = std::max(layer.last_time_ms, segments[i].last_time_ms);
       }
     }
   }

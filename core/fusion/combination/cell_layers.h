@@ -21,7 +21,7 @@ struct CellLayer {
   std::uint16_t sigma_100um = 0;
   bool is_measured = false;        // by at least one strong observation
   std::uint32_t observations = 0;  // that belong to it
-  std::int64_t last_time_ms = 0;   // of the keyframe that saw it last
+  std::int64_t last_time_ms = 0;   // of the keyframe that spoke of it last
 };
 
 inline constexpr std::uint32_t kNoLayer = std::numeric_limits<std::uint32_t>::max();
@@ -33,10 +33,9 @@ class CellLayerBuilder {
   CellLayerBuilder(const SigmaTable& sigmas, const MapProfile& profile)
       : sigmas_(sigmas), profile_(profile) {}
 
-  // Segments in canonical order, and whether the cell has strong ones besides. Their layers, lowest
-  // first and at most kMaxCellLayers, and for each segment its layer or kNoLayer are then in
-  // layers() and labels().
-  void Build(std::span<const SegmentView> segments, bool has_other_strong);
+  // Segments in canonical order. Their layers, lowest first and at most kMaxCellLayers, and for
+  // each segment its layer or kNoLayer are then in layers() and labels().
+  void Build(std::span<const SegmentView> segments);
 
   std::span<const CellLayer> layers() const { return layers_; }
   std::span<const std::uint32_t> labels() const { return labels_; }
@@ -73,7 +72,6 @@ class CellLayerBuilder {
   const SigmaTable& sigmas_;
   const MapProfile& profile_;
 
-  bool all_make_ = true;  // else strong segments make layers, and obstacles far from all of these
   std::vector<Maker> makers_;
   std::vector<AltitudeEstimate> estimates_;
   std::vector<std::uint32_t> chain_labels_;

@@ -8,6 +8,13 @@
 #include "server/store/await.h"
 
 namespace atlas {
+namespace {
+
+// After each the plan has less that can change. The first follows a search of the whole atlas, the
+// others only look which tiles changed since.
+constexpr int kAttempts = 10;
+
+}  // namespace
 
 Status CheckCompaction(const CompactionRequest& request, const MapProfile& profile) {
   if (profile.preset != FusionPreset::kBounded) {
@@ -30,20 +37,27 @@ Result<CompactionReport> CompactAt(AtlasStore& store,
   options.revision = revision;
   options.before_ms = request.before_ms;
   options.check_stop = check_stop;
-  auto plan = CompactionPlanner(store, std::move(options)).Run();
-  if (!plan) {
-    return Error(plan.error());
+  CompactionPlanner planner(store, std::move(options));
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    auto plan = planner.Run();
+    if (!plan) {
+      return Error(plan.error());
+    }
+    if (Status status = check_stop(); !status.ok()) {
+      return Error(std::move(status));
+    }
+    Compaction compaction{revision, request.before_ms, std::move(plan->dropped), request.author};
+    const auto stored = Await<CompactionResult>(
+        [&](auto done) { store.Compact(std::move(compaction), std::move(done)); });
+    if (stored) {
+      return CompactionReport{*stored, plan->tiles_checked};
+    }
+    if (stored.error().code() != StatusCode::kConflict) {
+      return Error(stored.error());
+    }
   }
-  if (Status status = check_stop(); !status.ok()) {
-    return Error(std::move(status));
-  }
-  Compaction compaction{revision, request.before_ms, std::move(plan->dropped), request.author};
-  const auto stored = Await<CompactionResult>(
-      [&](auto done) { store.Compact(std::move(compaction), std::move(done)); });
-  if (!stored) {
-    return Error(stored.error());
-  }
-  return CompactionReport{*stored, plan->tiles_checked};
+  return Error(StatusCode::kUnavailable,
+               "the places that could be compacted keep changing: try again later");
 }
 
 }  // namespace atlas

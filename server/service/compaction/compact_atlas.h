@@ -1,5 +1,5 @@
-// Compaction as one step: which keyframes can go, and away with them if the atlas stood still
-// meanwhile.
+// Compaction as one step: which keyframes can go, and away with them. Whatever changes meanwhile
+// keeps its keyframes.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +24,10 @@ struct CompactionReport {
 // kInvalidArgument: another preset than bounded, a time before 1970, an author that is no name.
 Status CheckCompaction(const CompactionRequest& request, const MapProfile& profile);
 
-// Of an atlas at `revision` with no tile dirty. kConflict when it changed meanwhile, kInvalidData
-// names what is damaged; a failed status of `check_stop`, asked before each keyframe, ends it: all
-// then is as it was.
+// Of an atlas whose tiles reflect `revision`, or changed since. For one caller at a time.
+// kUnavailable when they change faster than the plan can follow, kInvalidData names what is
+// damaged; a failed status of `check_stop`, asked before each keyframe, ends it: all then is as it
+// was.
 Result<CompactionReport> CompactAt(AtlasStore& store,
                                    std::uint64_t revision,
                                    const CompactionRequest& request,

@@ -21,16 +21,19 @@ CompactionPlanner::CompactionPlanner(AtlasStore& store, Options options)
       keyframes_(options_.keyframe_bytes) {}
 
 Result<CompactionPlan> CompactionPlanner::Run() {
-  if (Status status = VisitTiles(&CompactionPlanner::FindNeeded); !status.ok()) {
-    return Error(std::move(status));
+  if (!has_searched_) {
+    if (Status status = VisitTiles(&CompactionPlanner::FindNeeded); !status.ok()) {
+      return Error(std::move(status));
+    }
+    has_searched_ = true;
+    needed_.clear();
   }
-  needed_.clear();
-  while (!is_settled_) {
+  do {
     is_settled_ = true;
     if (Status status = VisitTiles(&CompactionPlanner::CheckWithout); !status.ok()) {
       return Error(std::move(status));
     }
-  }
+  } while (!is_settled_);
   CompactionPlan plan;
   plan.tiles_checked = checked_.size();
   for (const std::uint64_t content : droppable_) {
@@ -54,26 +57,54 @@ Status CompactionPlanner::VisitTiles(Status (CompactionPlanner::*visit)(const Ti
     }
     for (const TileId& id : *page) {
       ATLAS_RETURN_IF_ERROR(options_.check_stop());
-      const auto frames = Gather(id);
-      if (!frames) {
-        return frames.error();
-      }
-      ATLAS_RETURN_IF_ERROR((this->*visit)(id, *frames));
+      ATLAS_RETURN_IF_ERROR(VisitTile(id, visit));
     }
     after = static_cast<std::int64_t>(page->back().Key());
   }
 }
 
-Result<CompactionPlanner::Frames> CompactionPlanner::Gather(const TileId& id) {
+Status CompactionPlanner::VisitTile(const TileId& id,
+                                    Status (CompactionPlanner::*visit)(const TileId& id,
+                                                                       const Frames& frames)) {
   const auto sources = store_.GatherTile(id, 0);
   if (!sources) {
-    return Error(sources.error());
+    return sources.error();
   }
-  if (sources->revision != options_.revision) {
-    return Error(StatusCode::kConflict, StrCat("compaction: the atlas went from revision ",
-                                               options_.revision, " to ", sources->revision));
+  const auto frames = PlaceKeyframes(sources->keyframes);
+  if (!frames) {
+    return frames.error();
   }
-  return PlaceKeyframes(sources->keyframes);
+  const auto has_changed = HasChanged(id, sources->revision);
+  if (!has_changed) {
+    return has_changed.error();
+  }
+  if (*has_changed) {
+    KeepAll(id, *frames);
+    return {};
+  }
+  return (this->*visit)(id, *frames);
+}
+
+// Whether its keyframes may be others than at the plan's revision.
+Result<bool> CompactionPlanner::HasChanged(const TileId& id, std::uint64_t gathered_at) {
+  if (gathered_at == options_.revision) {
+    return false;
+  }
+  const auto since = store_.GatherTile(id, options_.revision);
+  if (!since) {
+    return Error(since.error());
+  }
+  return since->is_whole || !since->keyframes.empty() || !since->gone.empty();
+}
+
+void CompactionPlanner::KeepAll(const TileId& id, const Frames& frames) {
+  checked_.erase(id.Key());
+  for (const FrameOnMap& frame : frames) {
+    needed_.insert(frame.content);
+    if (droppable_.erase(frame.content) > 0) {
+      is_settled_ = false;
+    }
+  }
 }
 
 KeyframeSource CompactionPlanner::SourceOf(const Frames& frames) {
@@ -136,11 +167,7 @@ Status CompactionPlanner::CheckWithout(const TileId& id, const Frames& frames) {
     known->second = dropped;
     return {};
   }
-  is_settled_ = false;
-  checked_.erase(known);
-  for (const FrameOnMap& frame : frames) {
-    droppable_.erase(frame.content);
-  }
+  KeepAll(id, frames);
   return {};
 }
 

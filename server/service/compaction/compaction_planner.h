@@ -1,6 +1,7 @@
 // Which keyframes an atlas of preset bounded can do without: those that matter in no tile, each
-// tile fused without them to be sure. Reads and changes nothing; holds one tile at a time, and two
-// numbers for each keyframe that may go. For one thread.
+// tile fused without them to be sure. The atlas may change meanwhile: a tile that did keeps all its
+// keyframes. Reads and changes nothing; holds one tile at a time, and two numbers for each keyframe
+// that may go. For one thread.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +26,7 @@ struct CompactionPlan {
 class CompactionPlanner {
  public:
   struct Options {
-    std::uint64_t revision = 0;                           // of the atlas, with no tile dirty
+    std::uint64_t revision = 0;                           // tiles reflect it, or changed since
     std::int64_t before_ms = 0;                           // keyframes from then on stay
     std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded
     std::size_t tile_bytes = std::size_t{128} << 20;      // of the tile at hand
@@ -35,14 +36,18 @@ class CompactionPlanner {
 
   CompactionPlanner(AtlasStore& store, Options options);
 
-  // kConflict when the atlas leaves the revision, kInvalidData names what is damaged.
+  // kInvalidData names what is damaged. Called again, what tiles that changed since the last time
+  // leave of the plan.
   Result<CompactionPlan> Run();
 
  private:
   using Frames = std::vector<FrameOnMap>;
 
   Status VisitTiles(Status (CompactionPlanner::*visit)(const TileId& id, const Frames& frames));
-  Result<Frames> Gather(const TileId& id);
+  Status VisitTile(const TileId& id,
+                   Status (CompactionPlanner::*visit)(const TileId& id, const Frames& frames));
+  Result<bool> HasChanged(const TileId& id, std::uint64_t gathered_at);
+  void KeepAll(const TileId& id, const Frames& frames);
   KeyframeSource SourceOf(const Frames& frames);
   bool MayGo(const FrameOnMap& frame) const;
   Status FindNeeded(const TileId& id, const Frames& frames);
@@ -59,7 +64,8 @@ class CompactionPlanner {
   // By tile key: how many of its keyframes were droppable when it was found to do without them.
   // They only get fewer: as many are the same.
   std::unordered_map<std::uint64_t, std::size_t> checked_;
-  bool is_settled_ = false;  // no tile of this round asked for keyframes back
+  bool has_searched_ = false;  // all tiles for what they need
+  bool is_settled_ = false;    // no tile of this round asked for keyframes back
 };
 
 }  // namespace atlas

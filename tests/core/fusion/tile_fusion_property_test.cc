@@ -102,6 +102,49 @@ TEST(TileFusionPropertyTest, TilesAreValidAndReadBack) {
   }
 }
 
+// The cell's layers from one altitude up to another.
+std::vector<TileLayer> LayersBetween(const Tile& tile, std::size_t cell, int from_mm, int to_mm) {
+  std::vector<TileLayer> found;
+  for (const TileLayer& layer : tile.Layers(cell)) {
+    if (from_mm <= layer.altitude_mm && layer.altitude_mm < to_mm) {
+      found.push_back(layer);
+    }
+  }
+  return found;
+}
+
+TEST(TileFusionPropertyTest, OneDeckNeverTouchesAnother) {
+  constexpr int kAbove_mm = 60'000;
+  constexpr int kBetween_mm = 40'000;
+  constexpr int kSky_mm = 1'000'000;
+  std::size_t both = 0;
+  for (std::uint32_t seed = 400; seed < 400 + testing::Scaled(40); ++seed) {
+    const MapProfile profile = DrivesProfile(seed);
+    const auto below = RandomDrives(profile, seed);
+    auto above = RandomDrives(profile, seed + 10'000);
+    for (PlacedKeyframe& keyframe : above) {
+      keyframe.key.session.session += "-above";
+      keyframe.placement.z_um += 1'000 * kAbove_mm;
+    }
+    auto all = below;
+    all.insert(all.end(), above.begin(), above.end());
+    const Tile tile = FuseTile({0, 0, 0}, all, profile);
+    const Tile lower = FuseTile({0, 0, 0}, below, profile);
+    const Tile upper = FuseTile({0, 0, 0}, above, profile);
+    for (std::size_t cell = 0; cell + 1 < tile.cell_begin.size(); ++cell) {
+      if (tile.Layers(cell).size() == kMaxCellLayers) {
+        continue;
+      }
+      const auto lower_layers = LayersBetween(lower, cell, -kSky_mm, kSky_mm);
+      const auto upper_layers = LayersBetween(upper, cell, -kSky_mm, kSky_mm);
+      ASSERT_EQ(LayersBetween(tile, cell, -kSky_mm, kBetween_mm), lower_layers) << "seed " << seed;
+      ASSERT_EQ(LayersBetween(tile, cell, kBetween_mm, kSky_mm), upper_layers) << "seed " << seed;
+      both += !lower_layers.empty() && !upper_layers.empty() ? 1U : 0U;
+    }
+  }
+  EXPECT_GT(both, 50 * testing::Scaled(40));
+}
+
 TEST(TileFusionPropertyTest, KeyframesThatDoNotReachTheTileAreIgnored) {
   const MapProfile profile = DrivesProfile(0);
   auto keyframes = RandomDrives(profile, 7);
@@ -218,8 +261,12 @@ TEST(TileFusionPropertyTest, ResamplingAgreesWithDoubles) {
   for (std::uint32_t i = 0; i < 40; ++i) {
     const testing::MapPose pose{0.8 + unit(random), 0.8 + unit(random), 3.0 * unit(random),
                                 180.0 * unit(random)};
-    const PlacedKeyframe placed =
-        testing::PlacedFrame({}, pose, testing::RandomKeyframe(profile, 20, i));
+    Keyframe keyframe = testing::RandomKeyframe(profile, 20, i);
+    for (KeyframeCell& cell : keyframe.cells) {  // a guess makes no layer where it is free
+      cell.source = cell.source == AltitudeSource::kExtrapolated ? AltitudeSource::kInterpolated
+                                                                 : cell.source;
+    }
+    const PlacedKeyframe placed = testing::PlacedFrame({}, pose, std::move(keyframe));
     const Tile tile = FuseTile({0, 0, 0}, std::span(&placed, 1), profile);
     for (std::size_t cell = 0; cell < 256; ++cell) {
       const Eigen::Vector2d local = ToLocalCells(pose, cell);

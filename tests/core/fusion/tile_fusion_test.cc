@@ -163,44 +163,59 @@ TEST(TileFusionTest, OneVehicleDoesNotOutweighTheOthers) {
   EXPECT_EQ(layers[0].observations, 336);
 }
 
-TEST(TileFusionTest, GuessedAltitudesMakeNoLayerWhereGroundWasMeasured) {
-  const auto guess =
-      See({.z_m = 0.4, .occupancy = Occupancy::kObstacle, .source = AltitudeSource::kExtrapolated},
-          {"car", "a", 1});
-  const auto far_guess =
-      See({.z_m = 7.0, .source = AltitudeSource::kExtrapolated}, {"car", "b", 1});
-  const auto measured = See({.z_m = 0.0}, {"car", "c", 1});
+PlacedKeyframe Guess(double z_m, Occupancy occupancy, const std::string& session = "b") {
+  return See({.z_m = z_m, .occupancy = occupancy, .source = AltitudeSource::kExtrapolated},
+             {"car", session, 1});
+}
 
+TEST(TileFusionTest, FreeSpaceAtAGuessedHeightIsNoSurface) {
+  EXPECT_TRUE(Fuse({Guess(0.0, Occupancy::kFree)}).is_empty());
+  EXPECT_TRUE(Fuse({Guess(0.0, Occupancy::kUnknown)}).is_empty());
+  EXPECT_TRUE(Fuse({Guess(0.0, Occupancy::kFree)}).contributors.empty());
+  const PlacedKeyframe road = See({.z_m = 0.0}, {"car", "a", 1});
+  EXPECT_EQ(Middle({road, Guess(7.0, Occupancy::kFree)}), Middle({road}));
+}
+
+TEST(TileFusionTest, GuessedAltitudesLendWhatTheySayToMeasuredGround) {
+  const PlacedKeyframe guess = Guess(0.4, Occupancy::kObstacle);
   const auto alone = Middle({guess});
   ASSERT_EQ(alone.size(), 1u);
   EXPECT_EQ(alone[0].altitude_mm, 400);
   EXPECT_EQ(alone[0].flags & TileLayer::kMeasured, 0);
 
-  const Tile tile = Fuse({guess, far_guess, measured});
+  const Tile tile = Fuse({guess, See({.z_m = 0.0}, {"car", "c", 1})});
   const auto layers = tile.Layers(8 * 16 + 8);
   ASSERT_EQ(layers.size(), 1u);
-  EXPECT_EQ(layers[0].altitude_mm, 0);  // the near guess says nothing about the altitude
+  EXPECT_EQ(layers[0].altitude_mm, 0);  // the guess says nothing about the altitude
   EXPECT_EQ(layers[0].observations, 2);
   EXPECT_EQ(layers[0].occupancy, SmallProfile().hit_units + SmallProfile().miss_units);
-  EXPECT_EQ(tile.contributors, (std::vector<SessionKey>{{"car", "a"}, {"car", "c"}}));
+  EXPECT_EQ(tile.contributors, (std::vector<SessionKey>{{"car", "b"}, {"car", "c"}}));
+}
+
+// Whether the one who guesses has a stretch of its own or shares it with the one who measured.
+TEST(TileFusionTest, WhoeverSpeaksOfALayerConfirmsIt) {
+  for (const std::string session : {"a", "b"}) {
+    PlacedKeyframe measured = See({.z_m = 0.0}, {"car", "a", 0});
+    measured.time_ms = 5'000;
+    PlacedKeyframe guess = Guess(0.4, Occupancy::kFree, session);
+    guess.time_ms = 9'000;
+    const auto layers = Middle({measured, guess});
+    ASSERT_EQ(layers.size(), 1u);
+    EXPECT_EQ(layers[0].confirmed_s, 9u) << session;
+  }
 }
 
 TEST(TileFusionTest, AnObstacleOnAnotherDeckStandsOnALayerOfItsOwn) {
   // A parapet on the bridge, seen from there, and the road below, measured.
   const PlacedKeyframe road = See({.z_m = 0.0}, {"car", "a", 1});
-  const auto parapet = [](double z_m, Occupancy occupancy) {
-    return See({.z_m = z_m, .occupancy = occupancy, .source = AltitudeSource::kExtrapolated},
-               {"car", "b", 1});
-  };
-  const auto layers = Middle({road, parapet(5.5, Occupancy::kObstacle)});
+  const auto layers = Middle({road, Guess(5.5, Occupancy::kObstacle)});
   ASSERT_EQ(layers.size(), 2u);
   EXPECT_EQ(layers[0].altitude_mm, 0);
   EXPECT_EQ(layers[1].altitude_mm, 5'500);
   EXPECT_EQ(layers[1].occupancy, SmallProfile().hit_units);
   EXPECT_EQ(layers[1].flags & TileLayer::kMeasured, 0);
-  // A guess that says nothing of an obstacle makes none, nor does one that may stand on the road.
-  EXPECT_EQ(Middle({road, parapet(5.5, Occupancy::kUnknown)}).size(), 1u);
-  EXPECT_EQ(Middle({road, parapet(1.9, Occupancy::kObstacle)}).size(), 1u);
+  // One that may stand on the road does.
+  EXPECT_EQ(Middle({road, Guess(1.9, Occupancy::kObstacle)}).size(), 1u);
 }
 
 TEST(TileFusionTest, ACellHoldsABoundedNumberOfLayers) {

@@ -1,7 +1,9 @@
 // Passes over the same place again and again, preset bounded: those that matter nowhere any more
 // go, and nobody sees a difference.
+#include <atomic>
 #include <set>
 #include <thread>
+#include <vector>
 
 #include <sqlite3.h>
 
@@ -268,7 +270,56 @@ TEST_F(CompactionTest, VerifyFindsALostCompaction) {
   EXPECT_EQ(report->findings.at(0), "store: it counts 1 compactions, and the rows say 0");
 }
 
-// Uploads may keep it from finishing; nothing else goes wrong.
+// A fleet that drives elsewhere does not hold it up.
+TEST_F(CompactionTest, UploadsElsewhereKeepNothing) {
+  Open();
+  UploadPasses(0, 5);
+  Digest();
+  std::uint32_t sent = 0;
+  {
+    std::jthread uploads([&](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        UploadRequest far = PassUpload(10 + sent / kKeyframes, sent % kKeyframes);
+        far.pose.x_um += 500'000'000;
+        EXPECT_TRUE(Upload(std::move(far)).has_value());
+        ++sent;
+      }
+    });
+    while (service_->ReadStatus()->counts.keyframes < 6 * kKeyframes) {
+    }
+    const auto done = Compact(5 * kPass_ms);
+    ASSERT_TRUE(done.has_value()) << done.error().message();
+    EXPECT_EQ(done->stored.dropped, 2 * kKeyframes);
+    EXPECT_GT(done->stored.revision, 6 * kKeyframes + 1U);
+  }
+  EXPECT_EQ(service_->ReadStatus()->counts.keyframes, 3 * kKeyframes + sent);
+  ExpectSound();
+}
+
+TEST_F(CompactionTest, OneAtATime) {
+  Open();
+  UploadPasses(0, 5);
+  const AtlasDigest before = Digest();
+  std::atomic<std::uint64_t> dropped = 0;
+  std::atomic<int> refused = 0;
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < 4; ++i) {
+      threads.emplace_back([&] {
+        const auto done = Compact(kAll_ms);
+        EXPECT_TRUE(done || done.error().code() == StatusCode::kUnavailable);
+        dropped += done ? done->stored.dropped : 0;
+        refused += done ? 0 : 1;
+      });
+    }
+  }
+  EXPECT_LT(refused, 4);
+  EXPECT_EQ(dropped, 2 * kKeyframes);
+  EXPECT_EQ(Digest().sha256, before.sha256);
+  ExpectSound();
+}
+
+// Uploads to the same places keep what is there; nothing else goes wrong.
 TEST_F(CompactionTest, UploadsGoOnMeanwhile) {
   Open();
   UploadPasses(0, 5);

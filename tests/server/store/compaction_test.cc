@@ -88,16 +88,34 @@ TEST_F(CompactionTest, WithoutKeyframesNothingIsWritten) {
   EXPECT_EQ(Dirty().revision, 4u);
 }
 
-TEST_F(CompactionTest, OnlyTheAtlasThatWasCheckedIsCompacted) {
+TEST_F(CompactionTest, OnlyTilesThatStoodStillAreCompacted) {
   OpenWithThree();
   for (const std::uint64_t other : {0u, 2u, 4u}) {
     EXPECT_EQ(Compact({1}, other).error().code(), StatusCode::kConflict);
-    EXPECT_EQ(Compact({}, other).error().code(), StatusCode::kConflict);
   }
+  EXPECT_EQ(Compact({}, 4).error().code(), StatusCode::kConflict);
   EXPECT_EQ(Compact({1, 9}).error().code(), StatusCode::kInvalidData);
   EXPECT_EQ(Compact({1, 1}).error().code(), StatusCode::kInvalidData);
   ExpectAsWithThree();
   EXPECT_TRUE(Compact({1}, 3).has_value());
+  EXPECT_EQ(Compact({2}, 3).error().code(), StatusCode::kConflict) << "compacted since";
+}
+
+TEST_F(CompactionTest, WhatChangesElsewhereDoesNotHoldItUp) {
+  OpenWithThree();
+  ASSERT_TRUE(Put(MakeKeyframe(4, {kB, TileId{0, 9, 9}})).has_value());
+  EXPECT_EQ(Compact({1}, 3).error().code(), StatusCode::kConflict) << "both touch a tile";
+  const auto done = Compact({2}, 3);
+  ASSERT_TRUE(done.has_value()) << done.error().message();
+  EXPECT_EQ(done->revision, 5u);
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 3u);
+}
+
+TEST_F(CompactionTest, ACorrectionSinceIsAChange) {
+  OpenWithThree();
+  ASSERT_TRUE(Update({Moved(3, 7, {TileId{0, 5, 5}})}).has_value());
+  EXPECT_EQ(Compact({1}, 3).error().code(), StatusCode::kConflict);
+  EXPECT_TRUE(Compact({1}, 4).has_value());
 }
 
 TEST_F(CompactionTest, ADroppedKeyframeIsStillKnownToItsSender) {

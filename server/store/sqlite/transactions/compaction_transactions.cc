@@ -1,6 +1,7 @@
 #include "server/store/sqlite/transactions/compaction_transactions.h"
 
 #include <map>
+#include <set>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -50,12 +51,25 @@ Status CountOut(Connection& connection, std::int64_t session_id, const Loss& los
   return {};
 }
 
-Status CheckRevisionIs(Connection& connection, std::uint64_t expected) {
+// What the plan was made of is still there: every change of a tile's keyframes is in its
+// footprints, but what a compaction dropped.
+Status CheckStoodStill(Connection& connection, const Compaction& compaction) {
+  const std::uint64_t since = compaction.at_revision;
   const std::uint64_t revision = ReadCounter(connection, Counter::kRevision);
-  return revision == expected
-             ? Status()
-             : Status(StatusCode::kConflict, StrCat("compaction: the atlas is at revision ",
-                                                    revision, ", expected ", expected));
+  if (since > revision || since < ReadCounter(connection, Counter::kHistoryHorizon)) {
+    return {StatusCode::kConflict,
+            StrCat("compaction: found out at revision ", since, ", the atlas is at ", revision)};
+  }
+  std::set<TileId> tiles;
+  for (const std::int64_t id : compaction.dropped) {
+    for (const TileId& tile : ReadFootprint(connection, id)) {
+      if (tiles.insert(tile).second && !FootprintsSince(connection, tile, since).empty()) {
+        return {StatusCode::kConflict,
+                StrCat("compaction: tile ", tile, " changed since revision ", since)};
+      }
+    }
+  }
+  return {};
 }
 
 // Returns the atlas' revision, which is the oldest that can be read from here on.
@@ -69,12 +83,12 @@ std::uint64_t MoveHorizon(Connection& connection) {
 }  // namespace
 
 Result<CompactionResult> CompactInStore(Connection& connection, const Compaction& compaction) {
-  if (Status status = CheckRevisionIs(connection, compaction.at_revision); !status.ok()) {
+  if (Status status = CheckStoodStill(connection, compaction); !status.ok()) {
     return Error(std::move(status));
   }
   if (compaction.dropped.empty()) {
     return CompactionResult{0, 0, ReadCounter(connection, Counter::kHistoryHorizon),
-                            compaction.at_revision};
+                            ReadCounter(connection, Counter::kRevision)};
   }
   const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kCompactions, 1));
   CompactionResult result{compaction.dropped.size(), 0, 0, 0};

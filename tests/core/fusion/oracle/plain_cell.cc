@@ -53,15 +53,12 @@ void PlainCell::Fuse(std::span<const PlainObservation> observations,
   if (profile_.preset == FusionPreset::kBounded) {
     KeepLatest();
   }
-  const bool any_strong = std::any_of(segments_.begin(), segments_.end(),
-                                      [](const Segment& s) { return s.is_kept && s.is_strong; });
-  const bool all_make = !any_strong || profile_.preset == FusionPreset::kPaper;
-  ChainLayers(all_make);
+  ChainLayers();
   for (Layer& layer : layers_) {
     SumLayer(layer);
   }
   KeepBestLayers();
-  if (!all_make) {
+  if (profile_.preset != FusionPreset::kPaper) {
     AdoptWeak();
   }
   for (std::size_t i = 0; i < layers_.size(); ++i) {
@@ -114,7 +111,8 @@ bool PlainCell::IsAlone(const Segment& segment) const {
 }
 
 // Eq. 1.
-void PlainCell::ChainLayers(bool all_make) {
+void PlainCell::ChainLayers() {
+  const bool all_make = profile_.preset == FusionPreset::kPaper;
   makers_.clear();
   layers_.clear();
   for (Segment& segment : segments_) {
@@ -224,7 +222,9 @@ void PlainCell::AdoptWeak() {
       }
     }
     if (segment.layer >= 0) {
-      layers_[static_cast<std::size_t>(segment.layer)].observations += segment.observations;
+      Layer& layer = layers_[static_cast<std::size_t>(segment.layer)];
+      layer.observations += segment.observations;
+      layer.time_ms = std::max(layer.time_ms, segment.last->time_ms);
     }
   }
 }

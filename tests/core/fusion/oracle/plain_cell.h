@@ -36,7 +36,7 @@ class PlainCell {
 
   void KeepLatest();
   bool IsAlone(const Segment& segment) const;
-  void ChainLayers(bool all_make);
+  void ChainLayers();
   void SumLayer(Layer& layer) const;
   void KeepBestLayers();
   void AdoptWeak();
