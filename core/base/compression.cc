@@ -4,6 +4,7 @@
 #include <bit>
 #include <cassert>
 #include <memory>
+#include <utility>
 
 #include <zstd.h>
 
@@ -39,6 +40,31 @@ int WindowLog(std::size_t bytes) {
   return std::clamp(static_cast<int>(std::bit_width(bytes)), bounds.lowerBound, kMaxWindowLog);
 }
 
+Status CheckFrame(ByteSpan frame, std::size_t expected_size) {
+  if (ZSTD_getFrameContentSize(frame.data(), frame.size()) != expected_size) {
+    return {StatusCode::kInvalidData,
+            StrCat("compressed block does not declare the expected ", expected_size, " bytes")};
+  }
+  if (ZSTD_findFrameCompressedSize(frame.data(), frame.size()) != frame.size()) {
+    return {StatusCode::kInvalidData, "compressed block is truncated or has trailing bytes"};
+  }
+  return {};
+}
+
+Status Unpack(ByteSpan prefix, ByteSpan frame, std::span<std::uint8_t> content) {
+  // One a thread: to be made for each frame it is too large.
+  thread_local const Decompressor kContext(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  ZSTD_DCtx_reset(kContext.get(), ZSTD_reset_session_only);
+  ZSTD_DCtx_refPrefix(kContext.get(), prefix.data(), prefix.size());
+  const std::size_t size = ZSTD_decompressDCtx(kContext.get(), content.data(), content.size(),
+                                               frame.data(), frame.size());
+  if (ZSTD_isError(size) != 0 || size != content.size()) {
+    return {StatusCode::kInvalidData,
+            StrCat("compressed block is damaged: ", ZSTD_getErrorName(size))};
+  }
+  return {};
+}
+
 }  // namespace
 
 Bytes Compress(ByteSpan bytes, int level) {
@@ -57,25 +83,18 @@ Result<Bytes> Decompress(ByteSpan frame, std::size_t expected_size) {
   return DecompressAgainst({}, frame, expected_size);
 }
 
+Status DecompressInto(ByteSpan frame, std::span<std::uint8_t> content) {
+  ATLAS_RETURN_IF_ERROR(CheckFrame(frame, content.size()));
+  return Unpack({}, frame, content);
+}
+
 Result<Bytes> DecompressAgainst(ByteSpan prefix, ByteSpan frame, std::size_t expected_size) {
-  const unsigned long long declared = ZSTD_getFrameContentSize(frame.data(), frame.size());
-  if (declared != expected_size) {
-    return Error(StatusCode::kInvalidData, StrCat("compressed block does not declare the expected ",
-                                                  expected_size, " bytes"));
+  if (Status status = CheckFrame(frame, expected_size); !status.ok()) {
+    return Error(std::move(status));
   }
-  if (ZSTD_findFrameCompressedSize(frame.data(), frame.size()) != frame.size()) {
-    return Error(StatusCode::kInvalidData, "compressed block is truncated or has trailing bytes");
-  }
-  // One a thread: to be made for each frame it is too large.
-  thread_local const Decompressor kContext(ZSTD_createDCtx(), &ZSTD_freeDCtx);
-  ZSTD_DCtx_reset(kContext.get(), ZSTD_reset_session_only);
-  ZSTD_DCtx_refPrefix(kContext.get(), prefix.data(), prefix.size());
   Bytes bytes(expected_size);
-  const std::size_t size =
-      ZSTD_decompressDCtx(kContext.get(), bytes.data(), bytes.size(), frame.data(), frame.size());
-  if (ZSTD_isError(size) != 0 || size != expected_size) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("compressed block is damaged: ", ZSTD_getErrorName(size)));
+  if (Status status = Unpack(prefix, frame, bytes); !status.ok()) {
+    return Error(std::move(status));
   }
   return bytes;
 }

@@ -1,6 +1,5 @@
 #include "core/keyframe/keyframe_body_check.h"
 
-#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -17,7 +16,11 @@ constexpr int kAltitudePlanes = 2;
 // Up to eight bytes; those that are missing are 0.
 std::uint64_t WordAt(ByteSpan bytes, std::size_t at) {
   std::uint64_t word = 0;
-  std::memcpy(&word, bytes.data() + at, std::min(kWordBytes, bytes.size() - at));
+  if (at + kWordBytes <= bytes.size()) {
+    std::memcpy(&word, bytes.data() + at, kWordBytes);  // one load
+  } else {
+    std::memcpy(&word, bytes.data() + at, bytes.size() - at);
+  }
   return word;
 }
 

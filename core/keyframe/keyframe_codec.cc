@@ -1,6 +1,8 @@
 #include "core/keyframe/keyframe_codec.h"
 
+#include <algorithm>
 #include <cassert>
+#include <span>
 
 #include "core/base/compression.h"
 #include "core/base/hash.h"
@@ -15,6 +17,7 @@ constexpr std::uint32_t kMagic = 0x314B4152;  // "RAK1"
 constexpr std::uint8_t kVersion = 1;
 constexpr int kCompressionLevel = 3;  // measured: docs/formats/keyframe.md
 constexpr std::size_t kChecksumBytes = 8;
+constexpr std::size_t kKeptRoomBytes = std::size_t{1} << 20;  // of a thread that checks keyframes
 
 struct BodySizes {
   std::uint32_t uncompressed = 0;
@@ -96,8 +99,8 @@ Status CheckChecksum(ByteSpan blob) {
              : Status(StatusCode::kInvalidData, "keyframe: checksum does not match");
 }
 
-// Header and checksum are as they must be.
-Result<Bytes> ReadBody(ByteSpan blob, KeyframeHeader& header) {
+// In `room`, which grows to it. Header and checksum are as they must be.
+Result<ByteSpan> ReadBody(ByteSpan blob, KeyframeHeader& header, Bytes& room) {
   ByteReader in(blob);
   BodySizes sizes;
   if (Status status = ParseHeader(in, header, sizes); !status.ok()) {
@@ -106,8 +109,12 @@ Result<Bytes> ReadBody(ByteSpan blob, KeyframeHeader& header) {
   if (Status status = CheckChecksum(blob); !status.ok()) {
     return Error(std::move(status));
   }
-  Result<Bytes> body = Decompress(in.Raw(sizes.compressed), sizes.uncompressed);
-  return body ? std::move(body) : Error(body.error().WithContext("keyframe"));
+  room.resize(std::max<std::size_t>(room.size(), sizes.uncompressed));
+  const auto body = std::span(room).first(sizes.uncompressed);
+  if (Status status = DecompressInto(in.Raw(sizes.compressed), body); !status.ok()) {
+    return Error(status.WithContext("keyframe"));
+  }
+  return body;
 }
 
 // Without cells.
@@ -118,6 +125,21 @@ Keyframe FrameOf(const KeyframeHeader& header) {
   keyframe.level_quaternion = header.level_quaternion;
   keyframe.sensor_height_mm = header.sensor_height_mm;
   return keyframe;
+}
+
+Result<KeyframeHeader> CheckKeyframeIn(ByteSpan blob, Bytes& room) {
+  KeyframeHeader header;
+  const Result<ByteSpan> body = ReadBody(blob, header, room);
+  if (!body) {
+    return Error(body.error());
+  }
+  Keyframe keyframe = FrameOf(header);
+  if (!IsKeyframeBody(*body, header.grid, keyframe.block_count())) {
+    if (Status status = DecodeKeyframeBody(*body, keyframe); !status.ok()) {  // names what is wrong
+      return Error(std::move(status));
+    }
+  }
+  return header;
 }
 
 }  // namespace
@@ -148,7 +170,8 @@ Result<KeyframeHeader> ReadKeyframeHeader(ByteSpan blob) {
 
 Result<Keyframe> DecodeKeyframe(ByteSpan blob) {
   KeyframeHeader header;
-  const Result<Bytes> body = ReadBody(blob, header);
+  Bytes room;
+  const Result<ByteSpan> body = ReadBody(blob, header, room);
   if (!body) {
     return Error(body.error());
   }
@@ -160,16 +183,10 @@ Result<Keyframe> DecodeKeyframe(ByteSpan blob) {
 }
 
 Result<KeyframeHeader> CheckKeyframe(ByteSpan blob) {
-  KeyframeHeader header;
-  const Result<Bytes> body = ReadBody(blob, header);
-  if (!body) {
-    return Error(body.error());
-  }
-  Keyframe keyframe = FrameOf(header);
-  if (!IsKeyframeBody(*body, header.grid, keyframe.block_count())) {
-    if (Status status = DecodeKeyframeBody(*body, keyframe); !status.ok()) {  // names what is wrong
-      return Error(std::move(status));
-    }
+  thread_local Bytes room;  // new pages for each are a tenth of the check
+  auto header = CheckKeyframeIn(blob, room);
+  if (room.size() > kKeptRoomBytes) {
+    room = Bytes();
   }
   return header;
 }
