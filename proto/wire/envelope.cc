@@ -33,7 +33,9 @@ Status TooMany(const char* what, std::uint32_t limit) {
 // allocate for.
 class ShapeCheck {
  public:
-  explicit ShapeCheck(CodedInputStream& in) : in_(in) {}
+  // `max_bytes` at most, not counting what is in fields that are bytes.
+  ShapeCheck(CodedInputStream& in, std::size_t max_bytes)
+      : in_(in), bytes_left_(static_cast<std::int64_t>(max_bytes)) {}
 
   Status Message(const Descriptor& type) {
     while (const std::uint32_t tag = in_.ReadTag()) {
@@ -61,7 +63,14 @@ class ShapeCheck {
     if (is_nested) {
       return Nested(*field->message_type());
     }
-    return WireFormatLite::SkipField(&in_, tag) ? Status() : Malformed();
+    const bool is_blob = field != nullptr && field->type() == FieldDescriptor::TYPE_BYTES;
+    const int begin = in_.CurrentPosition();
+    if (!WireFormatLite::SkipField(&in_, tag)) {
+      return Malformed();
+    }
+    bytes_left_ -= is_blob ? 1 : 1 + in_.CurrentPosition() - begin;
+    return bytes_left_ >= 0 ? Status()
+                            : Status(StatusCode::kResourceExhausted, "envelope: more than blobs");
   }
 
   Status Nested(const Descriptor& type) {
@@ -78,9 +87,16 @@ class ShapeCheck {
   }
 
   CodedInputStream& in_;
+  std::int64_t bytes_left_;
   std::uint32_t unknown_ = 0;
   std::uint32_t repeated_ = 0;
 };
+
+Status CheckShape(ByteSpan payload, std::size_t max_bytes) {
+  CodedInputStream in(payload.data(), static_cast<int>(payload.size()));
+  in.SetRecursionLimit(kMaxDepth);
+  return ShapeCheck(in, max_bytes).Message(*wire::Envelope::descriptor());
+}
 
 }  // namespace
 
@@ -89,9 +105,7 @@ Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
     return Error(StatusCode::kInvalidData,
                  StrCat("envelope: ", payload.size(), " bytes, expected at most ", kMaxFrameBytes));
   }
-  CodedInputStream shape(payload.data(), static_cast<int>(payload.size()));
-  shape.SetRecursionLimit(kMaxDepth);
-  if (Status status = ShapeCheck(shape).Message(*wire::Envelope::descriptor()); !status.ok()) {
+  if (Status status = CheckShape(payload, payload.size()); !status.ok()) {
     return Error(std::move(status));
   }
   CodedInputStream in(payload.data(), static_cast<int>(payload.size()));
@@ -102,6 +116,10 @@ Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
   }
   envelope.DiscardUnknownFields();
   return envelope;
+}
+
+bool IsSmallBesidesBlobs(ByteSpan payload, std::size_t max_bytes) {
+  return CheckShape(payload, max_bytes).ok();
 }
 
 Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope) {

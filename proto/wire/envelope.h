@@ -22,6 +22,10 @@ inline constexpr std::uint32_t kMaxUnknownFields = 1024;
 // BODY_NOT_SET.
 Result<wire::Envelope> ParseEnvelope(ByteSpan payload);
 
+// Whether a payload is parsed as fast as one of `max_bytes`: it is an Envelope, and what it has
+// more is in fields that are bytes, which are copied at once (a keyframe's blob). As fast itself.
+bool IsSmallBesidesBlobs(ByteSpan payload, std::size_t max_bytes);
+
 // Header and payload, ready to be written. kInvalidArgument when the payload is above
 // kMaxFrameBytes.
 Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope);

@@ -114,7 +114,8 @@ Result<std::optional<ByteSpan>> FrameDecoder::Next() {
   return frame;
 }
 
-std::optional<LargeFrame> FrameDecoder::TakeLarge(std::size_t above_bytes) {
+std::optional<LargeFrame> FrameDecoder::TakeLarge(
+    std::size_t above_bytes, const std::function<bool(ByteSpan payload)>& stays) {
   if (failure_ || pending_bytes() <= kFrameHeaderBytes + above_bytes) {
     return std::nullopt;
   }
@@ -122,7 +123,8 @@ std::optional<LargeFrame> FrameDecoder::TakeLarge(std::size_t above_bytes) {
   const auto header = DecodeFrameHeader(ByteSpan(buffer_).subspan(consumed_, kFrameHeaderBytes),
                                         max_payload_bytes_);
   if (!header || header->payload_bytes <= above_bytes ||
-      header->payload_bytes > buffer_.size() - begin) {
+      header->payload_bytes > buffer_.size() - begin ||
+      stays(ByteSpan(buffer_).subspan(begin, header->payload_bytes))) {
     return std::nullopt;
   }
   const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(begin + header->payload_bytes);

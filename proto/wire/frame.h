@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -66,8 +67,11 @@ class FrameDecoder {
   // The next whole payload, valid until the next call of anything here; nullopt if more bytes are
   // needed. An error is final.
   Result<std::optional<ByteSpan>> Next();
-  // The next frame, if it is whole and its payload above this; else it is for Next().
-  std::optional<LargeFrame> TakeLarge(std::size_t above_bytes);
+  // The next frame, if it is whole, its payload above this, and none of those that stay; else it is
+  // for Next().
+  std::optional<LargeFrame> TakeLarge(
+      std::size_t above_bytes,
+      const std::function<bool(ByteSpan payload)>& stays = [](ByteSpan) { return false; });
   // That have come and that Next() did not hand out.
   std::size_t pending_bytes() const { return buffer_.size() - consumed_; }
 

@@ -22,9 +22,10 @@ struct NetOptions {
   std::size_t max_connections = 4096;
   std::uint32_t max_hello_bytes = 16u << 10;  // payload of a connection's first frame
   std::uint32_t max_frame_bytes = kMaxFrameBytes;
-  std::size_t large_frame_bytes = 16u << 10;  // above it is not read on the connection's thread
-  std::size_t max_requests_in_flight = 64;    // a connection
-  std::size_t max_queued_bytes = 1u << 20;    // replies waiting for a slow reader, a connection
+  std::size_t large_frame_bytes = 16u << 10;    // above it is not read on the connection's thread,
+  std::size_t copied_frame_bytes = 512u << 10;  // but up to this if it is small but for a blob
+  std::size_t max_requests_in_flight = 64;      // a connection
+  std::size_t max_queued_bytes = 1u << 20;      // replies waiting for a slow reader, a connection
   // Of these in the system's hands and not on their way: half of them take 16 s at 64 kbit/s.
   int max_unsent_bytes = 256 << 10;
   std::size_t max_received_bytes = 64u << 20;  // requests in flight, a connection

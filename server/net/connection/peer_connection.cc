@@ -123,7 +123,10 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
     Status status;
     std::optional<LargeFrame> large;
     if (is_greeted_) {
-      large = decoder_.TakeLarge(options_.large_frame_bytes);
+      large = decoder_.TakeLarge(options_.large_frame_bytes, [this](ByteSpan payload) {
+        return payload.size() <= options_.copied_frame_bytes &&
+               IsSmallBesidesBlobs(payload, options_.large_frame_bytes);
+      });
     }
     if (large) {
       status = co_await TakeLargeRequest(*std::move(large));

@@ -113,6 +113,42 @@ TEST(EnvelopeTest, CapsElementsSpreadOverSeveralBodies) {
   EXPECT_EQ(ParseCode(Repeat(half, 2)), StatusCode::kInvalidData);
 }
 
+TEST(EnvelopeTest, AKeyframeIsSmallButForItsBlob) {
+  const auto payload_of = [](const wire::Envelope& envelope) {
+    Bytes frame = EncodeEnvelopeFrame(envelope).value();
+    return Bytes(frame.begin() + kFrameHeaderBytes, frame.end());
+  };
+  wire::Envelope envelope;
+  envelope.set_request_id(3);
+  envelope.mutable_upload_keyframe()->mutable_key()->set_vehicle("bus");
+  envelope.mutable_upload_keyframe()->set_blob(std::string(100'000, 'x'));
+  EXPECT_TRUE(IsSmallBesidesBlobs(payload_of(envelope), 100));
+  EXPECT_FALSE(IsSmallBesidesBlobs(payload_of(envelope), 5));
+  Bytes cut = payload_of(envelope);
+  cut.pop_back();
+  EXPECT_FALSE(IsSmallBesidesBlobs(cut, 100));
+  // Bytes of other kinds count, known or not, one long field or many.
+  wire::Envelope named = envelope;
+  named.mutable_upload_keyframe()->mutable_key()->set_vehicle(std::string(200, 'x'));
+  EXPECT_FALSE(IsSmallBesidesBlobs(payload_of(named), 100));
+  wire::Envelope held;
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    held.mutable_sync_request()->add_held()->add_keys(i);
+  }
+  EXPECT_FALSE(IsSmallBesidesBlobs(payload_of(held), 100));
+  wire::Envelope packed;
+  packed.mutable_sync_request()->add_held();
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    packed.mutable_sync_request()->mutable_held(0)->add_keys(i);
+  }
+  EXPECT_FALSE(IsSmallBesidesBlobs(payload_of(packed), 100));
+  Bytes unknown = payload_of(envelope);
+  unknown.insert(unknown.end(), {0xFA, 0x3F, 200, 1});  // field 1023, 200 bytes
+  unknown.insert(unknown.end(), 200, 7);
+  EXPECT_TRUE(ParseEnvelope(unknown).has_value());
+  EXPECT_FALSE(IsSmallBesidesBlobs(unknown, 100));
+}
+
 TEST(EnvelopeTest, IgnoresAndDropsAFewUnknownFields) {
   const Bytes unknown = {0xF8, 0x07, 0x01};  // field 127, varint 1
   const auto envelope = ParseEnvelope(Repeat(unknown, 10));

@@ -85,6 +85,22 @@ TEST(FrameTest, ALargeOneIsNotCheckedBeforeItIsLookedInto) {
   EXPECT_EQ(large->Payload().error().code(), StatusCode::kInvalidData);
 }
 
+TEST(FrameTest, ALargeOneMayStayForNext) {
+  const Bytes payload(1'000, 2);
+  FrameDecoder decoder;
+  decoder.Push(Frame(payload));
+  Bytes asked;
+  const auto stays = [&](ByteSpan its) {
+    asked.assign(its.begin(), its.end());
+    return true;
+  };
+  EXPECT_FALSE(decoder.TakeLarge(10, stays).has_value());
+  EXPECT_EQ(asked, payload);
+  const auto next = decoder.Next();
+  ASSERT_TRUE(next && *next);
+  EXPECT_EQ(Bytes((*next)->begin(), (*next)->end()), payload);
+}
+
 TEST(FrameTest, WhatIsNoFrameIsNotTaken) {
   Bytes frame = Frame(Bytes(1'000, 2));
   for (const bool is_spoiled : {false, true}) {
