@@ -109,7 +109,7 @@ def bench_fusion(bin_dir):
 def bench_accuracy(bin_dir):
     """Maps of simulated drives against the worlds that they were simulated in."""
     data = os.environ.get("ATLAS_DATA", "")
-    worlds = ["street", "overpass", "garage"]
+    worlds = ["street", "street_without_cars", "overpass", "garage"]
     if (pathlib.Path(data) / "meshes").is_dir():
         worlds += ["mesh_garage", "mesh_interchange"]
     else:
@@ -132,7 +132,7 @@ def bench_accuracy(bin_dir):
              f"of {result['static_cells']} cells", "none", None)
         for truth in ("free", "occupied"):
             for said, count in zip(("free", "occupied", "unknown"), result[truth]):
-                emit(f"{name}.{truth}_called_{said}", count, "cells", "none", None)
+                emit(f"{name}.{truth}_called_{said}", count, "cells", f"all that are {truth}", sum(result[truth]))
     if process.wait():
         sys.exit(process.returncode)
 
