@@ -64,11 +64,15 @@ def bench_passes(bin_dir, emit, _):
         second, tenth = curves[name][1], curves[name][-1]
         ratios = ", ".join(f"{rows[-1]['cpu_ms'] / rows[1]['cpu_ms']:.2f}" for rows in all_runs)
         goal = f", asked {asked}, the middle one of {ratios}" if asked else ""
+        emit(f"passes.{name}.second", second["cpu_ms"], "ms CPU a keyframe", "none", None)
         emit(f"passes.{name}.tenth", tenth["cpu_ms"], "ms CPU a keyframe", "the second pass" + goal,
              second["cpu_ms"])
-        for what in ("kept", "store", "tile"):
-            emit(f"passes.{name}.{what}_bytes", tenth[what + "_bytes"] / 2**20, "MiB", "the second pass",
-                 second[what + "_bytes"] / 2**20)
+        emit(f"passes.{name}.kept_bytes", tenth["kept_bytes"] / 2**20, "MiB", "the second pass",
+             second["kept_bytes"] / 2**20)
+        for what in ("database", "keyframe", "tile", "kept"):
+            key = what + "_bytes_added"
+            emit(f"passes.{name}.{key}", tenth[key] / 2**20, "MiB in the tenth pass", "the second pass",
+                 second[key] / 2**20)
     draw_passes(curves, IMAGES / "passes.png")
 
 
@@ -139,15 +143,19 @@ def draw_online(curves, path):
 def draw_passes(curves, path):
     figure, axes = new_plot(3)
     figures = (("cpu_ms", 1.0, "CPU ms a keyframe"), ("kept_bytes", 2**-20, "kept surveys, MiB"),
-               ("store_bytes", 2**-20, "store, MiB"))
+               ("database_bytes_added", 2**-20, "added to the database, MiB (dashed: keyframes)"))
     for axis, (key, scale, title) in zip(axes, figures):
         for name, rows in curves.items():
             axis.plot([row["pass"] for row in rows], [scale * row[key] for row in rows], "-o", markersize=3,
                       label=name.replace("_", ", "))
-        axis.set_ylim(bottom=0)
         axis.set_title(title, fontsize=10)
         axis.set_xlabel("pass through the garage")
         axis.grid(alpha=0.3)
+    for color, rows in enumerate(curves.values()):
+        axes[2].plot([row["pass"] for row in rows], [2**-20 * row["keyframe_bytes_added"] for row in rows], "--",
+                     color=f"C{color}", linewidth=0.9)
+    for axis in axes:
+        axis.set_ylim(bottom=0)
     axes[0].legend(fontsize=8)
     figure.tight_layout()
     figure.savefig(path, dpi=110)

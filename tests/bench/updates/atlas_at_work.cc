@@ -9,6 +9,7 @@
 
 #include "server/service/process_memory.h"
 #include "server/store/await.h"
+#include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace atlas::testing {
@@ -145,6 +146,12 @@ Result<UpdateCost> AtlasAtWork::BuildCold(const std::vector<TileId>& tiles) {
     return Error(clean.error());
   }
   return meter.Read(tiles.size(), service_->ReadStatus()->tiles_built);
+}
+
+std::uint64_t AtlasAtWork::DatabaseBytes() const {
+  Connection connection({directory_ / "atlas.db"});
+  return static_cast<std::uint64_t>(connection.Ask("PRAGMA page_count") *
+                                    connection.Ask("PRAGMA page_size"));
 }
 
 Result<UpdateCost> AtlasAtWork::Upload(UploadRequest request) {

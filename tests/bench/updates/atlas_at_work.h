@@ -2,6 +2,7 @@
 // costs until it is served.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -37,6 +38,9 @@ class AtlasAtWork {
   // Builds tiles again after a restart: nothing is kept in memory or on disk, what they are made of
   // is not cached.
   Result<UpdateCost> BuildCold(const std::vector<TileId>& tiles);
+
+  // Of the database, its log copied into it.
+  std::uint64_t DatabaseBytes() const;
 
   AtlasStore& store() { return *store_; }
   AtlasService& service() { return *service_; }
