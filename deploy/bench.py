@@ -210,9 +210,9 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bin", type=pathlib.Path, required=True)
-    parser.add_argument("--nginx", default="nginx", help="for serving")
+    parser = argparse.ArgumentParser(prog="deploy/bench.sh", description=__doc__)
+    parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
+    parser.add_argument("--nginx", default="nginx", help=argparse.SUPPRESS)
     parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()
