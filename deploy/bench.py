@@ -109,7 +109,7 @@ def bench_fusion(bin_dir):
 def bench_accuracy(bin_dir):
     """Maps of simulated drives against the worlds that they were simulated in."""
     data = os.environ.get("ATLAS_DATA", "")
-    worlds = ["street", "overpass", "garage"]
+    worlds = ["street", "street_without_cars", "overpass", "garage"]
     if (pathlib.Path(data) / "meshes").is_dir():
         worlds += ["mesh_garage", "mesh_interchange"]
     else:
@@ -132,7 +132,7 @@ def bench_accuracy(bin_dir):
              f"of {result['static_cells']} cells", "none", None)
         for truth in ("free", "occupied"):
             for said, count in zip(("free", "occupied", "unknown"), result[truth]):
-                emit(f"{name}.{truth}_called_{said}", count, "cells", "none", None)
+                emit(f"{name}.{truth}_called_{said}", count, "cells", f"all that are {truth}", sum(result[truth]))
     if process.wait():
         sys.exit(process.returncode)
 
@@ -210,9 +210,9 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bin", type=pathlib.Path, required=True)
-    parser.add_argument("--nginx", default="nginx", help="for serving")
+    parser = argparse.ArgumentParser(prog="deploy/bench.sh", description=__doc__)
+    parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
+    parser.add_argument("--nginx", default="nginx", help=argparse.SUPPRESS)
     parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()

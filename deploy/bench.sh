@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
 # Runs the benchmarks named (all, if none) and prints one JSON line a figure:
-# {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [segmentation] [frontend] [localization] [fusion] [accuracy] [curbs]
-#   [speed] [closure] [online] [passes] [corrections] [restarts] [scaling] [serving] [serving_tls]
-#   [reads] [uploads] [connections] [follow] [memory] [--long]
+# {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [NAME...] [--long]; deploy/bench.sh --help
+# lists the names.
 # All but fusion, accuracy, online, passes, corrections, restarts and scaling need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the
 # meshes there too. curbs prints a line a threshold instead. curbs, online, passes and follow
 # draw docs/images/*.png. --long: memory with an atlas of 5 GiB, too (10 GiB of disk, half an hour).
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
+for argument in "$@"; do
+  [[ $argument == --help || $argument == -h ]] && exec python3 deploy/bench.py --help
+done
 . deploy/packages.sh
 . deploy/data.sh
 install_packages "${BUILD_PACKAGES[@]}" "${BENCH_PACKAGES[@]}" python3 xz-utils >&2

@@ -32,6 +32,7 @@ def emit_totals(runs, emit):
         emit(f"follow.{name}.tiles", sum(row["tiles"] for row in runs[name]), "tiles", "all finest tiles each time",
              sum(row["tiles"] for row in runs["discs"]))
     emit("follow.discs.bytes", total(runs["discs"]), "bytes", "none", None)
+    emit("follow.discs.tiles", sum(row["tiles"] for row in runs["discs"]), "tiles", "none", None)
 
 
 def emit_first(firsts, near, emit):
@@ -44,9 +45,14 @@ def emit_first(firsts, near, emit):
     emit("first_map.covered.bytes", max(first["covered_bytes"] for first in firsts), "bytes down, most", "none", None)
     emit_times("first_map.planned", [first["planned_s"] for first in firsts], "none", None)
     emit_times("first_map.near.planned", [first["planned_s"] for first in near], "none", None)
-    emit("first_map.near.bytes", max(sum(first["blob_bytes"]) for first in near), "bytes of tiles, most", "none", None)
+    for what, choose in (("least", min), ("most", max)):
+        emit(f"first_map.near.bytes.{what}", choose(sum(first["blob_bytes"]) for first in near), "bytes of tiles",
+             "none", None)
     for level in reversed(range(len(firsts[0]["complete_s"]))):
         emit_times(f"first_map.level_{level}", [first["complete_s"][level] for first in firsts], "none", None)
+        for what, choose in (("least", min), ("most", max)):
+            emit(f"first_map.level_{level}.tiles.{what}", choose(first["tiles"][level] for first in firsts), "tiles",
+                 "none", None)
 
 
 def emit_update(name, keyframes, row, emit):

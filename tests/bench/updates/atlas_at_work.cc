@@ -7,9 +7,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/base/str_cat.h"
 #include "server/service/process_memory.h"
 #include "server/store/await.h"
+#include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/sqlite_store.h"
+#include "tests/bench/updates/batch_build.h"
 
 namespace atlas::testing {
 namespace {
@@ -145,6 +148,29 @@ Result<UpdateCost> AtlasAtWork::BuildCold(const std::vector<TileId>& tiles) {
     return Error(clean.error());
   }
   return meter.Read(tiles.size(), service_->ReadStatus()->tiles_built);
+}
+
+Result<UpdateCost> AtlasAtWork::BuildBatch(const std::set<TileId>& tiles) {
+  service_.reset();
+  const Meter meter(0);
+  const auto built = atlas::testing::BuildBatch(*store_, tiles);
+  if (!built) {
+    return Error(built.error());
+  }
+  const UpdateCost cost = meter.Read(tiles.size(), built->size());
+  for (const auto& [id, payload_hash] : *built) {
+    const auto stored = store_->ReadTile(id);
+    if (!stored || !*stored || (*stored)->payload_hash != payload_hash) {
+      return Error(StatusCode::kInternal, StrCat("tile ", id, " is not what is stored"));
+    }
+  }
+  return cost;
+}
+
+std::uint64_t AtlasAtWork::DatabaseBytes() const {
+  Connection connection({directory_ / "atlas.db"});
+  return static_cast<std::uint64_t>(connection.Ask("PRAGMA page_count") *
+                                    connection.Ask("PRAGMA page_size"));
 }
 
 Result<UpdateCost> AtlasAtWork::Upload(UploadRequest request) {

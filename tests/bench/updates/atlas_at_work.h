@@ -2,8 +2,10 @@
 // costs until it is served.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "core/base/status.h"
@@ -37,6 +39,12 @@ class AtlasAtWork {
   // Builds tiles again after a restart: nothing is kept in memory or on disk, what they are made of
   // is not cached.
   Result<UpdateCost> BuildCold(const std::vector<TileId>& tiles);
+  // The service ends, and one thread makes the same tiles plainly (batch_build.h); nothing is
+  // written. kInternal names a tile that is not what is stored.
+  Result<UpdateCost> BuildBatch(const std::set<TileId>& tiles);
+
+  // Of the database, its log copied into it.
+  std::uint64_t DatabaseBytes() const;
 
   AtlasStore& store() { return *store_; }
   AtlasService& service() { return *service_; }

@@ -88,39 +88,72 @@ Status PrintCorrections(AtlasAtWork& atlas,
   return {};
 }
 
+// What is stored and kept.
+struct BytesInUse {
+  std::uint64_t database = 0;
+  std::uint64_t keyframes = 0;  // of it
+  std::uint64_t tiles = 0;      // of it
+  std::uint64_t kept = 0;       // surveys in memory
+
+  static Result<BytesInUse> Of(AtlasAtWork& atlas) {
+    const auto status = atlas.service().ReadStatus();
+    if (!status) return Error(status.error());
+    return BytesInUse{atlas.DatabaseBytes(), status->counts.keyframe_bytes,
+                      status->counts.tile_bytes, status->kept_bytes};
+  }
+};
+
+// Tiles and surveys can get smaller, too.
+std::int64_t Added(std::uint64_t before, std::uint64_t after) {
+  return static_cast<std::int64_t>(after) - static_cast<std::int64_t>(before);
+}
+
+// One JSON line.
+void PrintPass(int pass,
+               FusionPreset preset,
+               const std::vector<UpdateCost>& costs,
+               const BytesInUse& before,
+               const BytesInUse& after) {
+  std::vector<double> wall_ms;
+  double cpu_sum_ms = 0;
+  std::uint64_t tiles = 0;
+  for (const UpdateCost& cost : costs) {
+    wall_ms.push_back(cost.wall_ms);
+    cpu_sum_ms += cost.cpu_ms;
+    tiles += cost.tiles;
+  }
+  const auto keyframes = static_cast<double>(costs.size());
+  std::cout << "{\"pass\": " << pass << ", \"preset\": \"" << FusionPresetName(preset)
+            << "\", \"keyframes\": " << costs.size()
+            << ", \"tiles_per_keyframe\": " << static_cast<double>(tiles) / keyframes
+            << ", \"cpu_ms\": " << cpu_sum_ms / keyframes
+            << ", \"cpu_ms_first\": " << costs.front().cpu_ms
+            << ", \"wall_ms_first\": " << wall_ms.front()
+            << ", \"wall_ms_p50\": " << Quantile(wall_ms, 0.5)
+            << ", \"wall_ms_p99\": " << Quantile(wall_ms, 0.99)
+            << ", \"kept_bytes\": " << after.kept
+            << ", \"database_bytes_added\": " << Added(before.database, after.database)
+            << ", \"keyframe_bytes_added\": " << Added(before.keyframes, after.keyframes)
+            << ", \"tile_bytes_added\": " << Added(before.tiles, after.tiles)
+            << ", \"kept_bytes_added\": " << Added(before.kept, after.kept) << "}" << std::endl;
+}
+
 Result<Placed> RunPass(
     AtlasAtWork& atlas, WorldKind world, int pass, int vehicles, const MapProfile& profile) {
   auto requests = DrivePass(world, pass, vehicles, profile);
   if (!requests) return Error(requests.error());
   Placed two = PickTwo(*requests);
-  std::vector<double> cpu_ms;
-  std::vector<double> wall_ms;
-  std::uint64_t tiles = 0;
+  const auto before = BytesInUse::Of(atlas);
+  if (!before) return Error(before.error());
+  std::vector<UpdateCost> costs;
   for (UploadRequest& request : *requests) {
     const auto cost = atlas.Upload(std::move(request));
     if (!cost) return Error(cost.error());
-    cpu_ms.push_back(cost->cpu_ms);
-    wall_ms.push_back(cost->wall_ms);
-    tiles += cost->tiles;
+    costs.push_back(*cost);
   }
-  double cpu_sum_ms = 0;
-  for (const double ms : cpu_ms) cpu_sum_ms += ms;
-  const auto status = atlas.service().ReadStatus();
-  if (!status) return Error(status.error());
-  const auto keyframes = static_cast<double>(cpu_ms.size());
-  std::cout << "{\"pass\": " << pass << ", \"preset\": \"" << FusionPresetName(profile.preset)
-            << "\", \"keyframes\": " << cpu_ms.size()
-            << ", \"tiles_per_keyframe\": " << static_cast<double>(tiles) / keyframes
-            << ", \"cpu_ms\": " << cpu_sum_ms / keyframes
-            << ", \"cpu_ms_first\": " << cpu_ms.front()
-            << ", \"wall_ms_first\": " << wall_ms.front()
-            << ", \"wall_ms_p50\": " << Quantile(wall_ms, 0.5)
-            << ", \"wall_ms_p99\": " << Quantile(wall_ms, 0.99)
-            << ", \"keyframe_bytes\": " << status->counts.keyframe_bytes
-            << ", \"tile_bytes\": " << status->counts.tile_bytes
-            << ", \"store_bytes\": " << status->counts.store_bytes
-            << ", \"kept_bytes\": " << status->kept_bytes
-            << ", \"rss_bytes\": " << status->rss_bytes << "}" << std::endl;
+  const auto after = BytesInUse::Of(atlas);
+  if (!after) return Error(after.error());
+  PrintPass(pass, profile.preset, costs, *before, *after);
   return two;
 }
 
