@@ -74,6 +74,14 @@ UploadSpool OpenSpool(const TestFolder& folder, std::uint64_t max_bytes = 1U << 
   return *UploadSpool::Open(options);
 }
 
+// As the next run of the program finds it.
+UploadSpool Reopen(UploadSpool& spool,
+                   const TestFolder& folder,
+                   std::uint64_t max_bytes = 1U << 30U) {
+  { const UploadSpool closed = std::move(spool); }
+  return OpenSpool(folder, max_bytes);
+}
+
 std::vector<std::uint32_t> UpTo(std::uint32_t count) {
   std::vector<std::uint32_t> numbers;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -85,7 +93,8 @@ std::vector<std::uint32_t> UpTo(std::uint32_t count) {
 std::vector<fs::path> FilesOf(const fs::path& folder) {
   std::vector<fs::path> paths;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file()) paths.push_back(entry.path());
+    const bool is_lock = entry.path().filename() == "lock";
+    if (entry.is_regular_file() && !is_lock) paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
   return paths;
@@ -121,7 +130,7 @@ TEST(UploadSpoolHourTest, AnHourWithoutALinkLosesNothing) {
   EXPECT_EQ(spool.waiting(), kKeyframes);
   UploadPeer cut({}, 1'000);
   EXPECT_EQ(cut.Take(spool).error().code(), StatusCode::kUnavailable);
-  UploadSpool again = OpenSpool(folder);
+  UploadSpool again = Reopen(spool, folder);
   EXPECT_GE(again.waiting(), kKeyframes - 1'000);
   const auto first = static_cast<std::uint32_t>(kKeyframes - again.waiting());
   UploadPeer peer;
@@ -168,7 +177,7 @@ TEST(UploadSpoolTest, WhatIsRefusedForGoodIsSetAsideWithItsReason) {
   std::string reason;
   std::getline(std::ifstream(refused[1]), reason);
   EXPECT_EQ(reason, "conflict: keyframe car/monday/1: other content");
-  EXPECT_EQ(OpenSpool(folder).waiting(), 0U);
+  EXPECT_EQ(Reopen(spool, folder).waiting(), 0U);
 }
 
 // The daemon's clock has caught up with the vehicle's, which was fast.
@@ -182,7 +191,7 @@ TEST(UploadSpoolTest, WhatWasRefusedIsSentWhenItIsPutBack) {
   const Status ahead(StatusCode::kInvalidData, "a time ahead of the daemon's clock");
   UploadPeer strict({{0, ahead}, {1, ahead}, {2, ahead}, {3, ahead}});
   ASSERT_TRUE(strict.Take(spool));
-  UploadSpool again = OpenSpool(folder);
+  UploadSpool again = Reopen(spool, folder);
   EXPECT_EQ(again.refused(), 4U);
   ASSERT_TRUE(PutOne(again, 4).ok());
   fs::remove(FilesOf(again.refused_folder()).at(2));  // a keyframe, not its reason
@@ -206,7 +215,7 @@ TEST(UploadSpoolTest, WhatWasRefusedStaysWhereThereIsNoRoomForIt) {
   const std::uint64_t bytes_of_one = spool.waiting_bytes() / 2;
   UploadPeer strict({{0, {StatusCode::kInvalidData, "no"}}, {1, {StatusCode::kInvalidData, "no"}}});
   ASSERT_TRUE(strict.Take(spool));
-  UploadSpool small = OpenSpool(folder, bytes_of_one);
+  UploadSpool small = Reopen(spool, folder, bytes_of_one);
   EXPECT_EQ(*small.RetryRefused(), 1U);
   EXPECT_EQ(small.refused(), 1U);
   EXPECT_EQ(small.RetryRefused().error().code(), StatusCode::kResourceExhausted);
@@ -414,8 +423,10 @@ TEST(UploadSpoolTest, WhatCannotBeSetAsideWaitsAndTheOthersAreSent) {
 // A file at every length that a write can stop at.
 TEST(UploadSpoolTest, AFileCutAnywhereIsNeverSent) {
   const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  ASSERT_TRUE(PutOne(spool, 0, 30).ok());
+  {
+    UploadSpool spool = OpenSpool(folder);
+    ASSERT_TRUE(PutOne(spool, 0, 30).ok());
+  }
   const fs::path path = FilesOf(folder.path()).at(0);
   for (std::uintmax_t size = fs::file_size(path); size-- > 0;) {
     fs::resize_file(path, size);
