@@ -28,6 +28,9 @@ struct ConnectionOptions {
   std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
   std::optional<ConnectionTls> tls;             // none: in the clear
   std::string token;                            // of a person; empty: none
+  // A session whose upload goes on: the handshake says how far the daemon has it
+  // (AtlasIdentity::last_sequence; docs/client.md says for whom that is enough).
+  std::optional<SessionKey> resume;
   // From looking the host up to the end of the handshake, all of it.
   std::chrono::milliseconds connect_timeout{5'000};
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole

@@ -22,6 +22,10 @@ wire::Envelope HelloRequest(const ConnectionOptions& options) {
   hello.set_protocol_minor(kProtocolMinor);
   hello.set_client_name(options.client_name);
   hello.set_token(options.token);
+  if (options.resume) {
+    hello.mutable_resume()->set_vehicle(options.resume->vehicle);
+    hello.mutable_resume()->set_session(options.resume->session);
+  }
   if (options.expected_profile) hello.set_profile(ProfileToWire(*options.expected_profile));
   return request;
 }
@@ -35,8 +39,15 @@ Status CheckVersion(const wire::HelloReply& reply, const Endpoint& endpoint) {
 
 AtlasIdentity IdentityFromWire(const wire::HelloReply& reply) {
   const ByteSpan id = BytesFromWire(reply.atlas_id());
-  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision(),
-          reply.protocol_minor(),      reply.name(),  reply.role()};
+  AtlasIdentity atlas;
+  atlas.atlas_id.assign(id.begin(), id.end());
+  atlas.epoch = reply.epoch();
+  atlas.revision = reply.revision();
+  atlas.protocol_minor = reply.protocol_minor();
+  atlas.our_name = reply.name();
+  atlas.our_role = reply.role();
+  if (reply.has_last_sequence()) atlas.last_sequence = reply.last_sequence();
+  return atlas;
 }
 
 }  // namespace

@@ -284,6 +284,45 @@ TEST(UploadSpoolTest, ADaemonThatFailsAtEverythingIsNotSentEverything) {
   EXPECT_EQ(spool.waiting(), 50U);
 }
 
+// The answer that was lost with the link may have been a refusal: a number says nothing of that.
+TEST(UploadSpoolTest, WhatWasNotAnsweredIsSentAgainHoweverFarTheSessionIsThere) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  UploadPeer cut({}, 0);
+  EXPECT_EQ(cut.Take(spool).error().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(spool.waiting(), 4U);
+  std::vector<std::uint32_t> came;
+  {
+    TestPeer peer([&came](PeerSocket& socket) {
+      const auto hello = socket.ReadRequest();
+      wire::Envelope greeting;
+      wire::HelloReply& reply = *greeting.mutable_hello_reply();
+      reply.set_protocol_major(kProtocolMajor);
+      reply.set_protocol_minor(kProtocolMinor);
+      reply.set_profile(ProfileToWire({}));
+      reply.set_last_sequence(3);
+      socket.Reply(hello->request_id(), std::move(greeting));
+      while (const auto request = socket.ReadRequest()) {
+        came.push_back(request->upload_keyframe().key().sequence());
+        wire::Envelope answer;
+        answer.mutable_upload_reply()->set_duplicate(true);
+        socket.Reply(request->request_id(), std::move(answer));
+      }
+    });
+    ConnectionOptions options = peer.options();
+    options.resume = SessionKey{"car", "monday"};
+    auto client = AtlasClient::Connect(options);
+    ASSERT_TRUE(client) << client.error().message();
+    EXPECT_EQ(client->atlas().last_sequence, 3U);
+    EXPECT_TRUE(spool.Send(*client));
+  }
+  EXPECT_EQ(came, UpTo(4));
+  EXPECT_EQ(spool.waiting(), 0U);
+}
+
 TEST(UploadSpoolTest, ADaemonThatWantsToBeLeftAloneIs) {
   const TestFolder folder;
   UploadSpool spool = OpenSpool(folder);
