@@ -89,6 +89,27 @@ TEST_F(OtherAtlasesTest, MakeRoomTheOneOpenedLongestAgoFirst) {
   EXPECT_GT(TilesOf(7), 0U);
 }
 
+// Of any atlas: the folder's bytes are bounded together.
+TEST_F(OtherAtlasesTest, ASecondStoreOfTheFolderWorksInMemory) {
+  Fill(Atlas(7));
+  {
+    const TileStore first = Open(Atlas(7));
+    EXPECT_TRUE(first.disk_problem().ok());
+    for (const AtlasKey& atlas : {Atlas(7), Atlas(3)}) {
+      TileStore second = Open(atlas);
+      EXPECT_EQ(second.disk_problem().code(), StatusCode::kConflict);
+      EXPECT_NE(second.disk_problem().message().find(folder_.path().string()), std::string::npos);
+      EXPECT_EQ(second.size(), 0U);
+      Put(second, world_.tiles().begin()->first);
+      EXPECT_EQ(second.size(), 1U);
+      EXPECT_EQ(second.disk_failures(), 1U);
+    }
+  }
+  const TileStore later = Open(Atlas(7));
+  EXPECT_TRUE(later.disk_problem().ok());
+  EXPECT_EQ(later.size(), world_.tiles().size());
+}
+
 TEST_F(OtherAtlasesTest, AnEmptyOneIsGoneAndTheOpenOneIsBoundedLast) {
   const std::uint64_t one = Fill(Atlas(7));
   TileStore store = Open(Atlas(5), one / 2);

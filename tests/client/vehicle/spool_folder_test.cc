@@ -9,21 +9,10 @@
 #include "client/vehicle/folder_lock.h"
 #include "client/vehicle/numbered_files.h"
 #include "client/vehicle/stored_file.h"
-#include "client/vehicle/upload_spool.h"
-#include "tests/client/vehicle/test_folder.h"
+#include "tests/client/vehicle/spool_peer.h"
 
 namespace atlas {
 namespace {
-
-namespace fs = std::filesystem;
-
-Status PutOne(UploadSpool& spool, std::uint32_t sequence) {
-  const Bytes blob(100, static_cast<std::uint8_t>(sequence));
-  KeyframeUpload upload;
-  upload.key = {{"car", "monday"}, sequence};
-  upload.blob = blob;
-  return spool.Put(upload);
-}
 
 // Puts until it is killed, and says each time that it is done. Never returns.
 [[noreturn]] void PutForEver(const SpoolOptions& options, int say) {

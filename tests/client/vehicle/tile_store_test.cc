@@ -277,28 +277,6 @@ TEST(TileStoreTest, WithoutAFolderThatCanBeMadeItWorksInMemory) {
             StatusCode::kInvalidArgument);
 }
 
-// Of any atlas: the folder's bytes are bounded together.
-TEST(TileStoreTest, ASecondStoreOfAFolderWorksInMemory) {
-  const TestFolder folder;
-  const TileStoreOptions options{.folder = folder.path()};
-  const TinyWorld world = SquareWorld(2);
-  {
-    auto first = TileStore::Open(TinyAtlas(), options);
-    ASSERT_TRUE(SyncOnce(world, *first));
-    auto second = TileStore::Open(TinyAtlas(), options);
-    ASSERT_TRUE(second) << second.error().message();
-    EXPECT_EQ(second->disk_problem().code(), StatusCode::kConflict);
-    EXPECT_NE(second->disk_problem().message().find(folder.path().string()), std::string::npos);
-    EXPECT_EQ(second->size(), 0U);
-    EXPECT_EQ(TileStore::Open({Bytes(16, 9), TinyProfile()}, options)->disk_problem().code(),
-              StatusCode::kConflict);
-    EXPECT_TRUE(first->disk_problem().ok());
-  }
-  auto later = TileStore::Open(TinyAtlas(), options);
-  EXPECT_TRUE(later->disk_problem().ok());
-  ExpectHolds(*later, world);
-}
-
 TEST(TileStoreTest, DiskIsBounded) {
   const TestFolder folder;
   const TinyWorld world = SquareWorld(6);
