@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "client/connection/connect_attempt.h"
 #include "client/connection/rpc_channel.h"
 #include "client/connection/sync_exchange.h"
 #include "core/base/str_cat.h"
@@ -27,30 +28,6 @@ Clock::time_point EndAfter(milliseconds give_up) {
 std::uint32_t TimeoutField(milliseconds timeout) {
   return static_cast<std::uint32_t>(
       std::clamp<std::int64_t>(timeout.count(), 0, INT64_C(0xFFFFFFFF)));
-}
-
-wire::Envelope HelloRequest(const ConnectionOptions& options) {
-  wire::Envelope request;
-  wire::Hello& hello = *request.mutable_hello();
-  hello.set_protocol_major(kProtocolMajor);
-  hello.set_protocol_minor(kProtocolMinor);
-  hello.set_client_name(options.client_name);
-  hello.set_token(options.token);
-  if (options.expected_profile) hello.set_profile(ProfileToWire(*options.expected_profile));
-  return request;
-}
-
-Status CheckVersion(const wire::HelloReply& reply, const Endpoint& endpoint) {
-  if (reply.protocol_major() == kProtocolMajor) return {};
-  return {StatusCode::kUnsupported,
-          StrCat("daemon at ", endpoint.ToText(), ": speaks protocol ", reply.protocol_major(), '.',
-                 reply.protocol_minor(), ", this build ", kProtocolMajor, '.', kProtocolMinor)};
-}
-
-AtlasIdentity IdentityFromWire(const wire::HelloReply& reply) {
-  const ByteSpan id = BytesFromWire(reply.atlas_id());
-  return {Bytes(id.begin(), id.end()), reply.epoch(), reply.revision(),
-          reply.protocol_minor(),      reply.name(),  reply.role()};
 }
 
 wire::Envelope RegionRequest(const RegionQuery& query) {
@@ -149,31 +126,9 @@ AtlasClient& AtlasClient::operator=(AtlasClient&&) noexcept = default;
 AtlasClient::~AtlasClient() = default;
 
 Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
-  milliseconds ignored{0};
-  return Connect(options, ignored);
-}
-
-Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options,
-                                         milliseconds& retry_after) {
-  retry_after = milliseconds(0);
-  Result<DaemonConnection> connection =
-      DaemonConnection::Open(options.endpoint, options.connect_timeout, options.tls);
-  if (!connection) return Error(connection.error());
-  auto channel = std::make_unique<RpcChannel>(*std::move(connection), options.request_timeout,
-                                              options.max_retry_after);
-  wire::Envelope request = HelloRequest(options);
-  const milliseconds less =
-      std::min(options.connect_timeout - options.request_timeout, milliseconds(0));
-  const Result<wire::Envelope> reply = channel->Call(request, Body::kHelloReply, less);
-  retry_after = channel->retry_after();
-  if (!reply) return Error(reply.error());
-  const wire::HelloReply& hello = reply->hello_reply();
-  if (Status status = CheckVersion(hello, options.endpoint); !status.ok()) {
-    return Error(std::move(status));
-  }
-  const Result<MapProfile> profile = ProfileFromWire(hello.profile());
-  if (!profile) return Error(profile.error().WithContext("daemon's handshake"));
-  return AtlasClient(std::move(channel), *profile, IdentityFromWire(hello));
+  ConnectProgress progress = ConnectAttempt(options).Continue(options.connect_timeout);
+  if (!progress.client) return Error(std::move(progress.failure));
+  return *std::move(progress.client);
 }
 
 Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection> corrections,

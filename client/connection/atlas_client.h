@@ -13,6 +13,7 @@
 
 #include "client/connection/daemon_connection.h"
 #include "client/connection/endpoint.h"
+#include "client/connection/name_lookup.h"
 #include "client/connection/requests.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
@@ -23,25 +24,29 @@ class RpcChannel;
 
 struct ConnectionOptions {
   Endpoint endpoint;
-  std::string client_name = "libatlas_client";        // for the daemon's logs
-  std::optional<MapProfile> expected_profile;         // another one: refused by the daemon
-  std::optional<ConnectionTls> tls;                   // none: in the clear
-  std::string token;                                  // of a person; empty: none
-  std::chrono::milliseconds connect_timeout{5'000};   // to connect, and to shake hands
+  std::string client_name = "libatlas_client";  // for the daemon's logs
+  std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
+  std::optional<ConnectionTls> tls;             // none: in the clear
+  std::string token;                            // of a person; empty: none
+  // A session whose upload goes on: the handshake says how far the daemon has it
+  // (AtlasIdentity::last_sequence; docs/client.md says for whom that is enough).
+  std::optional<SessionKey> resume;
+  // From looking the host up to the end of the handshake, all of it.
+  std::chrono::milliseconds connect_timeout{5'000};
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
   // The most that is believed of a daemon that wants to be left alone; it asks for 1 s or 5 s.
   std::chrono::milliseconds max_retry_after{60'000};
+  std::shared_ptr<NameLookup>
+      names;  // for the endpoint's host; null: a new one that asks the system
 };
 
 class AtlasClient {
  public:
   using TileCallback = std::function<Status(TileBlob)>;
 
-  // Connects and shakes hands. kUnsupported when the daemon speaks another protocol version.
+  // Connects and shakes hands within `connect_timeout` (connect_attempt.h: over several calls).
+  // kUnsupported when the daemon speaks another protocol version.
   static Result<AtlasClient> Connect(const ConnectionOptions& options);
-  // The same; `retry_after` is set to how long a daemon that refused wants to be left alone, or 0.
-  static Result<AtlasClient> Connect(const ConnectionOptions& options,
-                                     std::chrono::milliseconds& retry_after);
 
   AtlasClient(const AtlasClient&) = delete;
   AtlasClient& operator=(const AtlasClient&) = delete;
@@ -96,6 +101,7 @@ class AtlasClient {
   std::uint64_t bytes_received() const;
 
  private:
+  friend class ConnectAttempt;
   friend class KeyframeUploader;
   AtlasClient(std::unique_ptr<RpcChannel> channel, const MapProfile& profile, AtlasIdentity atlas);
 

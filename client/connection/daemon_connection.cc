@@ -1,6 +1,9 @@
 #include "client/connection/daemon_connection.h"
 
+#include <algorithm>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
@@ -41,14 +44,18 @@ Status UseFiles(const ConnectionTls& tls, asio::ssl::context& context) {
 
 class DaemonConnection::Impl {
  public:
-  explicit Impl(Endpoint endpoint) : endpoint_(std::move(endpoint)), socket_(io_) {}
+  Impl(Endpoint endpoint, std::optional<ConnectionTls> tls, std::shared_ptr<NameLookup> names)
+      : endpoint_(std::move(endpoint)),
+        tls_options_(std::move(tls)),
+        names_(std::move(names)),
+        socket_(io_) {}
   ~Impl() { Close(); }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   Impl(Impl&&) = delete;
   Impl& operator=(Impl&&) = delete;
 
-  Status Open(milliseconds timeout, const std::optional<ConnectionTls>& tls);
+  Result<bool> Open(Clock::time_point latest, Clock::time_point deadline);
   Status Send(ByteSpan frame, milliseconds timeout);
   Result<Bytes> Receive(milliseconds timeout);
   Result<std::optional<Bytes>> Poll(milliseconds timeout);
@@ -58,7 +65,7 @@ class DaemonConnection::Impl {
   std::uint64_t bytes_received() const { return bytes_received_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
+  enum class Stage : std::uint8_t { kResolving, kConnecting, kEncrypting, kOpen };
 
   // Runs what was started until `done` is set or the time is over.
   void Run(const std::optional<error_code>& done, Clock::time_point deadline);
@@ -69,13 +76,23 @@ class DaemonConnection::Impl {
   void StartRead();
   // False when nothing came: the read goes on.
   Result<bool> ReadSome(Clock::time_point deadline);
-  Status Encrypt(const ConnectionTls& tls, Clock::time_point deadline);
-  Result<asio::ip::tcp::resolver::results_type> Resolve(Clock::time_point deadline);
+  // Ends a stage and begins the next; false when it has not ended at `latest`.
+  Result<bool> Step(Clock::time_point latest);
+  Result<bool> Resolve(Clock::time_point latest);
+  // Connected: encrypts, if it is to be.
+  Status BeginTalking();
+  std::string Doing() const;
+  const std::string& DaemonName() const;
   Status Fail(StatusCode code, const std::string& what);
   // With all that was started: it refers to our buffers.
   void Close();
 
   Endpoint endpoint_;
+  std::optional<ConnectionTls> tls_options_;
+  std::shared_ptr<NameLookup> names_;
+  Stage stage_ = Stage::kResolving;
+  std::vector<asio::ip::tcp::endpoint> addresses_;
+  std::optional<error_code> opened_;  // of the stage
   asio::io_context io_;
   asio::ip::tcp::socket socket_;
   asio::ssl::context tls_context_{asio::ssl::context::tlsv13_client};
@@ -121,49 +138,72 @@ Status DaemonConnection::Impl::Finish(const std::optional<error_code>& done,
   return {};
 }
 
-Result<asio::ip::tcp::resolver::results_type> DaemonConnection::Impl::Resolve(
-    Clock::time_point deadline) {
-  asio::ip::tcp::resolver resolver(io_);
-  std::optional<error_code> done;
-  asio::ip::tcp::resolver::results_type found;
-  resolver.async_resolve(endpoint_.host, std::to_string(endpoint_.port),
-                         asio::ip::tcp::resolver::numeric_service,
-                         [&](const error_code& error, auto results) {
-                           done = error;
-                           found = std::move(results);
-                         });
-  if (Status status = Finish(done, deadline, "resolving its name"); !status.ok()) {
-    return Error(std::move(status));
+Result<bool> DaemonConnection::Impl::Open(Clock::time_point latest, Clock::time_point deadline) {
+  if (!failure_.ok()) return Error(failure_);
+  while (stage_ != Stage::kOpen) {
+    const Result<bool> is_done = Step(std::min(latest, deadline));
+    if (!is_done) return is_done;
+    if (*is_done) continue;
+    if (Clock::now() < deadline) return false;
+    return Error(Fail(StatusCode::kTimeout, "timed out while " + Doing()));
   }
-  return found;
+  return true;
 }
 
-Status DaemonConnection::Impl::Open(milliseconds timeout, const std::optional<ConnectionTls>& tls) {
-  const Clock::time_point deadline = Clock::now() + timeout;
-  const auto addresses = Resolve(deadline);
-  if (!addresses) return addresses.error();
-  std::optional<error_code> done;
-  asio::async_connect(socket_, *addresses,
-                      [&](const error_code& error, const auto&) { done = error; });
-  ATLAS_RETURN_IF_ERROR(Finish(done, deadline, "connecting"));
-  error_code error;
-  socket_.set_option(asio::ip::tcp::no_delay(true), error);
-  if (error) return Fail(StatusCode::kUnavailable, error.message());
-  return tls ? Encrypt(*tls, deadline) : Status();
+Result<bool> DaemonConnection::Impl::Step(Clock::time_point latest) {
+  if (stage_ == Stage::kResolving) return Resolve(latest);
+  Run(opened_, latest);
+  if (!opened_) return false;
+  if (*opened_) {
+    return Error(Fail(StatusCode::kUnavailable, StrCat(Doing(), ": ", opened_->message())));
+  }
+  Status begun = stage_ == Stage::kConnecting ? BeginTalking() : Status();
+  if (!begun.ok()) return Error(std::move(begun));
+  stage_ = stage_ == Stage::kConnecting && tls_options_ ? Stage::kEncrypting : Stage::kOpen;
+  return true;
 }
 
-Status DaemonConnection::Impl::Encrypt(const ConnectionTls& tls, Clock::time_point deadline) {
-  if (Status status = UseFiles(tls, tls_context_); !status.ok()) {
+std::string DaemonConnection::Impl::Doing() const {
+  if (stage_ == Stage::kResolving) return "resolving its name";
+  if (stage_ == Stage::kConnecting) return "connecting";
+  return "a TLS handshake, expecting " + DaemonName();
+}
+
+const std::string& DaemonConnection::Impl::DaemonName() const {
+  return tls_options_->daemon_name.empty() ? endpoint_.host : tls_options_->daemon_name;
+}
+
+Result<bool> DaemonConnection::Impl::Resolve(Clock::time_point latest) {
+  const auto found = names_->Find(endpoint_.host, latest);
+  if (!found)
+    return Error(Fail(found.error().code(), StrCat(Doing(), ": ", found.error().message())));
+  if (!*found) return false;
+  for (const std::string& text : **found) {
+    error_code error;
+    const auto address = asio::ip::make_address(text, error);
+    if (!error) addresses_.emplace_back(address, endpoint_.port);
+  }
+  stage_ = Stage::kConnecting;
+  asio::async_connect(socket_, addresses_,
+                      [this](const error_code& error, const auto&) { opened_ = error; });
+  return true;
+}
+
+Status DaemonConnection::Impl::BeginTalking() {
+  error_code refused;
+  socket_.set_option(asio::ip::tcp::no_delay(true), refused);
+  if (refused) return Fail(StatusCode::kUnavailable, refused.message());
+  if (!tls_options_) return {};
+  if (Status status = UseFiles(*tls_options_, tls_context_); !status.ok()) {
     return Fail(status.code(), status.message());
   }
-  const std::string& name = tls.daemon_name.empty() ? endpoint_.host : tls.daemon_name;
+  opened_.reset();
   tls_.emplace(socket_, tls_context_);
   tls_->set_verify_mode(asio::ssl::verify_peer);
-  tls_->set_verify_callback(asio::ssl::host_name_verification(name));
-  std::optional<error_code> done;
+  tls_->set_verify_callback(asio::ssl::host_name_verification(DaemonName()));
   tls_->async_handshake(asio::ssl::stream_base::client,
-                        [&](const error_code& error) { done = error; });
-  return Finish(done, deadline, StrCat("a TLS handshake, expecting ", name).c_str());
+                        [this](const error_code& error) { opened_ = error; });
+  return {};
 }
 
 Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
@@ -232,17 +272,16 @@ Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
   return **std::move(payload);
 }
 
-DaemonConnection::DaemonConnection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DaemonConnection::DaemonConnection(const Endpoint& endpoint,
+                                   const std::optional<ConnectionTls>& tls,
+                                   std::shared_ptr<NameLookup> names)
+    : impl_(std::make_unique<Impl>(endpoint, tls, std::move(names))) {}
 DaemonConnection::DaemonConnection(DaemonConnection&&) noexcept = default;
 DaemonConnection& DaemonConnection::operator=(DaemonConnection&&) noexcept = default;
 DaemonConnection::~DaemonConnection() = default;
 
-Result<DaemonConnection> DaemonConnection::Open(const Endpoint& endpoint,
-                                                milliseconds timeout,
-                                                const std::optional<ConnectionTls>& tls) {
-  auto impl = std::make_unique<Impl>(endpoint);
-  if (Status status = impl->Open(timeout, tls); !status.ok()) return Error(std::move(status));
-  return DaemonConnection(std::move(impl));
+Result<bool> DaemonConnection::Open(Clock::time_point latest, Clock::time_point deadline) {
+  return impl_->Open(latest, deadline);
 }
 
 Status DaemonConnection::Send(ByteSpan frame, milliseconds timeout) {

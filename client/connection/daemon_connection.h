@@ -1,5 +1,6 @@
-// A TCP connection to a daemon that carries whole frames: blocking, every wait with a deadline. One
-// thread at a time. Knows bytes, not messages.
+// A TCP connection to a daemon that carries whole frames: blocking, every wait with a deadline. It
+// is made in steps, so that a slow one may outlive the call that began it. One thread at a time.
+// Knows bytes, not messages.
 #pragma once
 
 #include <chrono>
@@ -10,6 +11,7 @@
 #include <string>
 
 #include "client/connection/endpoint.h"
+#include "client/connection/name_lookup.h"
 #include "core/base/bytes.h"
 #include "core/base/status.h"
 
@@ -25,11 +27,12 @@ struct ConnectionTls {
 
 class DaemonConnection {
  public:
-  // kUnavailable when nobody listens there or the handshake fails, kTimeout after `timeout`.
-  // kInvalidArgument names a file that is of no use.
-  static Result<DaemonConnection> Open(const Endpoint& endpoint,
-                                       std::chrono::milliseconds timeout,
-                                       const std::optional<ConnectionTls>& tls = std::nullopt);
+  using Clock = std::chrono::steady_clock;
+
+  // Not connected yet. `names` is asked for the endpoint's host.
+  DaemonConnection(const Endpoint& endpoint,
+                   const std::optional<ConnectionTls>& tls,
+                   std::shared_ptr<NameLookup> names);
 
   DaemonConnection(const DaemonConnection&) = delete;
   DaemonConnection& operator=(const DaemonConnection&) = delete;
@@ -37,6 +40,11 @@ class DaemonConnection {
   DaemonConnection& operator=(DaemonConnection&&) noexcept;
   ~DaemonConnection();
 
+  // Looks the host up, connects and encrypts: true when all that is done. False when it is not done
+  // at `latest`: the next call goes on with it. kUnavailable when nobody listens there or the
+  // handshake fails, kTimeout when it is not done at `deadline`. kInvalidArgument names a file that
+  // is of no use.
+  Result<bool> Open(Clock::time_point latest, Clock::time_point deadline);
   // A whole frame, header included. After a failure the connection is closed and every further call
   // returns that failure.
   Status Send(ByteSpan frame, std::chrono::milliseconds timeout);
@@ -53,7 +61,6 @@ class DaemonConnection {
 
  private:
   class Impl;
-  explicit DaemonConnection(std::unique_ptr<Impl> impl);
 
   std::unique_ptr<Impl> impl_;
 };

@@ -26,6 +26,9 @@ struct AtlasIdentity {
   std::uint32_t protocol_minor = 0;  // that its daemon speaks
   std::string our_name;              // whom it takes us for; empty: nobody in particular
   std::string our_role;  // "reader", "vehicle", "merge" or "admin"; empty: an older daemon
+  // Of the session in ConnectionOptions::resume: the highest sequence number that is there. None:
+  // nothing is, nothing was asked, or an older daemon (before 1.5).
+  std::optional<std::uint32_t> last_sequence = std::nullopt;
 };
 
 struct KeyframeUpload {

@@ -46,12 +46,16 @@ Result<wire::Envelope> RpcChannel::Receive(Milliseconds extra) {
 
 Result<wire::Envelope> RpcChannel::Read(ByteSpan payload) {
   waiting_since_ = Clock::now();
+  refused_id_.reset();
   last_frame_bytes_ = kFrameHeaderBytes + payload.size();
   Result<wire::Envelope> reply = ParseEnvelope(payload);
   if (!reply) {
     return Error(reply.error().WithContext("daemon at " + connection_.endpoint().ToText()));
   }
-  if (reply->has_error()) NoteRetryAfter(reply->error());
+  if (reply->has_error()) {
+    refused_id_ = reply->request_id();
+    NoteRetryAfter(reply->error());
+  }
   if (reply->request_id() == 0 && reply->has_error()) {
     return Error(ErrorFromWire(reply->error()).status);
   }

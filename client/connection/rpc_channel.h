@@ -48,6 +48,8 @@ class RpcChannel {
   // The reply is one that no caller expects.
   Status Unexpected(const wire::Envelope& reply) const;
   std::uint64_t last_id() const { return last_id_; }
+  // Whether the last frame that came was an Error to this request.
+  bool has_refused(std::uint64_t id) const { return refused_id_ == id; }
   // How long the daemon still wants to be left alone, by what it refused so far; 0: it does not.
   Milliseconds retry_after() const;
   // Of the frame received last, its header included.
@@ -66,6 +68,7 @@ class RpcChannel {
   Clock::time_point retry_at_ = Clock::time_point::min();
   Clock::time_point waiting_since_ = Clock::now();  // for a frame
   std::uint64_t last_id_ = 0;
+  std::optional<std::uint64_t> refused_id_;  // by the last frame
   std::uint64_t last_frame_bytes_ = 0;
 };
 

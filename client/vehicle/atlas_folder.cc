@@ -88,6 +88,12 @@ void NoteOpened(const fs::path& root, const fs::path& folder) {
 
 }  // namespace
 
+Status AtlasKey::Validate() const {
+  if (atlas_id.size() == kAtlasIdBytes) return {};
+  return {StatusCode::kInvalidArgument, StrCat("tile files: an atlas id of ", atlas_id.size(),
+                                               " bytes, expected ", kAtlasIdBytes)};
+}
+
 std::vector<fs::path> AtlasFolders(const fs::path& root) {
   // By name among those opened at the same time.
   std::vector<std::tuple<fs::file_time_type, fs::path>> found;
@@ -119,11 +125,7 @@ std::vector<AtlasKey> KnownAtlases(const fs::path& root) {
 }
 
 Result<fs::path> OpenAtlasFolder(const fs::path& root, const AtlasKey& atlas) {
-  if (atlas.atlas_id.size() != kAtlasIdBytes) {
-    return Error(StatusCode::kInvalidArgument,
-                 StrCat("tile files: an atlas id of ", atlas.atlas_id.size(), " bytes, expected ",
-                        kAtlasIdBytes));
-  }
+  if (Status status = atlas.Validate(); !status.ok()) return Error(std::move(status));
   const fs::path folder = root / NameOf(atlas.atlas_id);
   if (Status status = MakeFolder(folder); !status.ok()) return Error(std::move(status));
   const auto known = Read(folder);

@@ -18,6 +18,8 @@ struct AtlasKey {
   Bytes atlas_id;  // 16 bytes
   MapProfile profile;
 
+  // kInvalidArgument: an id that is none.
+  Status Validate() const;
   friend bool operator==(const AtlasKey&, const AtlasKey&) = default;
 };
 

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "client/vehicle/stored_file.h"
+#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -33,8 +34,8 @@ std::string NumberedName(std::uint64_t number, std::string_view suffix) {
   return StrCat(std::string(kDigits - std::min(kDigits, digits.size()), '0'), digits, suffix);
 }
 
-std::map<std::uint64_t, std::uint64_t> NumberedFiles(const fs::path& folder,
-                                                     std::string_view suffix) {
+Result<std::map<std::uint64_t, std::uint64_t>> NumberedFiles(const fs::path& folder,
+                                                             std::string_view suffix) {
   std::map<std::uint64_t, std::uint64_t> files;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
@@ -46,6 +47,7 @@ std::map<std::uint64_t, std::uint64_t> NumberedFiles(const fs::path& folder,
     const std::uint64_t bytes = entry->file_size(unreadable);
     if (number && !unreadable) files[*number] = bytes;
   }
+  if (error) return Error(DiskError("cannot read folder", folder, error.value()));
   return files;
 }
 

@@ -1,6 +1,7 @@
 #include "client/vehicle/stored_file.h"
 
 #include <cerrno>
+#include <cstdio>
 #include <system_error>
 
 #include <fcntl.h>
@@ -59,13 +60,21 @@ int SyncFolder(const fs::path& folder) {
   return file.fd() >= 0 && fsync(file.fd()) == 0 ? 0 : errno;
 }
 
-}  // namespace
+// As rename, but EEXIST where something is.
+int RenameToNew(const char* from, const char* to) {
+  if (renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return -1;
+  // A file system that cannot do that in one step: for a moment it has both names.
+  return link(from, to) == 0 ? unlink(from) : -1;
+}
 
-Status StoreFile(const fs::path& path, ByteSpan bytes, Durability durability) {
+using Rename = int (*)(const char*, const char*);
+
+Status Store(const fs::path& path, ByteSpan bytes, Durability durability, Rename rename_to) {
   fs::path partial = path;
   partial += kPartialSuffix;
   int error = WritePartial(partial, bytes, durability);
-  if (error == 0 && rename(partial.c_str(), path.c_str()) != 0) error = errno;
+  if (error == 0 && rename_to(partial.c_str(), path.c_str()) != 0) error = errno;
   if (error != 0) {
     unlink(partial.c_str());
     return DiskError("cannot write", path, error);
@@ -75,6 +84,16 @@ Status StoreFile(const fs::path& path, ByteSpan bytes, Durability durability) {
   if (error == 0) return {};
   unlink(path.c_str());
   return DiskError("cannot write", path, error);
+}
+
+}  // namespace
+
+Status StoreFile(const fs::path& path, ByteSpan bytes, Durability durability) {
+  return Store(path, bytes, durability, &rename);
+}
+
+Status StoreNewFile(const fs::path& path, ByteSpan bytes) {
+  return Store(path, bytes, Durability::kOnDevice, &RenameToNew);
 }
 
 Result<Bytes> LoadFile(const fs::path& path, std::uint64_t max_bytes) {
@@ -112,7 +131,7 @@ Status MakeFolder(const fs::path& folder) {
 }
 
 Status MoveFile(const fs::path& from, const fs::path& to) {
-  if (rename(from.c_str(), to.c_str()) != 0) return DiskError("cannot move", from, errno);
+  if (RenameToNew(from.c_str(), to.c_str()) != 0) return DiskError("cannot move", from, errno);
   int error = SyncFolder(to.parent_path());
   if (error == 0) error = SyncFolder(from.parent_path());
   return error == 0 ? Status() : DiskError("cannot move", from, error);

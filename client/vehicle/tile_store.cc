@@ -6,6 +6,7 @@
 #include "client/vehicle/area_bounds.h"
 #include "client/vehicle/area_touch.h"
 #include "client/vehicle/held_summary.h"
+#include "client/vehicle/stored_file.h"
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
 #include "core/tile/tile_container.h"
@@ -50,12 +51,17 @@ TileStore::TileStore(AtlasKey atlas, const TileStoreOptions& options)
 Result<TileStore> TileStore::Open(AtlasKey atlas, const TileStoreOptions& options) {
   TileStore store(std::move(atlas), options);
   if (options.folder.empty()) return store;
+  if (Status status = store.atlas_.Validate(); !status.ok()) return Error(std::move(status));
   store.disk_problem_ = store.OpenFolder();
-  if (store.disk_problem_.code() == StatusCode::kInvalidArgument) return Error(store.disk_problem_);
   return store;
 }
 
 Status TileStore::OpenFolder() {
+  ATLAS_RETURN_IF_ERROR(MakeFolder(options_.folder));
+  Result<FolderLock> lock = FolderLock::Take(options_.folder);
+  // A disk that takes no lock, because it is only read, is used by anybody without harm.
+  if (!lock && lock.error().code() == StatusCode::kConflict) return lock.error();
+  if (lock) lock_ = *std::move(lock);
   Result<TileFiles> files = TileFiles::Open(options_.folder, atlas_);
   if (!files) return files.error();
   files_ = *std::move(files);

@@ -13,6 +13,7 @@
 
 #include "client/connection/requests.h"
 #include "client/vehicle/eviction_order.h"
+#include "client/vehicle/folder_lock.h"
 #include "client/vehicle/other_atlases.h"
 #include "client/vehicle/tile_files.h"
 #include "core/base/status.h"
@@ -37,8 +38,9 @@ struct AskedSections {
 
 class TileStore {
  public:
-  // Reads the folder's names, no tile. A folder that the disk does not let it make or use leaves a
-  // store in memory, and disk_problem says why. kInvalidArgument: an atlas id that is none.
+  // Reads the folder's names, no tile. A folder that the disk does not let it make or use, or that
+  // another store has (kConflict), leaves a store in memory, and disk_problem says why.
+  // kInvalidArgument: an atlas id that is none.
   static Result<TileStore> Open(AtlasKey atlas, const TileStoreOptions& options);
 
   TileStore(const TileStore&) = delete;  // its orders point into themselves
@@ -96,6 +98,7 @@ class TileStore {
 
   AtlasKey atlas_;
   TileStoreOptions options_;
+  std::optional<FolderLock> lock_;  // of the folder, with all atlases in it
   std::optional<TileFiles> files_;
   OtherAtlases others_;
   Entries tiles_;

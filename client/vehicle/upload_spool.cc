@@ -31,15 +31,22 @@ std::uint64_t Sum(const std::map<std::uint64_t, std::uint64_t>& files) {
 }  // namespace
 
 Result<UploadSpool> UploadSpool::Open(const SpoolOptions& options) {
-  UploadSpool spool(options);
+  if (Status status = MakeFolder(options.folder); !status.ok()) return Error(std::move(status));
+  Result<FolderLock> lock = FolderLock::Take(options.folder);
+  if (!lock) return Error(lock.error().WithContext("upload spool"));
+  UploadSpool spool(options, *std::move(lock));
   if (Status status = spool.Scan(); !status.ok()) return Error(std::move(status));
   return spool;
 }
 
 Status UploadSpool::Scan() {
   ATLAS_RETURN_IF_ERROR(MakeFolder(refused_folder()));
-  waiting_ = NumberedFiles(options_.folder, kSuffix);
-  refused_ = NumberedFiles(refused_folder(), kSuffix);
+  auto waiting = NumberedFiles(options_.folder, kSuffix);
+  if (!waiting) return waiting.error();
+  auto refused = NumberedFiles(refused_folder(), kSuffix);
+  if (!refused) return refused.error();
+  waiting_ = *std::move(waiting);
+  refused_ = *std::move(refused);
   waiting_bytes_ = Sum(waiting_);
   refused_bytes_ = Sum(refused_);
   for (const auto* files : {&waiting_, &refused_}) {
@@ -64,7 +71,12 @@ Status UploadSpool::Put(const KeyframeUpload& upload) {
             StrCat("upload spool: ", waiting_.size(), " keyframes of ", waiting_bytes_,
                    " bytes wait, no room for ", file.size(), " more of ", options_.max_bytes)};
   }
-  ATLAS_RETURN_IF_ERROR(StoreFile(PathOf(next_), file, Durability::kOnDevice));
+  Status stored = StoreNewFile(PathOf(next_), file);
+  // Somebody put a file there by hand: it is sent when the spool is opened the next time.
+  while (stored.code() == StatusCode::kConflict) {
+    stored = StoreNewFile(PathOf(++next_), file);
+  }
+  ATLAS_RETURN_IF_ERROR(stored);
   waiting_[next_++] = file.size();
   waiting_bytes_ += file.size();
   return {};

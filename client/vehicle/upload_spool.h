@@ -1,16 +1,18 @@
 // Keyframes wait on the vehicle's disk until the daemon has them on its own: nothing that Put
 // accepted is lost with the program, the link or the power. One file a keyframe, numbered in the
-// order of Put. One thread at a time, one process a folder.
+// order of Put. One thread at a time, and one spool a folder, which it holds locked.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "client/connection/atlas_client.h"
 #include "client/connection/keyframe_uploader.h"
+#include "client/vehicle/folder_lock.h"
 #include "core/base/status.h"
 
 namespace atlas {
@@ -37,7 +39,8 @@ struct SpoolReport {
 
 class UploadSpool {
  public:
-  // What a killed program left is put in order. Reads names only.
+  // What a killed program left is put in order. Reads names only. kConflict: another spool has the
+  // folder.
   static Result<UploadSpool> Open(const SpoolOptions& options);
 
   // On the disk when it returns. kResourceExhausted when there is no room, kInvalidArgument for a
@@ -63,7 +66,8 @@ class UploadSpool {
   using Number = std::uint64_t;
   class Sending;
 
-  explicit UploadSpool(SpoolOptions options) : options_(std::move(options)) {}
+  UploadSpool(SpoolOptions options, FolderLock lock)
+      : options_(std::move(options)), lock_(std::move(lock)) {}
   Status Scan();
   void Remove(Number number);
   // Moves it out of the queue, the reason first. kNotFound: it vanished, and waits no more.
@@ -76,6 +80,7 @@ class UploadSpool {
   std::filesystem::path PathOf(Number number) const;
 
   SpoolOptions options_;
+  FolderLock lock_;
   std::map<Number, std::uint64_t> waiting_;  // with the bytes of each
   std::map<Number, std::uint64_t> refused_;
   std::map<Number, int> failures_;  // of the daemon, at waiting ones

@@ -29,20 +29,6 @@ TEST(AtlasClientTest, NobodyListensIsUnavailable) {
   EXPECT_NE(client.error().message().find(endpoint.ToText()), std::string::npos);
 }
 
-TEST(AtlasClientTest, SilentPeerIsTimeout) {
-  EXPECT_EQ(ConnectCode([](PeerSocket& socket) { socket.Drain(); }), StatusCode::kTimeout);
-}
-
-TEST(AtlasClientTest, SilentPeerHoldsAConnectNoLongerThanItsTimeout) {
-  TestPeer peer([](PeerSocket& socket) { socket.Drain(); });
-  ConnectionOptions options = peer.options();
-  options.connect_timeout = std::chrono::milliseconds(100);
-  options.request_timeout = std::chrono::hours(1);
-  const auto client = AtlasClient::Connect(options);
-  ASSERT_FALSE(client);
-  EXPECT_EQ(client.error().code(), StatusCode::kTimeout);
-}
-
 TEST(AtlasClientTest, PeerThatClosesIsUnavailable) {
   EXPECT_EQ(ConnectCode([](PeerSocket& socket) { socket.ReadRequest(); }),
             StatusCode::kUnavailable);

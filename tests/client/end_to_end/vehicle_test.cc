@@ -96,6 +96,41 @@ TEST_F(VehicleTest, ACutReplyLeavesAMapAndTheNextSyncCompletesIt) {
   EXPECT_EQ(Held(store), atlas);
 }
 
+TEST_F(VehicleTest, AfterACutTheHandshakeSaysHowFarASessionIsThere) {
+  DaemonProcess daemon(NewData(), kSmall);
+  const Endpoint endpoint = *Endpoint::Parse(daemon.address());
+  const auto ingest = [](const std::string& address) {
+    return RunAtlas(address, {"ingest", shared_drive.string(), "--max-range", "12", "--every", "0",
+                              "--vehicle", "car", "--session", "monday", "--batch", "1"});
+  };
+  const auto last_sequence = [&endpoint](const std::string& session) {
+    ConnectionOptions options;
+    options.endpoint = endpoint;
+    options.resume = SessionKey{"car", session};
+    const auto client = AtlasClient::Connect(options);
+    EXPECT_TRUE(client) << client.error().message();
+    return client ? client->atlas().last_sequence : std::nullopt;
+  };
+  const auto listed = [&endpoint] {
+    const auto sessions = Connect(endpoint).ListSessions();
+    EXPECT_TRUE(sessions && !sessions->empty());
+    return sessions && !sessions->empty() ? std::optional(sessions->front().last_sequence)
+                                          : std::nullopt;
+  };
+  EXPECT_EQ(last_sequence("monday"), std::nullopt);
+  {
+    CutProxy proxy(endpoint, 400);
+    EXPECT_NE(ingest(proxy.endpoint().ToText()).exit_code, 0);
+  }
+  const auto cut = last_sequence("monday");
+  EXPECT_TRUE(cut);
+  EXPECT_EQ(cut, listed());
+  ASSERT_EQ(ingest(daemon.address()).exit_code, 0);
+  EXPECT_GT(last_sequence("monday"), cut);
+  EXPECT_EQ(last_sequence("monday"), listed());
+  EXPECT_EQ(last_sequence("tuesday"), std::nullopt);
+}
+
 TEST_F(VehicleTest, WhatTheDaemonRefusesForGoodIsSetAside) {
   DaemonProcess daemon(NewData(), kSmall);
   UploadSpool spool = *UploadSpool::Open({.folder = shared_root / "spool"});

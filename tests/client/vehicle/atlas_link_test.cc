@@ -12,14 +12,17 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Connections that fail as scripted; at the script's end they succeed.
+// Attempts that fail as scripted; at the script's end they succeed.
 class LinkWorld {
  public:
   std::deque<Status> failures;
   double random = 0.999999;
   milliseconds retry_after{0};  // that failures ask for
+  bool is_final = false;        // that failures are
+  int slow_calls = 0;           // after which an attempt ends
+  int attempts = 0;
   std::vector<milliseconds> pauses;
-  std::vector<milliseconds> timeouts;
+  std::vector<milliseconds> timeouts;  // of each call
 
   LinkEnvironment environment() {
     return {[this] { return now_; },
@@ -28,18 +31,31 @@ class LinkWorld {
               now_ += pause;
             },
             [this] { return random; },
-            [this](const ConnectionOptions& options, milliseconds& asked) -> Result<AtlasClient> {
-              timeouts.push_back(options.connect_timeout);
-              if (failures.empty()) return AtlasClient::Connect(peer_.options());
-              const Status failure = failures.front();
-              failures.pop_front();
-              asked = retry_after;
-              return Error(failure);
+            [this](const ConnectionOptions&) {
+              ++attempts;
+              return [this](milliseconds time) {
+                return Continue(time);
+              };
             }};
   }
   void Pass(milliseconds time) { now_ += time; }
 
  private:
+  ConnectProgress Continue(milliseconds time) {
+    timeouts.push_back(time);
+    ConnectProgress progress;
+    if (slow_calls-- > 0) return progress;
+    if (failures.empty()) {
+      progress.client = std::move(*AtlasClient::Connect(peer_.options()));
+      return progress;
+    }
+    progress.failure = failures.front();
+    progress.retry_after = retry_after;
+    progress.is_final = is_final;
+    failures.pop_front();
+    return progress;
+  }
+
   LinkEnvironment::Clock::time_point now_{};
   TinyWorld map_;
   SyncPeer peer_{map_};
@@ -101,8 +117,11 @@ TEST(AtlasLinkTest, WhatARefusedRequestAskedForHoldsForTheNextConnection) {
   LinkWorld world;
   world.random = 0.0;
   LinkEnvironment environment = world.environment();
-  environment.connect = [&busy](const ConnectionOptions&, milliseconds& retry_after) {
-    return AtlasClient::Connect(busy.options(), retry_after);
+  environment.connect = [&busy](const ConnectionOptions&) {
+    const auto attempt = std::make_shared<ConnectAttempt>(busy.options());
+    return [attempt](milliseconds) {
+      return attempt->Continue(milliseconds(2'000));
+    };
   };
   AtlasLink link({}, environment);
   const auto client = link.Client(milliseconds(50));
@@ -148,19 +167,74 @@ TEST(AtlasLinkTest, ADeadlineEndsTheWait) {
   EXPECT_LE(slept, milliseconds(5'000));
 }
 
+TEST(AtlasLinkTest, AnAttemptGoesOnInTheNextCall) {
+  LinkWorld world;
+  world.slow_calls = 5;
+  AtlasLink link({}, world.environment());
+  for (int call = 0; call < 5; ++call) {
+    const auto client = link.Client(milliseconds(50));
+    ASSERT_FALSE(client);
+    EXPECT_EQ(client.error().code(), StatusCode::kUnavailable);
+    EXPECT_NE(client.error().message().find("connecting"), std::string::npos);
+  }
+  EXPECT_TRUE(link.Client(milliseconds(50)));
+  EXPECT_EQ(world.attempts, 1);
+  EXPECT_EQ(world.timeouts, std::vector<milliseconds>(6, milliseconds(50)));
+}
+
+TEST(AtlasLinkTest, AnAttemptThatFailsInALaterCallBacksOff) {
+  LinkWorld world;
+  world.slow_calls = 1;
+  world.failures = {kAway};
+  AtlasLink link({}, world.environment());
+  EXPECT_FALSE(link.Client(milliseconds(50)));
+  EXPECT_EQ(link.Client(milliseconds(50)).error(), kAway);
+  EXPECT_FALSE(link.Client(milliseconds(50)));
+  EXPECT_EQ(world.attempts, 1);
+  world.Pass(milliseconds(500));
+  EXPECT_TRUE(link.Client(milliseconds(50)));
+  EXPECT_EQ(world.attempts, 2);
+}
+
 TEST(AtlasLinkTest, WhatWillFailAgainIsNotTriedAgain) {
-  for (const StatusCode code : {StatusCode::kInvalidData, StatusCode::kPermissionDenied,
-                                StatusCode::kUnsupported, StatusCode::kInvalidArgument}) {
+  for (const StatusCode code : {StatusCode::kInvalidData, StatusCode::kUnsupported}) {
     LinkWorld world;
     world.failures = {{code, "never"}};
+    world.is_final = true;
     AtlasLink link({}, world.environment());
     EXPECT_EQ(link.Wait(milliseconds(60'000)).error().code(), code);
     EXPECT_EQ(link.Wait(milliseconds(60'000)).error().code(), code);
-    EXPECT_EQ(world.timeouts.size(), 1U);
+    EXPECT_EQ(world.attempts, 1);
     EXPECT_EQ(link.refusal().code(), code);
     link.TryAgain();
     EXPECT_TRUE(link.Wait(milliseconds(60'000)));
   }
+}
+
+// A captive portal, a proxy without its daemon.
+TEST(AtlasLinkTest, AnAnswerThatMakesNoSenseIsABrokenLink) {
+  LinkWorld world;
+  world.failures = {{StatusCode::kInvalidData, "not a frame"}};
+  AtlasLink link({}, world.environment());
+  EXPECT_FALSE(link.Client(milliseconds(50)));
+  EXPECT_TRUE(link.refusal().ok());
+  EXPECT_TRUE(link.Wait(milliseconds(1'000)));
+  EXPECT_EQ(world.attempts, 2);
+}
+
+TEST(AtlasLinkTest, AMissingPermissionIsAskedForOnceAMinute) {
+  const Status denied(StatusCode::kPermissionDenied, "who are you?");
+  LinkWorld world;
+  world.failures.assign(3, denied);
+  AtlasLink link({}, world.environment());
+  EXPECT_EQ(link.Wait(milliseconds(1'000)).error(), denied) << "at once: no attempt comes within";
+  EXPECT_TRUE(link.refusal().ok());
+  world.random = 0.0;
+  EXPECT_TRUE(link.Wait(milliseconds(300'000)));
+  ASSERT_EQ(world.pauses.size(), 3U);
+  EXPECT_NEAR(static_cast<double>(world.pauses[0].count()), 60'000, 1.0);
+  EXPECT_EQ(world.pauses[1], milliseconds(30'000));
+  EXPECT_EQ(world.pauses[2], milliseconds(30'000));
 }
 
 TEST(AtlasLinkTest, AnotherAtlasIsRefused) {

@@ -300,6 +300,10 @@ void SyncPeer::Serve(PeerSocket& socket) {
   reply.set_protocol_minor(kProtocolMinor);
   reply.set_profile(ProfileToWire(TinyProfile()));
   reply.set_atlas_id(BytesToWire(TinyAtlas().atlas_id));
+  {
+    std::unique_lock lock(mutex_);
+    released_.wait_for(lock, std::chrono::seconds(10), [this] { return !is_greeting_held_; });
+  }
   socket.Reply(hello->request_id(), std::move(greeting));
   while (const auto request = socket.ReadRequest()) {
     ++syncs_;
@@ -331,8 +335,17 @@ void SyncPeer::FallSilentAfter(int frames) {
   frames_until_silence_ = frames;
 }
 
+void SyncPeer::HoldGreeting() {
+  const std::scoped_lock lock(mutex_);
+  is_greeting_held_ = true;
+}
+
 void SyncPeer::Release() {
-  FallSilentAfter(kNever);
+  {
+    const std::scoped_lock lock(mutex_);
+    is_greeting_held_ = false;
+    frames_until_silence_ = kNever;
+  }
   released_.notify_all();
 }
 

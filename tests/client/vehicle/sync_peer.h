@@ -61,6 +61,8 @@ class SyncPeer {
   SyncPeer(SyncPeer&&) = delete;
   SyncPeer& operator=(SyncPeer&&) = delete;
 
+  // The answer to the Hello waits until it is released.
+  void HoldGreeting();
   // In the middle of the frame after `frames` more it falls silent, until it is released.
   void FallSilentAfter(int frames);
   void Release();
@@ -76,6 +78,7 @@ class SyncPeer {
   const TinyWorld& world_;
   std::mutex mutex_;
   std::condition_variable released_;
+  bool is_greeting_held_ = false;
   int frames_until_silence_ = kNever;
   int frames_left_;
   std::atomic<int> syncs_{0};

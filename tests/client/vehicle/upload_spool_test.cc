@@ -1,95 +1,14 @@
-// What was put is sent or waits, whatever the link, the daemon and the disk do.
+// What was put is sent or waits, whatever the link and the disk do.
 #include "client/vehicle/upload_spool.h"
 
 #include <fstream>
-#include <mutex>
 
 #include <gtest/gtest.h>
 
-#include "proto/wire/convert.h"
-#include "tests/client/support/test_peer.h"
-#include "tests/client/vehicle/test_folder.h"
+#include "tests/client/vehicle/spool_peer.h"
 
 namespace atlas {
 namespace {
-
-namespace fs = std::filesystem;
-
-// A daemon that remembers the sequence numbers it took, refuses as told, and leaves after so many.
-class UploadPeer {
- public:
-  explicit UploadPeer(std::map<std::uint32_t, Status> refusals = {}, int answers = 1 << 30)
-      : refusals_(std::move(refusals)),
-        answers_(answers),
-        peer_([this](PeerSocket& socket) { Serve(socket); }) {}
-
-  Result<SpoolReport> Take(UploadSpool& spool) {
-    auto client = AtlasClient::Connect(peer_.options());
-    return client ? spool.Send(*client) : Result<SpoolReport>(Error(client.error()));
-  }
-  std::vector<std::uint32_t> came() {
-    const std::lock_guard lock(mutex_);
-    return came_;
-  }
-
- private:
-  void Serve(PeerSocket& socket) {
-    AnswerHello(socket, {});
-    while (const auto request = socket.ReadRequest()) {
-      if (answers_-- <= 0) return;
-      const std::uint32_t sequence = request->upload_keyframe().key().sequence();
-      wire::Envelope reply;
-      const auto refusal = refusals_.find(sequence);
-      if (refusal != refusals_.end()) {
-        *reply.mutable_error() = ErrorToWire(refusal->second);
-      } else {
-        const std::lock_guard lock(mutex_);
-        came_.push_back(sequence);
-        reply.mutable_upload_reply()->set_revision(1);
-      }
-      socket.Reply(request->request_id(), std::move(reply));
-    }
-  }
-
-  std::map<std::uint32_t, Status> refusals_;
-  int answers_;
-  std::mutex mutex_;
-  std::vector<std::uint32_t> came_;
-  TestPeer peer_;
-};
-
-Status PutOne(UploadSpool& spool, std::uint32_t sequence, std::size_t bytes = 100) {
-  const Bytes blob(bytes, static_cast<std::uint8_t>(sequence));
-  KeyframeUpload upload;
-  upload.key = {{"car", "monday"}, sequence};
-  upload.time_ms = 1'000 + sequence;
-  upload.blob = blob;
-  return spool.Put(upload);
-}
-
-UploadSpool OpenSpool(const TestFolder& folder, std::uint64_t max_bytes = 1U << 30U) {
-  SpoolOptions options;
-  options.folder = folder.path();
-  options.max_bytes = max_bytes;
-  return *UploadSpool::Open(options);
-}
-
-std::vector<std::uint32_t> UpTo(std::uint32_t count) {
-  std::vector<std::uint32_t> numbers;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    numbers.push_back(i);
-  }
-  return numbers;
-}
-
-std::vector<fs::path> FilesOf(const fs::path& folder) {
-  std::vector<fs::path> paths;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file()) paths.push_back(entry.path());
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
 
 TEST(UploadSpoolTest, SendsInOrderAndForgets) {
   const TestFolder folder;
@@ -121,7 +40,7 @@ TEST(UploadSpoolHourTest, AnHourWithoutALinkLosesNothing) {
   EXPECT_EQ(spool.waiting(), kKeyframes);
   UploadPeer cut({}, 1'000);
   EXPECT_EQ(cut.Take(spool).error().code(), StatusCode::kUnavailable);
-  UploadSpool again = OpenSpool(folder);
+  UploadSpool again = Reopen(spool, folder);
   EXPECT_GE(again.waiting(), kKeyframes - 1'000);
   const auto first = static_cast<std::uint32_t>(kKeyframes - again.waiting());
   UploadPeer peer;
@@ -148,159 +67,6 @@ TEST(UploadSpoolTest, AFullSpoolTakesNothingAndLosesNothing) {
   ASSERT_TRUE(peer.Take(spool));
   EXPECT_EQ(peer.came(), UpTo(taken));
   EXPECT_TRUE(PutOne(spool, taken).ok());
-}
-
-TEST(UploadSpoolTest, WhatIsRefusedForGoodIsSetAsideWithItsReason) {
-  const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  for (std::uint32_t i = 0; i < 5; ++i) {
-    ASSERT_TRUE(PutOne(spool, i).ok());
-  }
-  UploadPeer peer({{1, {StatusCode::kConflict, "other content"}},
-                   {3, {StatusCode::kInvalidData, "of another profile"}}});
-  const auto report = peer.Take(spool);
-  ASSERT_TRUE(report) << report.error().message();
-  EXPECT_EQ(report->acknowledged, 3U);
-  EXPECT_EQ(report->set_aside, 2U);
-  EXPECT_EQ(spool.waiting(), 0U);
-  const auto refused = FilesOf(spool.refused_folder());
-  ASSERT_EQ(refused.size(), 4U);
-  std::string reason;
-  std::getline(std::ifstream(refused[1]), reason);
-  EXPECT_EQ(reason, "conflict: keyframe car/monday/1: other content");
-  EXPECT_EQ(OpenSpool(folder).waiting(), 0U);
-}
-
-// The daemon's clock has caught up with the vehicle's, which was fast.
-TEST(UploadSpoolTest, WhatWasRefusedIsSentWhenItIsPutBack) {
-  const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    ASSERT_TRUE(PutOne(spool, i).ok());
-  }
-  const std::uint64_t bytes = spool.waiting_bytes();
-  const Status ahead(StatusCode::kInvalidData, "a time ahead of the daemon's clock");
-  UploadPeer strict({{0, ahead}, {1, ahead}, {2, ahead}, {3, ahead}});
-  ASSERT_TRUE(strict.Take(spool));
-  UploadSpool again = OpenSpool(folder);
-  EXPECT_EQ(again.refused(), 4U);
-  ASSERT_TRUE(PutOne(again, 4).ok());
-  fs::remove(FilesOf(again.refused_folder()).at(2));  // a keyframe, not its reason
-  EXPECT_EQ(*again.RetryRefused(), 3U);
-  EXPECT_EQ(again.refused(), 0U);
-  EXPECT_EQ(again.waiting(), 4U);
-  EXPECT_EQ(again.waiting_bytes(), bytes);
-  EXPECT_TRUE(FilesOf(again.refused_folder()).empty());
-  EXPECT_EQ(*again.RetryRefused(), 0U);
-  UploadPeer peer;
-  ASSERT_TRUE(peer.Take(again));
-  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{0, 2, 3, 4}));
-}
-
-TEST(UploadSpoolTest, WhatWasRefusedStaysWhereThereIsNoRoomForIt) {
-  const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  for (std::uint32_t i = 0; i < 2; ++i) {
-    ASSERT_TRUE(PutOne(spool, i).ok());
-  }
-  const std::uint64_t bytes_of_one = spool.waiting_bytes() / 2;
-  UploadPeer strict({{0, {StatusCode::kInvalidData, "no"}}, {1, {StatusCode::kInvalidData, "no"}}});
-  ASSERT_TRUE(strict.Take(spool));
-  UploadSpool small = OpenSpool(folder, bytes_of_one);
-  EXPECT_EQ(*small.RetryRefused(), 1U);
-  EXPECT_EQ(small.refused(), 1U);
-  EXPECT_EQ(small.RetryRefused().error().code(), StatusCode::kResourceExhausted);
-  EXPECT_EQ(FilesOf(small.refused_folder()).size(), 2U);
-}
-
-TEST(UploadSpoolTest, WhatMayPassLaterIsKept) {
-  for (const StatusCode code : {StatusCode::kResourceExhausted, StatusCode::kUnavailable,
-                                StatusCode::kInternal, StatusCode::kPermissionDenied}) {
-    const TestFolder folder;
-    UploadSpool spool = OpenSpool(folder);
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      ASSERT_TRUE(PutOne(spool, i).ok());
-    }
-    UploadPeer full({{0, {code, "not now"}}, {1, {code, "not now"}}, {2, {code, "not now"}}});
-    EXPECT_EQ(full.Take(spool).error().code(), code);
-    EXPECT_EQ(spool.waiting(), 3U);
-    UploadPeer peer;
-    ASSERT_TRUE(peer.Take(spool));
-    EXPECT_EQ(peer.came(), UpTo(3));
-  }
-}
-
-TEST(UploadSpoolTest, AKeyframeThatTheDaemonFailsAtStopsNoOther) {
-  const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  std::uint32_t next = 0;
-  while (next < 3) {
-    ASSERT_TRUE(PutOne(spool, next++).ok());
-  }
-  for (int send = 0; send < 2; ++send) {
-    UploadPeer peer({{1, {StatusCode::kInternal, "stumbles"}}});
-    const auto report = peer.Take(spool);
-    ASSERT_TRUE(report) << report.error().message();
-    EXPECT_EQ(report->skipped, 1U);
-    EXPECT_EQ(report->set_aside, 0U);
-    EXPECT_EQ(report->problem.code(), StatusCode::kInternal);
-    EXPECT_EQ(spool.waiting(), 1U);
-    // Alone it says nothing of itself: the daemon may fail at all.
-    UploadPeer alone({{1, {StatusCode::kInternal, "stumbles"}}});
-    EXPECT_EQ(alone.Take(spool).error().code(), StatusCode::kInternal);
-    EXPECT_EQ(spool.waiting(), 1U);
-    ASSERT_TRUE(PutOne(spool, next++).ok());
-  }
-  UploadPeer peer({{1, {StatusCode::kInternal, "stumbles"}}});
-  const auto report = peer.Take(spool);
-  ASSERT_TRUE(report) << report.error().message();
-  EXPECT_EQ(report->set_aside, 1U);
-  EXPECT_EQ(spool.waiting(), 0U);
-  EXPECT_EQ(spool.refused(), 1U);
-}
-
-TEST(UploadSpoolTest, ADaemonThatFailsAtEverythingIsNotSentEverything) {
-  const TestFolder folder;
-  SpoolOptions options;
-  options.folder = folder.path();
-  options.upload.max_in_flight = 1;
-  UploadSpool spool = *UploadSpool::Open(options);
-  std::map<std::uint32_t, Status> failures;
-  for (std::uint32_t i = 0; i < 50; ++i) {
-    ASSERT_TRUE(PutOne(spool, i).ok());
-    failures[i] = {StatusCode::kInternal, "stumbles"};
-  }
-  UploadPeer peer(failures, 10);  // it would leave then
-  EXPECT_EQ(peer.Take(spool).error().code(), StatusCode::kInternal);
-  EXPECT_EQ(spool.waiting(), 50U);
-}
-
-TEST(UploadSpoolTest, ADaemonThatWantsToBeLeftAloneIs) {
-  const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  ASSERT_TRUE(PutOne(spool, 0).ok());
-  int requests = 0;
-  {
-    TestPeer full([&requests](PeerSocket& socket) {
-      AnswerHello(socket, {});
-      while (const auto request = socket.ReadRequest()) {
-        ++requests;
-        wire::Envelope reply;
-        *reply.mutable_error() = ErrorToWire({StatusCode::kResourceExhausted, "a full disk"});
-        reply.mutable_error()->set_retry_after_ms(60'000);
-        socket.Reply(request->request_id(), std::move(reply));
-      }
-    });
-    auto client = AtlasClient::Connect(full.options());
-    ASSERT_TRUE(client) << client.error().message();
-    EXPECT_EQ(spool.Send(*client).error().code(), StatusCode::kResourceExhausted);
-    const auto again = spool.Send(*client);
-    ASSERT_TRUE(again) << again.error().message();
-    EXPECT_GT(again->retry_after, std::chrono::milliseconds(0));
-    EXPECT_EQ(again->acknowledged, 0U);
-  }
-  EXPECT_EQ(requests, 1);
-  EXPECT_EQ(spool.waiting(), 1U);
 }
 
 TEST(UploadSpoolTest, WhatAKilledProgramLeavesIsPutInOrder) {
@@ -414,8 +180,10 @@ TEST(UploadSpoolTest, WhatCannotBeSetAsideWaitsAndTheOthersAreSent) {
 // A file at every length that a write can stop at.
 TEST(UploadSpoolTest, AFileCutAnywhereIsNeverSent) {
   const TestFolder folder;
-  UploadSpool spool = OpenSpool(folder);
-  ASSERT_TRUE(PutOne(spool, 0, 30).ok());
+  {
+    UploadSpool spool = OpenSpool(folder);
+    ASSERT_TRUE(PutOne(spool, 0, 30).ok());
+  }
   const fs::path path = FilesOf(folder.path()).at(0);
   for (std::uintmax_t size = fs::file_size(path); size-- > 0;) {
     fs::resize_file(path, size);

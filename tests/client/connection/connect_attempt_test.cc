@@ -1,0 +1,199 @@
+// An attempt over several calls: what one leaves goes on in the next, and all of it has one
+// deadline.
+#include "client/connection/connect_attempt.h"
+
+#include <future>
+
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert.h"
+#include "tests/client/support/gated_resolver.h"
+#include "tests/client/support/test_peer.h"
+
+namespace atlas {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kDeadline{300};
+const milliseconds kLong{20'000};
+
+ConnectProgress ToTheEnd(const ConnectionOptions& options) {
+  return ConnectAttempt(options).Continue(options.connect_timeout);
+}
+
+// Of a peer that answers the Hello with this.
+ConnectProgress Refused(StatusCode code, bool is_of_the_connection = false) {
+  const TestPeer peer([code, is_of_the_connection](PeerSocket& socket) {
+    const auto hello = socket.ReadRequest();
+    wire::Envelope reply;
+    *reply.mutable_error() = ErrorToWire({code, "no"});
+    socket.Reply(is_of_the_connection ? 0 : hello->request_id(), std::move(reply));
+    socket.Drain();
+  });
+  return ToTheEnd(peer.options());
+}
+
+TEST(ConnectAttemptTest, APeerThatAnswersLateIsWaitedForOverManyCalls) {
+  std::promise<void> answer;
+  const TestPeer peer([may_answer = answer.get_future().share()](PeerSocket& socket) {
+    may_answer.wait_for(kLong);
+    AnswerHello(socket, {});
+    socket.Drain();
+  });
+  ConnectionOptions options = peer.options();
+  options.connect_timeout = kLong;
+  options.request_timeout = milliseconds(1);  // is no part of it
+  ConnectAttempt attempt(options);
+  for (int call = 0; call < 10; ++call) {
+    const ConnectProgress progress = attempt.Continue(milliseconds(5));
+    EXPECT_FALSE(progress.client);
+    ASSERT_TRUE(progress.failure.ok()) << progress.failure.message();
+  }
+  answer.set_value();
+  const ConnectProgress progress = attempt.Continue(kLong);
+  ASSERT_TRUE(progress.client) << progress.failure.message();
+  EXPECT_EQ(progress.client->atlas().revision, 7U);
+}
+
+TEST(ConnectAttemptTest, ASilentPeerHoldsItNoLongerThanItsDeadline) {
+  const TestPeer peer([](PeerSocket& socket) { socket.Drain(); });
+  ConnectionOptions options = peer.options();
+  options.connect_timeout = kDeadline;
+  options.request_timeout = std::chrono::hours(1);
+  const Clock::time_point start = Clock::now();
+  const ConnectProgress progress = ToTheEnd(options);
+  EXPECT_EQ(progress.failure.code(), StatusCode::kTimeout) << progress.failure.message();
+  EXPECT_FALSE(progress.is_final);
+  EXPECT_GE(Clock::now() - start, kDeadline - milliseconds(1));  // counted in whole ones
+  EXPECT_LT(Clock::now() - start, 2 * kDeadline);
+}
+
+TEST(ConnectAttemptTest, TheNameAndTheHandshakeHaveOneDeadline) {
+  GatedResolver resolver;
+  const TestPeer peer([](PeerSocket& socket) { socket.Drain(); });
+  ConnectionOptions options = peer.options();
+  options.endpoint.host = "daemon";
+  options.names = std::make_shared<NameLookup>(resolver.resolver());
+  options.connect_timeout = kDeadline;
+  const Clock::time_point start = Clock::now();
+  ConnectAttempt attempt(options);
+  const ConnectProgress half = attempt.Continue(kDeadline * 2 / 3);
+  EXPECT_TRUE(half.failure.ok()) << half.failure.message();
+  resolver.Answer(NameLookup::Addresses{"127.0.0.1"});
+  const ConnectProgress progress = attempt.Continue(kLong);
+  EXPECT_EQ(progress.failure.code(), StatusCode::kTimeout) << progress.failure.message();
+  EXPECT_LT(Clock::now() - start, 2 * kDeadline);
+}
+
+TEST(ConnectAttemptTest, ANameThatNobodyAnswersForHoldsNoCall) {
+  GatedResolver resolver;
+  ConnectionOptions options;
+  options.endpoint.host = "daemon";
+  options.names = std::make_shared<NameLookup>(resolver.resolver());
+  options.connect_timeout = kDeadline;
+  Clock::time_point start = Clock::now();
+  {
+    ConnectAttempt attempt(options);
+    EXPECT_TRUE(attempt.Continue(milliseconds(1)).failure.ok());
+    const ConnectProgress progress = attempt.Continue(kLong);
+    EXPECT_EQ(progress.failure.code(), StatusCode::kTimeout);
+    EXPECT_NE(progress.failure.message().find("resolving"), std::string::npos);
+  }
+  EXPECT_LT(Clock::now() - start, 2 * kDeadline);
+  start = Clock::now();
+  const auto client = AtlasClient::Connect(options);
+  EXPECT_EQ(client.error().code(), StatusCode::kTimeout);
+  EXPECT_LT(Clock::now() - start, 2 * kDeadline);
+  EXPECT_EQ(resolver.asked().size(), 1U) << "the question of the first attempt is still open";
+}
+
+TEST(ConnectAttemptTest, AHostWithAnAddressThatIsDeadIsReachedAtTheNextOne) {
+  GatedResolver resolver;
+  const TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    socket.Drain();
+  });
+  ConnectionOptions options = peer.options();
+  options.endpoint.host = "daemon";
+  options.names = std::make_shared<NameLookup>(resolver.resolver());
+  resolver.Answer(NameLookup::Addresses{"::1", "127.0.0.1"});
+  EXPECT_TRUE(ToTheEnd(options).client);
+  resolver.Answer(NameLookup::Addresses{"no address"});
+  EXPECT_EQ(ToTheEnd(options).failure.code(), StatusCode::kUnavailable);
+}
+
+TEST(ConnectAttemptTest, WhatTheDaemonRefusesForGoodIsFinal) {
+  for (const StatusCode code : {StatusCode::kInvalidData, StatusCode::kUnsupported}) {
+    const ConnectProgress progress = Refused(code);
+    EXPECT_EQ(progress.failure.code(), code);
+    EXPECT_TRUE(progress.is_final) << StatusCodeName(code);
+  }
+  for (const StatusCode code : {StatusCode::kUnavailable, StatusCode::kPermissionDenied,
+                                StatusCode::kInternal, StatusCode::kResourceExhausted}) {
+    const ConnectProgress progress = Refused(code);
+    EXPECT_EQ(progress.failure.code(), code);
+    EXPECT_FALSE(progress.is_final) << StatusCodeName(code);
+  }
+}
+
+TEST(ConnectAttemptTest, BytesThatMakeNoSenseAreNotFinal) {
+  const std::string wrong_checksum("RAF1\1\0\0\0\0\0\0\0x", 13);
+  const std::string portal = "HTTP/1.1 503 Service Unavailable\r\n\r\n";
+  for (const std::string& text : {portal, wrong_checksum}) {
+    const TestPeer peer([text](PeerSocket& socket) {
+      socket.ReadRequest();
+      socket.Write(BytesFromWire(text));
+      socket.Drain();
+    });
+    const ConnectProgress progress = ToTheEnd(peer.options());
+    EXPECT_EQ(progress.failure.code(), StatusCode::kInvalidData) << progress.failure.message();
+    EXPECT_FALSE(progress.is_final);
+  }
+  // What the daemon says of a Hello that was damaged on its way.
+  const ConnectProgress damaged = Refused(StatusCode::kInvalidData, true);
+  EXPECT_EQ(damaged.failure.code(), StatusCode::kInvalidData);
+  EXPECT_FALSE(damaged.is_final);
+}
+
+TEST(ConnectAttemptTest, TheHandshakeSaysHowFarASessionIsThere) {
+  std::vector<wire::Hello> hellos;
+  const auto connect = [&hellos](std::optional<SessionKey> resume,
+                                 std::optional<std::uint32_t> last_sequence) {
+    const TestPeer peer([&hellos, last_sequence](PeerSocket& socket) {
+      const auto request = socket.ReadRequest();
+      hellos.push_back(request->hello());
+      wire::Envelope reply;
+      wire::HelloReply& hello = *reply.mutable_hello_reply();
+      hello.set_protocol_major(kProtocolMajor);
+      hello.set_profile(ProfileToWire({}));
+      if (last_sequence) hello.set_last_sequence(*last_sequence);
+      socket.Reply(request->request_id(), std::move(reply));
+      socket.Drain();
+    });
+    ConnectionOptions options = peer.options();
+    options.resume = std::move(resume);
+    const auto client = AtlasClient::Connect(options);
+    return client ? client->atlas().last_sequence : std::optional<std::uint32_t>(~0U);
+  };
+  EXPECT_EQ(connect(SessionKey{"car", "monday"}, 41U), 41U);
+  EXPECT_EQ(connect(SessionKey{"car", "monday"}, 0U), 0U);
+  EXPECT_EQ(connect(SessionKey{"car", "monday"}, std::nullopt), std::nullopt);
+  EXPECT_EQ(connect(std::nullopt, std::nullopt), std::nullopt);
+  EXPECT_EQ(hellos.at(0).resume().vehicle(), "car");
+  EXPECT_EQ(hellos.at(0).resume().session(), "monday");
+  EXPECT_FALSE(hellos.at(3).has_resume());
+}
+
+TEST(ConnectAttemptTest, AFileThatIsOfNoUseIsFinal) {
+  const TestPeer peer([](PeerSocket& socket) { socket.Drain(); });
+  ConnectionOptions options = peer.options();
+  options.tls = ConnectionTls{"/nowhere/ca.pem", {}, {}, {}};
+  const ConnectProgress progress = ToTheEnd(options);
+  EXPECT_EQ(progress.failure.code(), StatusCode::kInvalidArgument) << progress.failure.message();
+  EXPECT_TRUE(progress.is_final);
+}
+
+}  // namespace
+}  // namespace atlas
