@@ -16,7 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kDeadline{300};
+constexpr milliseconds kDeadline{1'000};
 const milliseconds kLong{20'000};
 
 ConnectProgress ToTheEnd(const ConnectionOptions& options) {
@@ -84,7 +84,7 @@ TEST(ConnectAttemptTest, TheNameAndTheHandshakeHaveOneDeadline) {
   resolver.Answer(NameLookup::Addresses{"127.0.0.1"});
   const ConnectProgress progress = attempt.Continue(kLong);
   EXPECT_EQ(progress.failure.code(), StatusCode::kTimeout) << progress.failure.message();
-  EXPECT_LT(Clock::now() - start, 2 * kDeadline);
+  EXPECT_LT(Clock::now() - start, kDeadline * 3 / 2);
 }
 
 TEST(ConnectAttemptTest, ANameThatNobodyAnswersForHoldsNoCall) {
