@@ -8,8 +8,10 @@
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <linux/sockios.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 
@@ -41,6 +43,11 @@ PeerStream::PeerStream(tcp::socket socket, SslSession session)
   if (error) {  // it would hold up its thread
     Close();
   }
+}
+
+asio::ip::address PeerStream::PeerAddress() const {
+  error_code error;
+  return socket_.remote_endpoint(error).address();
 }
 
 std::string PeerStream::PeerName() const {
@@ -120,6 +127,12 @@ asio::awaitable<void> PeerStream::WaitUntilWritable() {
   co_await socket_.async_wait(
       write_waits_to_read_ ? tcp::socket::wait_read : tcp::socket::wait_write,
       asio::redirect_error(asio::use_awaitable, ignored));
+}
+
+std::size_t PeerStream::unacknowledged_bytes() {
+  int bytes = 0;
+  return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? static_cast<std::size_t>(bytes)
+                                                                 : 0;
 }
 
 bool PeerStream::has_unread() {
