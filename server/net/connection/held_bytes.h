@@ -3,6 +3,7 @@
 // thread of the connection.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -20,9 +21,9 @@ namespace atlas {
 
 class HeldBytes {
  public:
-  // `limits` outlives this. Frames are large above `large_frame_bytes`.
-  HeldBytes(SharedLimits& limits, std::size_t large_frame_bytes)
-      : all_(limits.held), large_(limits.large), large_frame_bytes_(large_frame_bytes) {}
+  // Both outlive this.
+  HeldBytes(SharedLimits& limits, const NetOptions& options)
+      : all_(limits.held), large_(limits.large), options_(options) {}
   HeldBytes(const HeldBytes&) = delete;
   HeldBytes& operator=(const HeldBytes&) = delete;
   ~HeldBytes() { GiveBack(bytes_); }
@@ -36,8 +37,10 @@ class HeldBytes {
     allowance_ = std::move(allowance);
     return {};
   }
-  // What one of many connections may hold now.
-  std::size_t share_bytes() const { return all_.share_bytes(); }
+  // Of requests in flight, now: the less, the more the others hold.
+  std::size_t max_request_bytes() const {
+    return std::clamp(all_.share_bytes(), options_.large_frame_bytes, options_.max_received_bytes);
+  }
   Status Take(std::size_t bytes) {
     if (!all_.Take(bytes)) {
       return TooMuch(all_, "all");
@@ -62,7 +65,7 @@ class HeldBytes {
   Status CountPart(std::size_t bytes,
                    LargeParts::Time deadline,
                    const std::function<void()>& make_room) {
-    const std::size_t large_bytes = bytes > large_frame_bytes_ ? bytes : 0;
+    const std::size_t large_bytes = bytes > options_.large_frame_bytes ? bytes : 0;
     if (part_ == nullptr && large_bytes > 0) {
       part_ = std::make_unique<LargeParts::Part>(large_, make_room);
     }
@@ -92,7 +95,7 @@ class HeldBytes {
 
   ByteBudget& all_;
   LargeParts& large_;
-  const std::size_t large_frame_bytes_;
+  const NetOptions& options_;
   std::unique_ptr<LargeParts::Part> part_;        // from the first large frame on
   std::shared_ptr<IdentityAllowance> allowance_;  // of its name, if it has one
   std::size_t bytes_ = 0;

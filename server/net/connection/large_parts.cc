@@ -11,8 +11,8 @@ LargeParts::Part::Part(LargeParts& all, std::function<void()> close)
 }
 
 LargeParts::Part::~Part() {
-  all_.bytes_ -= bytes_;
   const std::lock_guard lock(all_.mutex_);
+  all_.bytes_ -= bytes_;
   all_.parts_.erase(this);
 }
 

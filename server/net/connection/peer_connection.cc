@@ -1,6 +1,5 @@
 #include "server/net/connection/peer_connection.h"
 
-#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -37,7 +36,7 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       writer_(stream_, peer_, limits_.queued, options_),
       as_peer_(writer_, stream_.executor(), options_.max_connection_watched_bytes),
       decoder_(options_.max_hello_bytes),
-      held_(limits_, options_.large_frame_bytes),
+      held_(limits_, options_),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
       access_(stream_, limits_.identities, options_, std::move(arrival.security)),
@@ -285,9 +284,8 @@ void PeerConnection::ChangeSecurity(const ServerSecurity& security) {
 }
 
 void PeerConnection::CheckIdentity() {
-  const Status status = access_.IdentifyAgain(handler_.NowMs());
-  if (!status.ok()) {
-    const std::string what = StrCat(access_.identity().name, ", no longer: ", status.message());
+  if (const Status now = access_.IdentifyAgain(handler_.NowMs()); !now.ok()) {
+    const std::string what = StrCat(access_.identity().name, ", no longer: ", now.message());
     spdlog::warn("{}", peer_.Line(what).text());
     CloseNow();
   }
@@ -313,10 +311,8 @@ asio::awaitable<void> PeerConnection::Write() {
 
 // For one more request, and for its replies.
 bool PeerConnection::HasRoom() const {
-  const std::size_t max_bytes =
-      std::clamp(held_.share_bytes(), options_.large_frame_bytes, options_.max_received_bytes);
-  return requests_ < options_.max_requests_in_flight && request_bytes_ <= max_bytes &&
-         writer_.has_room();
+  return requests_ < options_.max_requests_in_flight &&
+         request_bytes_ <= held_.max_request_bytes() && writer_.has_room();
 }
 
 asio::awaitable<void> PeerConnection::WaitForRoom() {
@@ -350,28 +346,33 @@ asio::awaitable<void> PeerConnection::Linger() {
 }
 
 void PeerConnection::CheckDeadlines(Clock::time_point now) {
+  if (phase_ == Phase::kLingering && now >= linger_until_) {
+    CloseNow();
+  }
+  if (phase_ != Phase::kClosed && is_greeted_ && access_.IsDue(now)) {
+    CheckIdentity();
+  }
   if (phase_ == Phase::kClosed) {
     return;
   }
-  if (writer_.IsStalled(now) || (phase_ == Phase::kLingering && now >= linger_until_)) {
+  if (const char* const late = WhatIsLate(now); late != nullptr) {
+    spdlog::warn("{}", peer_.Line(late).text());
     CloseNow();
-    return;
   }
-  if (is_greeted_ && access_.IsDue(now)) {
-    CheckIdentity();
-    if (phase_ == Phase::kClosed) {
-      return;
-    }
+}
+
+const char* PeerConnection::WhatIsLate(Clock::time_point now) {
+  if (writer_.IsStalled(now)) {
+    stream_.DropUnsent();  // else the system would keep it for as long as the peer likes
+    return "replies were not taken in time";
   }
   const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
                            (requests_ == 0 || frame_clock_.is_mid_frame());
-  if (is_expected && now >= frame_clock_.deadline()) {
-    const char* const what = frame_clock_.is_mid_frame()
-                                 ? "the rest of a frame did not come in time"
-                                 : "nothing came in time";
-    spdlog::warn("{}", peer_.Line(what).text());
-    CloseNow();
+  if (!is_expected || now < frame_clock_.deadline()) {
+    return nullptr;
   }
+  return frame_clock_.is_mid_frame() ? "the rest of a frame did not come in time"
+                                     : "nothing came in time";
 }
 
 std::shared_ptr<const void> PeerConnection::HoldRequest(std::size_t bytes) {

@@ -149,6 +149,11 @@ std::optional<PeerCertificate> PeerStream::certificate() const {
   return session_ == nullptr ? std::nullopt : CertificateOf(*session_);
 }
 
+void PeerStream::DropUnsent() {
+  error_code ignored;  // a peer that is gone already
+  socket_.set_option(tcp::socket::linger(true, 0), ignored);
+}
+
 void PeerStream::CloseSending() {
   if (session_ != nullptr && SSL_is_init_finished(session_.get()) == 1) {
     SSL_shutdown(session_.get());  // a notice, that may not fit any more

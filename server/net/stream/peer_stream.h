@@ -56,6 +56,8 @@ class PeerStream {
   bool is_encrypted() const { return session_ != nullptr; }
   // Why TLS closed it; empty: it did not.
   const std::string& failure() const { return failure_; }
+  // Closing forgets what the system has not sent yet.
+  void DropUnsent();
   void CloseSending();
   void Close();
 
