@@ -183,10 +183,11 @@ def uploads(bin_dir, atlas, keyframes, vehicles, number):
 
 def bench_connections(bin_dir, emit, drive):
     """A good client beside 2,000 quiet connections and 50 hostile ones: that break rules, in the clear and with TLS,
-    and that keep to them but ask for as much as may be asked."""
+    that keep to them but ask for as much as may be asked, and that read nothing of what they ask for."""
     for name, with_tls, hostility, asked in (("connections", False, "breaks_rules", "asked at most 64"),
                                              ("connections_tls", True, "breaks_rules", "asked at most 160"),
-                                             ("connections_heavy", False, "asks_much", "none")):
+                                             ("connections_heavy", False, "asks_much", "none"),
+                                             ("connections_unread", False, "never_reads", "asked at most 64")):
         with contextlib.ExitStack() as stack:
             tiles, keys = (stack.enter_context(tempfile.TemporaryDirectory()) for _ in range(2))
             certificate = Certificate(keys) if with_tls else None

@@ -71,6 +71,8 @@ NameLimits NameLimitsFrom(const DaemonConfig& config) {
   limits.held_bytes = static_cast<std::size_t>(config.name_held_mib) << 20;
   limits.requests_per_s = config.name_requests_per_s;
   limits.bytes_per_s = config.name_mib_per_s * double{1u << 20};
+  limits.watched_bytes = std::max(static_cast<std::size_t>(config.watch_mib) << 18,
+                                  NetOptions().max_connection_watched_bytes);
   return limits;
 }
 
@@ -81,6 +83,7 @@ NetOptions NetFrom(const DaemonConfig& config) {
                         : std::max(1, static_cast<int>(std::thread::hardware_concurrency() / 4));
   options.of_name = NameLimitsFrom(config);
   options.tile_frame_bytes = static_cast<std::size_t>(config.reply_mib) << 20;
+  options.max_all_queued_bytes = static_cast<std::size_t>(config.queue_mib) << 20;
   options.max_watched_bytes = static_cast<std::size_t>(config.watch_mib) << 20;
   return options;
 }

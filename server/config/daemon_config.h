@@ -36,6 +36,7 @@ struct DaemonConfig {
   int survey_mib = 1024;       // what tiles keep from one fusion to the next
   int survey_disk_mib = 4096;  // the same on disk; 0: nothing
   int reply_mib = 64;          // tiles ready to be sent
+  int queue_mib = 16;          // replies that wait for slow readers
   int watch_mib = 64;          // areas that are watched
   std::string log_level = "info";
   std::string log_format = "text";

@@ -107,6 +107,11 @@ void AddNet(const NetFigures& net, Families& out) {
   AddGauge(out, "requests_in_flight", "Requests that were read and are not answered yet.",
            net.in_flight);
   AddGauge(out, "held_bytes", "Bytes of requests and parts of them that are held.", net.held_bytes);
+  AddCounter(out, "large_requests_closed_total",
+             "Large requests that were not whole and had to go, for the room they took.",
+             net.parts_closed);
+  AddGauge(out, "queued_reply_bytes", "Bytes of replies that wait for slow readers.",
+           net.queued_bytes);
   AddCounter(out, "received_bytes_total", "Bytes from peers.", net.received_bytes);
   AddCounter(out, "sent_bytes_total", "Bytes to peers.", net.sent_bytes);
 }

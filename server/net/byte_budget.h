@@ -2,6 +2,7 @@
 // them alone may not. Thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <cstddef>
@@ -23,11 +24,20 @@ class ByteBudget {
     } while (!taken_bytes_.compare_exchange_weak(taken_bytes, taken_bytes + bytes));
     return true;
   }
+  // Takes them, whether they are left or not.
+  void Add(std::size_t bytes) { taken_bytes_.fetch_add(bytes); }
   void GiveBack(std::size_t bytes) {
     [[maybe_unused]] const std::size_t taken_bytes = taken_bytes_.fetch_sub(bytes);
     assert(bytes <= taken_bytes);
   }
   std::size_t max_bytes() const { return max_bytes_.load(); }
+  // What one of many may have: an eighth of what is free. The more of them take theirs, the less
+  // it is: together they never take all, and whoever comes finds as much as they have. (Choudhury,
+  // Hahne: Dynamic queue length thresholds for shared-memory packet switches, 1998, with 1/8.)
+  std::size_t share_bytes() const {
+    const std::size_t max_bytes = max_bytes_.load();
+    return (max_bytes - std::min(max_bytes, taken_bytes_.load())) / 8;
+  }
   // What was taken stays taken.
   void set_max_bytes(std::size_t max_bytes) { max_bytes_.store(max_bytes); }
   std::size_t taken_bytes() const { return taken_bytes_.load(); }

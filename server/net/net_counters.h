@@ -54,8 +54,10 @@ struct NetFigures {
   std::array<Kind, kRequestKinds> kinds;
   std::uint64_t received_bytes = 0;
   std::uint64_t sent_bytes = 0;
-  std::uint64_t in_flight = 0;   // requests now
-  std::uint64_t held_bytes = 0;  // of requests now
+  std::uint64_t in_flight = 0;     // requests now
+  std::uint64_t held_bytes = 0;    // of requests now
+  std::uint64_t queued_bytes = 0;  // of replies now, that wait for slow readers
+  std::uint64_t parts_closed = 0;  // large requests that had to go for others, since the start
 };
 
 struct NetCounters {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -10,6 +11,7 @@
 #include "server/base/line_budget.h"
 #include "server/base/log_line.h"
 #include "server/net/net_counters.h"
+#include "server/net/peer_share.h"
 
 namespace atlas {
 
@@ -20,6 +22,8 @@ struct PeerRecord {
   NetCounters& counters;  // of its thread, as is the next
   LineBudget& lines;      // about requests
   std::chrono::milliseconds slow_request;
+  // Of its name or address; null: it may have all there is.
+  std::shared_ptr<PeerShare> share = nullptr;
 
   LogLine Line(std::string_view message) const {
     LogLine line(StrCat(address, ": ", message), message);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <utility>
 
 namespace atlas {
 
@@ -23,6 +24,10 @@ class Places {
     return {this, [taken = taken_](const void*) {
               taken->fetch_sub(1);
             }};
+  }
+  // Given back together.
+  static Place Both(Place first, Place second) {
+    return std::make_shared<std::pair<Place, Place>>(std::move(first), std::move(second));
   }
   std::size_t max_places() const { return max_places_.load(); }
   // Nobody loses a place that was taken.

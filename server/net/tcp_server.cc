@@ -19,8 +19,8 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/byte_budget.h"
 #include "server/net/connection/net_thread.h"
+#include "server/net/connection/shared_limits.h"
 #include "server/net/connection/visit_pace.h"
 #include "server/net/peer_socket.h"
 #include "server/net/places.h"
@@ -56,8 +56,7 @@ class TcpServer::Impl {
         pool_(static_cast<std::size_t>(options.service_threads)),
         reading_pool_(static_cast<std::size_t>(options.reading_threads)),
         handler_(service, pool_, reading_pool_, options_),
-        budget_(options.max_held_bytes),
-        limits_(options.of_name),
+        limits_(options),
         places_(options.max_connections),
         pace_(PaceFrom(options)),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
@@ -65,7 +64,7 @@ class TcpServer::Impl {
         signals_(io_, SIGTERM, SIGINT) {
     std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to peers that are gone, too
     for (int i = 0; i < options.threads; ++i) {
-      threads_.push_back(std::make_unique<NetThread>(handler_, budget_, limits_, options_));
+      threads_.push_back(std::make_unique<NetThread>(handler_, limits_, options_));
     }
   }
   Impl(const Impl&) = delete;
@@ -110,13 +109,15 @@ class TcpServer::Impl {
     });
   }
 
-  void ChangeNameLimits(const NameLimits& limits) { limits_.Change(limits); }
+  void ChangeNameLimits(const NameLimits& limits) { limits_.identities.Change(limits); }
 
   NetFigures ReadFigures() const {
     NetFigures figures;
     figures.connections = places_.taken();
     figures.refused = refused_.value();
-    figures.held_bytes = budget_.taken_bytes();
+    figures.held_bytes = limits_.held.taken_bytes();
+    figures.queued_bytes = limits_.queued.taken_bytes();
+    figures.parts_closed = limits_.large.closed();
     for (const auto& thread : threads_) {
       thread->counters().AddTo(figures);
     }
@@ -263,8 +264,7 @@ class TcpServer::Impl {
   asio::thread_pool pool_;
   asio::thread_pool reading_pool_;
   RequestHandler handler_;
-  ByteBudget budget_;
-  IdentityLimits limits_;
+  SharedLimits limits_;
   Places places_;  // of connections
   VisitPace pace_;
   std::vector<std::unique_ptr<NetThread>> threads_;

@@ -20,7 +20,8 @@ STORE = SERVER + ["server/store"]
 WIRE = ["proto/wire", "proto/roadatlas/v1"]
 SERVING = SERVER + WIRE + ["server/service"]
 NET = ["server/net/byte_budget.h", "server/net/net_counters.h", "server/net/net_options.h",
-       "server/net/peer_record.h", "server/net/places.h", "server/net/server_security.h"]
+       "server/net/peer_record.h", "server/net/peer_share.h", "server/net/places.h",
+       "server/net/server_security.h"]
 NET_ROOMS = ["server/net", "server/net/connection", "server/net/requests", "server/net/stream"]
 COMMAND_ROOMS = ["client/cli/command_line", "client/cli/files", "client/cli/output", "client/connection"]
 ALLOWED = {

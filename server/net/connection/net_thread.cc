@@ -29,12 +29,8 @@ milliseconds LookEvery(const NetOptions& options) {
 
 }  // namespace
 
-NetThread::NetThread(RequestHandler& handler,
-                     ByteBudget& budget,
-                     IdentityLimits& limits,
-                     const NetOptions& options)
+NetThread::NetThread(RequestHandler& handler, SharedLimits& limits, const NetOptions& options)
     : handler_(handler),
-      budget_(budget),
       limits_(limits),
       options_(options),
       buffer_(kReadBytes),
@@ -51,8 +47,8 @@ void NetThread::Serve(PeerConnection::Arrival arrival) {
   auto begin = [this, arrival = std::move(arrival)]() mutable {
     --arrivals_;
     const auto connection = std::make_shared<PeerConnection>(
-        std::move(arrival), PeerConnection::Surroundings{handler_, budget_, limits_, buffer_,
-                                                         options_, counters_, request_lines_});
+        std::move(arrival), PeerConnection::Surroundings{handler_, limits_, buffer_, options_,
+                                                         counters_, request_lines_});
     connections_.push_back(connection);
     connection->Start();
   };

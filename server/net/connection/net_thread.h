@@ -15,7 +15,6 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 
-#include "server/net/byte_budget.h"
 #include "server/net/connection/peer_connection.h"
 #include "server/net/net_counters.h"
 #include "server/net/net_options.h"
@@ -28,10 +27,7 @@ namespace atlas {
 class NetThread {
  public:
   // All outlive this. Runs from the start.
-  NetThread(RequestHandler& handler,
-            ByteBudget& budget,
-            IdentityLimits& limits,
-            const NetOptions& options);
+  NetThread(RequestHandler& handler, SharedLimits& limits, const NetOptions& options);
   NetThread(const NetThread&) = delete;
   NetThread& operator=(const NetThread&) = delete;
   ~NetThread() { Stop(); }
@@ -61,8 +57,7 @@ class NetThread {
   void Run();
 
   RequestHandler& handler_;
-  ByteBudget& budget_;
-  IdentityLimits& limits_;
+  SharedLimits& limits_;
   const NetOptions& options_;
   std::vector<std::uint8_t> buffer_;
   NetCounters counters_;

@@ -33,13 +33,13 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       options_(surroundings.options),
       peer_{stream_.PeerName(),   "", "", surroundings.counters, surroundings.lines,
             options_.slow_request},
-      writer_(stream_, peer_, options_),
+      writer_(stream_, peer_, limits_.queued, options_),
       as_peer_(writer_, stream_.executor(), options_.max_connection_watched_bytes),
       decoder_(options_.max_hello_bytes),
-      held_(surroundings.budget),
+      held_(limits_, options_),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
-      security_(std::move(arrival.security)),
+      access_(stream_, limits_.identities, options_, std::move(arrival.security)),
       rate_pause_(stream_.executor()) {}
 
 void PeerConnection::Start() {
@@ -57,7 +57,7 @@ void PeerConnection::Drain() {
 void PeerConnection::CloseNow() {
   phase_ = Phase::kClosed;
   place_.reset();  // before the peer can see it
-  own_place_.reset();
+  access_.GiveBackPlace();
   writer_.CloseNow();
   changed_.cancel();
   rate_pause_.cancel();
@@ -67,9 +67,7 @@ asio::awaitable<void> PeerConnection::Read() {
   const Status broken = co_await ReadRequests();
   DropUnread();
   if (!broken.ok()) {
-    spdlog::warn("{}", peer_.Line(broken.message()).text());
-    is_refused_ = true;
-    writer_.PushError(0, broken);
+    Refuse(broken);
   }
   is_reading_ = false;
   writer_.NotePeerLeft();
@@ -103,7 +101,7 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
         co_return status;
       }
       writer_.Flush();
-      if (allowance_ != nullptr) {
+      if (access_.allowance() != nullptr) {
         co_await KeepToRate(came.bytes);
       }
     }
@@ -123,10 +121,7 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
     Status status;
     std::optional<LargeFrame> large;
     if (is_greeted_) {
-      large = decoder_.TakeLarge(options_.large_frame_bytes, [this](ByteSpan payload) {
-        return payload.size() <= options_.copied_frame_bytes &&
-               IsSmallBesidesBlobs(payload, options_.large_frame_bytes);
-      });
+      large = decoder_.TakeLarge(options_.large_frame_bytes, is_copied_);
     }
     if (large) {
       status = co_await TakeLargeRequest(*std::move(large));
@@ -151,7 +146,33 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
   if (is_greeted_) {
     frame_clock_.Expect(Clock::now(), decoder_.pending_bytes());
   }
-  co_return Status();
+  co_return CountPart(decoder_.pending_bytes(), frame_clock_.deadline());
+}
+
+Status PeerConnection::CountPart(std::size_t bytes, Clock::time_point deadline) {
+  return held_.CountPart(bytes, deadline, [weak = weak_from_this(), executor = stream_.executor()] {
+    asio::post(executor, [weak] {
+      if (const auto self = weak.lock()) {
+        self->MakeRoom();
+      }
+    });
+  });
+}
+
+void PeerConnection::MakeRoom() {
+  if (phase_ == Phase::kOpen && !is_refused_) {
+    Refuse(held_.NoRoomForPart());
+    DropUnread();
+    stop_reading_.emit(asio::cancellation_type::terminal);
+    rate_pause_.cancel();
+  }
+}
+
+void PeerConnection::Refuse(const Status& why) {
+  spdlog::warn("{}", peer_.Line(why.message()).text());
+  is_refused_ = true;
+  writer_.PushError(0, why);
+  writer_.Flush();
 }
 
 // Answers it at once, or lets it run beside the others.
@@ -165,7 +186,7 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
     Begin(Greet(*std::move(envelope)));
     return {};
   }
-  const Status denied = CheckMayAsk(identity_, *envelope);
+  const Status denied = CheckMayAsk(access_.identity(), *envelope);
   Begin(Answer({std::make_shared<wire::Envelope>(*std::move(envelope)), std::move(held)}, denied));
   return {};
 }
@@ -173,16 +194,19 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
 // The peer's next one has to wait until this one is read, the other connections have not.
 asio::awaitable<Status> PeerConnection::TakeLargeRequest(LargeFrame frame) {
   std::shared_ptr<const void> held = HoldRequest(frame.size());
+  if (Status full = CountPart(frame.size(), Clock::time_point::max()); !full.ok()) {
+    co_return full;
+  }
   writer_.Flush();
   is_held_up_ = true;
-  auto read = co_await handler_.ReadLarge(std::move(frame), identity_);
+  auto read = co_await handler_.ReadLarge(std::move(frame), access_.identity());
   is_held_up_ = false;
   frame_clock_.Restart(Clock::now(), decoder_.pending_bytes());
   if (!read) {
     co_return read.error();
   }
   held.reset();  // the frame is gone; now it counts as what was made of it
-  if (Status full = held_.Take(read->bytes); !full.ok()) {
+  if (Status full = held_.TakeLarge(read->bytes); !full.ok()) {
     read->denied = std::move(full);
   } else {
     read->request.held = HoldRequest(read->bytes);
@@ -212,35 +236,24 @@ PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
     writer_.PushError(hello.request_id(), status);
     return std::nullopt;
   }
-  return handler_.Greet(std::move(hello), identity_, writer_);
+  return handler_.Greet(std::move(hello), access_.identity(), writer_);
 }
 
 Status PeerConnection::ComeIn(const wire::Envelope& hello) {
-  credentials_ = Credentials::Of(stream_.certificate(), hello.hello().token());
-  const Result<Identity> identity = Identify();
-  if (!identity) {
-    return identity.error();
-  }
-  identity_ = *identity;
-  identity_until_ = Clock::now() + options_.identity_check;
-  peer_.name = identity_.name;
+  ATLAS_RETURN_IF_ERROR(access_.Identify(hello.hello().token(), handler_.NowMs()));
+  peer_.name = access_.identity().name;
   ATLAS_RETURN_IF_ERROR(handler_.CheckGreeting(hello));
-  if (identity_.name.empty()) {
+  ATLAS_RETURN_IF_ERROR(access_.TakePlace());
+  if (access_.allowance() == nullptr) {
     return {};
   }
-  const auto allowance = limits_.Of(identity_.name, Clock::now());
-  own_place_ = allowance->TakeConnection();
-  if (own_place_ == nullptr) {
-    return {StatusCode::kUnavailable, StrCat(allowance->max_connections(), " connections of ",
-                                             identity_.name, " are open already; try again later")};
-  }
-  ATLAS_RETURN_IF_ERROR(held_.CountByName(allowance, identity_.name));
-  allowance_ = allowance;
-  return {};
+  peer_.share = access_.allowance()->share();
+  return held_.CountByName(access_.allowance());
 }
 
 asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
-  const auto pause = allowance_->Charge(std::exchange(unpaid_requests_, 0), bytes, Clock::now());
+  const auto pause =
+      access_.allowance()->Charge(std::exchange(unpaid_requests_, 0), bytes, Clock::now());
   if (pause == Clock::duration::zero() || is_draining_ || writer_.is_closed()) {
     co_return;
   }
@@ -264,32 +277,18 @@ PeerConnection::MaybeAwaited PeerConnection::Answer(Request request, const Statu
 }
 
 void PeerConnection::ChangeSecurity(const ServerSecurity& security) {
-  security_ = security;
+  access_.set_security(security);
   if (is_greeted_) {
-    CheckIdentity(Clock::now());
+    CheckIdentity();
   }
 }
 
-Result<Identity> PeerConnection::Identify() const {
-  if (security_.tls != nullptr) {  // the handshake may have been under other rules
-    Status status = stream_.CheckCertificate(*security_.tls);
-    if (!status.ok()) {
-      return Error(std::move(status));
-    }
+void PeerConnection::CheckIdentity() {
+  if (const Status now = access_.IdentifyAgain(handler_.NowMs()); !now.ok()) {
+    const std::string what = StrCat(access_.identity().name, ", no longer: ", now.message());
+    spdlog::warn("{}", peer_.Line(what).text());
+    CloseNow();
   }
-  return security_.access->Identify(credentials_, handler_.NowMs());
-}
-
-void PeerConnection::CheckIdentity(Clock::time_point now) {
-  identity_until_ = now + options_.identity_check;
-  const Result<Identity> identity = Identify();
-  if (identity) {
-    identity_ = *identity;
-    return;
-  }
-  const std::string what = StrCat(identity_.name, ", no longer: ", identity.error().message());
-  spdlog::warn("{}", peer_.Line(what).text());
-  CloseNow();
 }
 
 asio::awaitable<void> PeerConnection::Serve(asio::awaitable<void> request) {
@@ -313,7 +312,7 @@ asio::awaitable<void> PeerConnection::Write() {
 // For one more request, and for its replies.
 bool PeerConnection::HasRoom() const {
   return requests_ < options_.max_requests_in_flight &&
-         request_bytes_ <= options_.max_received_bytes && writer_.has_room();
+         request_bytes_ <= held_.max_request_bytes() && writer_.has_room();
 }
 
 asio::awaitable<void> PeerConnection::WaitForRoom() {
@@ -347,28 +346,33 @@ asio::awaitable<void> PeerConnection::Linger() {
 }
 
 void PeerConnection::CheckDeadlines(Clock::time_point now) {
+  if (phase_ == Phase::kLingering && now >= linger_until_) {
+    CloseNow();
+  }
+  if (phase_ != Phase::kClosed && is_greeted_ && access_.IsDue(now)) {
+    CheckIdentity();
+  }
   if (phase_ == Phase::kClosed) {
     return;
   }
-  if (writer_.IsStalled(now) || (phase_ == Phase::kLingering && now >= linger_until_)) {
+  if (const char* const late = WhatIsLate(now); late != nullptr) {
+    spdlog::warn("{}", peer_.Line(late).text());
     CloseNow();
-    return;
   }
-  if (is_greeted_ && now >= identity_until_) {
-    CheckIdentity(now);
-    if (phase_ == Phase::kClosed) {
-      return;
-    }
+}
+
+const char* PeerConnection::WhatIsLate(Clock::time_point now) {
+  if (writer_.IsStalled(now)) {
+    stream_.DropUnsent();  // else the system would keep it for as long as the peer likes
+    return "replies were not taken in time";
   }
   const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
                            (requests_ == 0 || frame_clock_.is_mid_frame());
-  if (is_expected && now >= frame_clock_.deadline()) {
-    const char* const what = frame_clock_.is_mid_frame()
-                                 ? "the rest of a frame did not come in time"
-                                 : "nothing came in time";
-    spdlog::warn("{}", peer_.Line(what).text());
-    CloseNow();
+  if (!is_expected || now < frame_clock_.deadline()) {
+    return nullptr;
   }
+  return frame_clock_.is_mid_frame() ? "the rest of a frame did not come in time"
+                                     : "nothing came in time";
 }
 
 std::shared_ptr<const void> PeerConnection::HoldRequest(std::size_t bytes) {
@@ -384,6 +388,7 @@ std::shared_ptr<const void> PeerConnection::HoldRequest(std::size_t bytes) {
 void PeerConnection::DropUnread() {
   decoder_ = FrameDecoder(options_.max_frame_bytes);
   held_.GiveBack(held_.bytes() - request_bytes_);
+  held_.DropPart();
 }
 
 void PeerConnection::Finish() {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,12 +16,12 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "proto/wire/envelope.h"
 #include "proto/wire/frame.h"
-#include "server/net/access/access_control.h"
-#include "server/net/byte_budget.h"
 #include "server/net/connection/frame_clock.h"
 #include "server/net/connection/held_bytes.h"
-#include "server/net/connection/identity_limits.h"
+#include "server/net/connection/peer_access.h"
+#include "server/net/connection/shared_limits.h"
 #include "server/net/net_options.h"
 #include "server/net/peer_record.h"
 #include "server/net/places.h"
@@ -39,8 +40,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // anybody else runs.
   struct Surroundings {
     RequestHandler& handler;
-    ByteBudget& budget;
-    IdentityLimits& limits;
+    SharedLimits& limits;
     std::span<std::uint8_t> buffer;
     const NetOptions& options;
     NetCounters& counters;  // of its thread, as is the next
@@ -100,12 +100,18 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // Reads on and drops what comes: closing a socket with unread bytes resets it, and the peer would
   // lose the replies that are still under way.
   boost::asio::awaitable<void> Linger();
-  // Whom it is by the rules as they are now.
-  Result<Identity> Identify() const;
   // Closes when it would not come in any more.
-  void CheckIdentity(Clock::time_point now);
+  void CheckIdentity();
   // Whom it is, within what one may have.
   Status ComeIn(const wire::Envelope& hello);
+  // What has come of a frame, or waits for being read, counts among the large ones when it is.
+  Status CountPart(std::size_t bytes, Clock::time_point deadline);
+  // Others need the room of what has come of its frame.
+  void MakeRoom();
+  // Takes nothing any more; what was answered goes out first.
+  void Refuse(const Status& why);
+  // That the peer owes; null: nothing.
+  const char* WhatIsLate(Clock::time_point now);
   // As long as its name has sent too much.
   boost::asio::awaitable<void> KeepToRate(std::size_t bytes);
   // What a request that was read counts for, until it is destroyed.
@@ -116,24 +122,24 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   PeerStream stream_;
   Places::Place place_;
   RequestHandler& handler_;
-  IdentityLimits& limits_;
+  SharedLimits& limits_;
   const std::span<std::uint8_t> buffer_;
   const NetOptions& options_;
   PeerRecord peer_;
   ReplyWriter writer_;
   Peer as_peer_;  // for its requests
   FrameDecoder decoder_;
+  // A large frame that is read where it came in all the same.
+  const std::function<bool(ByteSpan payload)> is_copied_ = [this](ByteSpan payload) {
+    return payload.size() <= options_.copied_frame_bytes &&
+           IsSmallBesidesBlobs(payload, options_.large_frame_bytes);
+  };
   HeldBytes held_;  // received and not answered yet
   boost::asio::cancellation_signal stop_reading_;
   boost::asio::steady_timer changed_;  // cancelled when a request is done
   FrameClock frame_clock_;             // of what the peer owes next
   Clock::time_point linger_until_;
-  ServerSecurity security_;
-  Credentials credentials_;                       // that it showed
-  Identity identity_;                             // from the greeting on
-  Clock::time_point identity_until_;              // it is to be checked again
-  std::shared_ptr<IdentityAllowance> allowance_;  // of its name, if it has one
-  Places::Place own_place_;                       // of these connections
+  PeerAccess access_;
   boost::asio::steady_timer rate_pause_;
   std::size_t unpaid_requests_ = 0;  // that came since the last pause
   std::size_t requests_ = 0;

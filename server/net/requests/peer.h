@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "server/net/byte_budget.h"
-#include "server/net/requests/upload_order.h"
+#include "server/net/requests/turn_order.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/upload_check.h"
 
@@ -21,7 +21,7 @@ class Peer {
   Peer(ReplyWriter& writer,
        const boost::asio::any_io_executor& executor,
        std::size_t max_watched_bytes)
-      : out(writer), uploads(executor), watched(max_watched_bytes) {}
+      : out(writer), uploads(executor), streams(executor), watched(max_watched_bytes) {}
 
   // Fewer than a connection may have requests in flight: a peer can always say "cancel".
   static constexpr std::size_t kMaxCancellable = 16;
@@ -41,7 +41,11 @@ class Peer {
   }
 
   ReplyWriter& out;
-  UploadOrder uploads;
+  // Checked side by side, they reach the store in the order in which they came, so that the last
+  // sequence number that is there tells what else is.
+  TurnOrder uploads;
+  // Replies of many frames are made one after the other: what one keeps meanwhile is kept once.
+  TurnOrder streams;
   ByteBudget watched;  // areas that its watches keep
   const std::shared_ptr<MissingUploads> missing = std::make_shared<MissingUploads>();
 

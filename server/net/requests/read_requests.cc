@@ -1,5 +1,6 @@
 #include "server/net/requests/read_requests.h"
 
+#include <chrono>
 #include <vector>
 
 #include "server/net/requests/answer.h"
@@ -24,7 +25,7 @@ asio::awaitable<Status> QueryThePast(RequestContext& context,
                                      const wire::Envelope& request,
                                      const RegionRequest& region,
                                      ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take();
+  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
@@ -35,7 +36,8 @@ asio::awaitable<Status> QueryThePast(RequestContext& context,
 
 asio::awaitable<Status> AnswerQuery(RequestContext& context,
                                     const wire::Envelope& request,
-                                    ReplyWriter& out) {
+                                    Peer& peer) {
+  ReplyWriter& out = peer.out;
   const wire::QueryRegion& query = request.query_region();
   const Result<RegionRequest> region = RegionFromWire(query);
   if (!region) {
@@ -48,6 +50,8 @@ asio::awaitable<Status> AnswerQuery(RequestContext& context,
   if (!status.ok()) {
     co_return status;
   }
+  TurnOrder::Turn turn(peer.streams);
+  co_await turn.Come();
   co_return co_await SendRegion(context.service, context.pool, request, *region, out);
 }
 
@@ -64,13 +68,19 @@ asio::awaitable<Status> AnswerStatus(RequestContext& context,
 
 asio::awaitable<Status> AnswerSessions(RequestContext& context,
                                        const wire::Envelope& request,
-                                       ReplyWriter& out) {
+                                       Peer& peer) {
+  TurnOrder::Turn turn(peer.streams);  // there may be many
+  co_await turn.Come();
+  const bool is_open = co_await peer.out.WaitForRoom();
+  if (!is_open) {
+    co_return Status();
+  }
   const Blocking<std::vector<SessionRecord>> list = [&context] {
     return context.service.ListSessions();
   };
   const Result<std::vector<SessionRecord>> sessions = co_await OnPool(context.pool, list);
   co_return co_await Answer(request, sessions, &wire::Envelope::mutable_sessions_reply,
-                            SessionsToWire, out);
+                            SessionsToWire, peer.out);
 }
 
 asio::awaitable<Status> AwaitRevision(RequestContext& context,
@@ -80,11 +90,16 @@ asio::awaitable<Status> AwaitRevision(RequestContext& context,
   if (revision == 0) {
     co_return Status();
   }
-  const Result<Places::Place> place = context.places.Take();
+  Patience patience{std::chrono::milliseconds(0), out.peer_left()};
+  Status now = co_await WaitForRevision(context.service, context.pool, revision, patience);
+  if (now.code() != StatusCode::kTimeout || timeout_ms == 0) {
+    co_return now;  // whoever does not wait takes no place
+  }
+  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
-  const Patience patience{TimeoutFromWire(timeout_ms), out.peer_left()};
+  patience.timeout = TimeoutFromWire(timeout_ms);
   co_return co_await WaitForRevision(context.service, context.pool, revision, patience);
 }
 

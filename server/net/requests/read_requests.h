@@ -6,6 +6,7 @@
 #include <boost/asio/awaitable.hpp>
 
 #include "proto/wire/envelope.h"
+#include "server/net/requests/peer.h"
 #include "server/net/requests/request_context.h"
 #include "server/net/stream/reply_writer.h"
 
@@ -15,16 +16,16 @@ namespace atlas {
 
 boost::asio::awaitable<Status> AnswerQuery(RequestContext& context,
                                            const wire::Envelope& request,
-                                           ReplyWriter& out);
+                                           Peer& peer);
 boost::asio::awaitable<Status> AnswerStatus(RequestContext& context,
                                             const wire::Envelope& request,
                                             ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerSessions(RequestContext& context,
                                               const wire::Envelope& request,
-                                              ReplyWriter& out);
+                                              Peer& peer);
 
-// Until the tiles reflect `revision` (0: at once), in a place of those who wait: kUnavailable when
-// there is none, kTimeout after `timeout_ms`.
+// Until the tiles reflect `revision` (0: at once). If they do not yet it takes a place of those who
+// wait: kUnavailable when there is none, kTimeout after `timeout_ms`.
 boost::asio::awaitable<Status> AwaitRevision(RequestContext& context,
                                              std::uint64_t revision,
                                              std::uint32_t timeout_ms,

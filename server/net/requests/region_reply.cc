@@ -15,9 +15,8 @@ namespace {
 
 namespace asio = boost::asio;
 
-// Those of the past are fused one by one: each is sent when it is there.
-constexpr std::size_t kTilesPerRead = 16;
-constexpr std::size_t kPastTilesPerRead = 1;
+// Kept by a query that waits for its peer: 512 KiB.
+constexpr std::size_t kMaxCandidates = 16'384;
 // More than any frame of a reply has besides its tile's blob.
 constexpr std::size_t kFrameOverheadBytes = kFrameHeaderBytes + 52;
 
@@ -36,21 +35,26 @@ wire::Envelope TileEnvelope(std::uint64_t request_id, const StoredTile& tile) {
   return envelope;
 }
 
-using TileBatch = std::vector<StoredTile>;
+struct TileBatch {
+  std::vector<StoredTile> tiles;
+  bool is_last = false;
+};
 
-// Up to `max_tiles` tiles; fewer only at the end.
-Result<TileBatch> NextBatch(AtlasService& service, RegionQuery& query, std::size_t max_tiles) {
+// Tiles of `max_bytes` and up to one more.
+Result<TileBatch> NextBatch(AtlasService& service, RegionQuery& query, std::size_t max_bytes) {
   TileBatch batch;
-  while (batch.size() < max_tiles) {
+  std::size_t bytes = 0;
+  do {
     Result<std::optional<StoredTile>> tile = service.NextTile(query);
     if (!tile) {
       return Error(tile.error());
     }
-    if (!*tile) {
-      break;
+    batch.is_last = !*tile;
+    if (*tile) {
+      bytes += TileCost(**tile);
+      batch.tiles.push_back(std::move(**tile));
     }
-    batch.push_back(std::move(**tile));
-  }
+  } while (!batch.is_last && bytes < max_bytes);
   return batch;
 }
 
@@ -65,6 +69,7 @@ Result<std::shared_ptr<Cursor>> OpenCursor(AtlasService& service,
                                            const Patience& patience) {
   const std::uint64_t current = service.revision();
   RegionQuery::Options options;
+  options.max_candidates = kMaxCandidates;
   options.end_bytes = kFrameOverheadBytes;
   options.tile_cost = &TileCost;
   Result<RegionQuery> query = service.Query(region, std::move(options), patience);
@@ -79,27 +84,20 @@ struct Sent {
   std::uint64_t bytes = 0;
 };
 
-// False when the connection is gone.
-asio::awaitable<Result<bool>> SendBatch(std::uint64_t request_id,
-                                        TileBatch batch,
-                                        Sent& sent,
-                                        ReplyWriter& out) {
-  for (const StoredTile& tile : batch) {
+// What has room already.
+Status SendBatch(std::uint64_t request_id, const TileBatch& batch, Sent& sent, ReplyWriter& out) {
+  for (const StoredTile& tile : batch.tiles) {
     Result<Bytes> bytes = EncodeEnvelopeFrame(TileEnvelope(request_id, tile));
     if (!bytes) {
-      co_return Error(bytes.error());
+      return bytes.error();
     }
     const ReplyFrame frame(*std::move(bytes));
     ++sent.tiles;
     sent.bytes += frame.size();
-    const bool is_open = co_await out.WaitForRoom();
-    if (!is_open) {
-      co_return false;
-    }
     out.Push(frame);
   }
   out.Flush();
-  co_return true;
+  return {};
 }
 
 // The end counts itself: its own length depends on the number it carries.
@@ -146,6 +144,9 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
                                    const wire::Envelope& request,
                                    RegionRequest region,
                                    ReplyWriter& out) {
+  // Tiles of the past are fused one by one: each is sent when it is there, and nobody who has his
+  // at once waits for its room meanwhile.
+  const std::size_t batch_bytes = region.at_revision ? 0 : kReplyBatchBytes;
   const std::uint64_t request_id = request.request_id();
   const Patience patience{TimeoutFromWire(request.query_region().timeout_ms()), out.peer_left()};
   const Blocking<std::shared_ptr<Cursor>> open = [&service, region, patience] {
@@ -156,27 +157,23 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
     co_return opened.error();
   }
   const std::shared_ptr<Cursor>& cursor = *opened;
-  const std::size_t max_tiles = region.at_revision ? kPastTilesPerRead : kTilesPerRead;
-  const Blocking<TileBatch> read = [&service, cursor, max_tiles] {
-    return NextBatch(service, cursor->query, max_tiles);
-  };
   Sent sent;
-  while (true) {
-    Result<TileBatch> batch = co_await OnPool(pool, read);
+  for (bool is_last = false; !is_last;) {
+    const ReplyWriter::Room room = co_await out.TakeRoom(batch_bytes);
+    if (!room) {
+      co_return Status();
+    }
+    const Blocking<TileBatch> read = [&service, cursor, bytes = room.bytes()] {
+      return NextBatch(service, cursor->query, bytes);
+    };
+    const Result<TileBatch> batch = co_await OnPool(pool, read);
     if (!batch) {
       co_return batch.error();
     }
-    const bool is_last = batch->size() < max_tiles;
-    const Result<bool> is_open = co_await SendBatch(request_id, std::move(*batch), sent, out);
-    if (!is_open) {
-      co_return is_open.error();
+    if (Status status = SendBatch(request_id, *batch, sent, out); !status.ok()) {
+      co_return status;
     }
-    if (!*is_open) {
-      co_return Status();
-    }
-    if (is_last) {
-      break;
-    }
+    is_last = batch->is_last;
   }
   Result<Bytes> end = EndFrame(request_id, sent, cursor->query.is_truncated(), cursor->revision);
   if (!end) {

@@ -83,11 +83,14 @@ std::optional<asio::awaitable<void>> RequestHandler::Handle(Request request, Pee
   RequestRecord record(peer.out.peer(), message, request.began);
   auto reply = std::make_shared<SyncReply>(context_.service, frames_, std::move(request.message),
                                            request.is_large);
-  const bool may_begin = reply->message().wait_revision() == 0;
-  if (may_begin && SyncAtOnce(*reply, record, peer.out)) {
-    return std::nullopt;
+  std::unique_ptr<TurnOrder::Turn> turn;
+  if (reply->message().wait_revision() == 0) {
+    if (peer.streams.is_empty() && SyncAtOnce(*reply, record, peer.out)) {
+      return std::nullopt;
+    }
+    turn = std::make_unique<TurnOrder::Turn>(peer.streams);
   }
-  return Sync(std::move(reply), std::move(request.held), std::move(record), peer.out);
+  return Sync(std::move(reply), std::move(request.held), std::move(record), std::move(turn), peer);
 }
 
 void RequestHandler::ReturnFreed(FreedMemory::Clock::time_point now) {
@@ -124,11 +127,11 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& pee
     case Envelope::kChangeSession:
       return AnswerChangeSession(context_, request, peer.out);
     case Envelope::kQueryRegion:
-      return AnswerQuery(context_, request, peer.out);
+      return AnswerQuery(context_, request, peer);
     case Envelope::kStatusRequest:
       return AnswerStatus(context_, request, peer.out);
     case Envelope::kSessionsRequest:
-      return AnswerSessions(context_, request, peer.out);
+      return AnswerSessions(context_, request, peer);
     case Envelope::kWaitRequest:
       return AnswerWait(context_, request, peer.out);
     case Envelope::kDigestRequest:
@@ -155,8 +158,12 @@ asio::awaitable<Status> RequestHandler::Refuse(const Envelope& request) {
 
 bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out) {
   std::vector<ReplyFrame> frames;
-  for (std::size_t bytes = 0; out.has_room() && bytes < kBytesAtOnce;) {
-    const Result<SyncReply::Step> step = reply.Next(false, frames);
+  for (std::size_t bytes = 0; bytes < kBytesAtOnce;) {
+    const std::size_t room_bytes = out.RoomNow();
+    if (room_bytes == 0) {
+      return false;
+    }
+    const Result<SyncReply::Step> step = reply.Next(false, frames, room_bytes);
     if (!step) {
       out.PushError(reply.request_id(), step.error());
       record.End(step.error());
@@ -181,23 +188,29 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWr
 asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
                                            std::shared_ptr<const void> /*held*/,
                                            RequestRecord record,
-                                           ReplyWriter& out) {
-  Status status = co_await WaitAndSync(reply, out);
+                                           std::unique_ptr<TurnOrder::Turn> turn,
+                                           Peer& peer) {
+  Status status = co_await WaitAndSync(reply, std::move(turn), peer);
   record.End(status);
   if (!status.ok()) {
-    co_await out.SendError(reply->request_id(), std::move(status));
+    co_await peer.out.SendError(reply->request_id(), std::move(status));
   }
 }
 
 asio::awaitable<Status> RequestHandler::WaitAndSync(std::shared_ptr<SyncReply> reply,
-                                                    ReplyWriter& out) {
-  const wire::SyncRequest& message = reply->message();
-  Status status =
-      co_await AwaitRevision(context_, message.wait_revision(), message.timeout_ms(), out);
-  if (!status.ok()) {
-    co_return status;
+                                                    std::unique_ptr<TurnOrder::Turn> turn,
+                                                    Peer& peer) {
+  if (turn == nullptr) {
+    const wire::SyncRequest& message = reply->message();
+    Status status =
+        co_await AwaitRevision(context_, message.wait_revision(), message.timeout_ms(), peer.out);
+    if (!status.ok()) {
+      co_return status;
+    }
+    turn = std::make_unique<TurnOrder::Turn>(peer.streams);
   }
-  co_return co_await SendSync(std::move(reply), context_.pool, out);
+  co_await turn->Come();
+  co_return co_await SendSync(std::move(reply), context_.pool, peer.out);
 }
 
 }  // namespace atlas

@@ -78,8 +78,12 @@ class RequestHandler {
   boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
                                     std::shared_ptr<const void> held,
                                     RequestRecord record,
-                                    ReplyWriter& out);
-  boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply, ReplyWriter& out);
+                                    std::unique_ptr<TurnOrder::Turn> turn,
+                                    Peer& peer);
+  // Without a turn it waits for the revision that it asks for first.
+  boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply,
+                                             std::unique_ptr<TurnOrder::Turn> turn,
+                                             Peer& peer);
 
   RequestContext context_;
   const NetOptions& options_;

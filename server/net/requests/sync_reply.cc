@@ -20,7 +20,6 @@ namespace asio = boost::asio;
 // The first batch is there soon, the others are worth their manifest.
 constexpr std::size_t kFirstTiles = 4;
 constexpr std::size_t kTilesPerBatch = 32;
-constexpr std::size_t kBatchBytes = 512u << 10;
 // At most, in bytes of a reply: a manifest without its tiles, a tile in it, the end.
 constexpr std::size_t kManifestBytes = kFrameHeaderBytes + 64;
 constexpr std::size_t kAnnouncementBytes = 40;
@@ -42,7 +41,9 @@ SyncReply::SyncReply(AtlasService& service,
   }
 }
 
-Result<SyncReply::Step> SyncReply::Next(bool may_block, std::vector<ReplyFrame>& out) {
+Result<SyncReply::Step> SyncReply::Next(bool may_block,
+                                        std::vector<ReplyFrame>& out,
+                                        std::size_t max_bytes) {
   if (is_large_ && !may_block) {
     return Step::kBlocked;
   }
@@ -58,7 +59,7 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block, std::vector<ReplyFrame>&
   if (is_first) {
     *batch.manifest.mutable_sync_manifest() = holdings_;
   }
-  Result<Step> filled = Fill(may_block, batch);
+  Result<Step> filled = Fill(may_block, max_bytes, batch);
   if (!filled) {
     return filled;
   }
@@ -115,11 +116,11 @@ Result<SyncReply::Step> SyncReply::Plan(bool may_block) {
 }
 
 // With tiles, and the end, if that is reached.
-Result<SyncReply::Step> SyncReply::Fill(bool may_block, Batch& batch) {
+Result<SyncReply::Step> SyncReply::Fill(bool may_block, std::size_t max_bytes, Batch& batch) {
   wire::SyncManifest& manifest = *batch.manifest.mutable_sync_manifest();
   std::uint64_t bytes = sent_bytes_ + kManifestBytes + manifest.ByteSizeLong();
   const std::size_t max_tiles = sent_bytes_ == 0 ? kFirstTiles : kTilesPerBatch;
-  while (batch.tiles.size() < max_tiles && batch.tile_bytes < kBatchBytes) {
+  while (batch.tiles.size() < max_tiles && batch.tile_bytes < max_bytes) {
     if (next_ == plan_.items.size() && plan_.is_cut) {
       request_->after = last_;
       Result<Step> planned = Plan(may_block);
@@ -208,13 +209,17 @@ asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
                                  ReplyWriter& out) {
   const auto executor = co_await asio::this_coro::executor;
   const auto frames = std::make_shared<std::vector<ReplyFrame>>();
-  const Blocking<SyncReply::Step> read = [reply, frames] {
-    return reply->Next(true, *frames);
-  };
-  while (co_await out.WaitForRoom()) {
+  while (true) {
+    const ReplyWriter::Room room = co_await out.TakeRoom(kReplyBatchBytes);
+    if (!room) {
+      break;
+    }
     frames->clear();
-    Result<SyncReply::Step> step = reply->Next(false, *frames);
+    Result<SyncReply::Step> step = reply->Next(false, *frames, room.bytes());
     if (step && *step == SyncReply::Step::kBlocked) {
+      const Blocking<SyncReply::Step> read = [reply, frames, bytes = room.bytes()] {
+        return reply->Next(true, *frames, bytes);
+      };
       step = co_await OnPool(pool, read);
     }
     if (!step) {

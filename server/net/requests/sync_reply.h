@@ -37,9 +37,11 @@ class SyncReply {
   const wire::SyncRequest& message() const { return envelope_->sync_request(); }
   std::uint64_t request_id() const { return envelope_->request_id(); }
 
-  // Appends the next frames. An error ends the reply; kInvalidArgument: a request that makes no
-  // sense.
-  Result<Step> Next(bool may_block, std::vector<ReplyFrame>& out);
+  // Appends the next frames, tiles of `max_bytes` and up to one more. An error ends the reply;
+  // kInvalidArgument: a request that makes no sense.
+  Result<Step> Next(bool may_block,
+                    std::vector<ReplyFrame>& out,
+                    std::size_t max_bytes = kReplyBatchBytes);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -54,7 +56,7 @@ class SyncReply {
 
   Result<Step> Begin(bool may_block);
   Result<Step> Plan(bool may_block);
-  Result<Step> Fill(bool may_block, Batch& batch);
+  Result<Step> Fill(bool may_block, std::size_t max_bytes, Batch& batch);
   Status Emit(const Batch& batch, std::vector<ReplyFrame>& out);
   // The end counts itself: its own length depends on the number it carries.
   Result<Bytes> EndFrame(End how) const;

@@ -31,6 +31,8 @@ class WatchRequests {
   boost::asio::awaitable<void> Answer(Request request, Peer& peer);
 
  private:
+  // One of `share`, too, unless that is null. kUnavailable.
+  Result<Places::Place> TakePlace(PeerShare* share);
   // With a place, and counted by the peer.
   boost::asio::awaitable<Status> Follow(Request request, Peer& peer);
   boost::asio::awaitable<Result<WatchOrder>> Read(const Request& request);

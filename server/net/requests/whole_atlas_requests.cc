@@ -52,7 +52,7 @@ Result<CompactionRequest> ReadCompaction(const AtlasService& service,
 asio::awaitable<Status> AnswerWait(RequestContext& context,
                                    const wire::Envelope& request,
                                    ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take();
+  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
@@ -68,7 +68,7 @@ asio::awaitable<Status> AnswerWait(RequestContext& context,
 asio::awaitable<Status> AnswerDigest(RequestContext& context,
                                      const wire::Envelope& request,
                                      ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take();
+  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
@@ -82,7 +82,7 @@ asio::awaitable<Status> AnswerDigest(RequestContext& context,
 asio::awaitable<Status> AnswerVerify(RequestContext& context,
                                      const wire::Envelope& request,
                                      ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take();
+  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
@@ -113,7 +113,7 @@ asio::awaitable<Status> AnswerCompact(RequestContext& context,
   if (!compaction) {
     co_return compaction.error();  // before any wait
   }
-  const Result<Places::Place> place = context.places.Take();
+  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }

@@ -60,7 +60,7 @@ void NoteRefusal(const wire::UploadKeyframe& message, const Status& why, Missing
 asio::awaitable<Status> AnswerUpload(RequestContext& context,
                                      const wire::Envelope& request,
                                      Peer& peer) {
-  UploadOrder::Turn turn(peer.uploads);
+  TurnOrder::Turn turn(peer.uploads);
   Result<NewKeyframe> keyframe = co_await CheckUpload(context, request.upload_keyframe());
   co_await turn.Come();
   if (!keyframe) {

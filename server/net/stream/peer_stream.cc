@@ -8,8 +8,10 @@
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <linux/sockios.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 
@@ -41,6 +43,11 @@ PeerStream::PeerStream(tcp::socket socket, SslSession session)
   if (error) {  // it would hold up its thread
     Close();
   }
+}
+
+asio::ip::address PeerStream::PeerAddress() const {
+  error_code error;
+  return socket_.remote_endpoint(error).address();
 }
 
 std::string PeerStream::PeerName() const {
@@ -122,6 +129,12 @@ asio::awaitable<void> PeerStream::WaitUntilWritable() {
       asio::redirect_error(asio::use_awaitable, ignored));
 }
 
+std::size_t PeerStream::unacknowledged_bytes() {
+  int bytes = 0;
+  return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? static_cast<std::size_t>(bytes)
+                                                                 : 0;
+}
+
 bool PeerStream::has_unread() {
   error_code gone;
   return (session_ != nullptr && SSL_has_pending(session_.get()) == 1) ||
@@ -134,6 +147,11 @@ Status PeerStream::CheckCertificate(const TlsContext& tls) const {
 
 std::optional<PeerCertificate> PeerStream::certificate() const {
   return session_ == nullptr ? std::nullopt : CertificateOf(*session_);
+}
+
+void PeerStream::DropUnsent() {
+  error_code ignored;  // a peer that is gone already
+  socket_.set_option(tcp::socket::linger(true, 0), ignored);
 }
 
 void PeerStream::CloseSending() {

@@ -31,6 +31,8 @@ class PeerStream {
   // handshake.
   explicit PeerStream(boost::asio::ip::tcp::socket socket, SslSession session = nullptr);
 
+  // Of the peer; none when it is gone.
+  boost::asio::ip::address PeerAddress() const;
   // "ADDRESS:PORT" of the peer.
   std::string PeerName() const;
   boost::asio::any_io_executor executor() { return socket_.get_executor(); }
@@ -43,6 +45,8 @@ class PeerStream {
   boost::asio::awaitable<void> WaitUntilReadable(boost::asio::cancellation_slot stop);
   boost::asio::awaitable<void> WaitUntilWritable();
 
+  // Given to the system, and not known to have come.
+  std::size_t unacknowledged_bytes();
   // Bytes have come that were not read.
   bool has_unread();
   // That the peer showed and that was verified; once bytes were read.
@@ -52,6 +56,8 @@ class PeerStream {
   bool is_encrypted() const { return session_ != nullptr; }
   // Why TLS closed it; empty: it did not.
   const std::string& failure() const { return failure_; }
+  // Closing forgets what the system has not sent yet.
+  void DropUnsent();
   void CloseSending();
   void Close();
 

@@ -20,11 +20,16 @@ constexpr std::size_t kGatheredBytes = 4u << 10;  // small pieces become one up 
 
 }  // namespace
 
-ReplyWriter::ReplyWriter(PeerStream& stream, const PeerRecord& peer, const NetOptions& options)
+ReplyWriter::ReplyWriter(PeerStream& stream,
+                         const PeerRecord& peer,
+                         ByteBudget& all,
+                         const NetOptions& options)
     : stream_(stream),
       peer_(peer),
+      all_(all),
       options_(options),
-      changed_(stream.executor(), asio::steady_timer::time_point::max()) {}
+      changed_(stream.executor(), asio::steady_timer::time_point::max()),
+      pace_(options) {}
 
 void ReplyWriter::Push(const ReplyFrame& frame) {
   if (is_closed_) {
@@ -75,14 +80,21 @@ void ReplyWriter::Flush() {
     const PeerStream::Moved moved = stream_.Write(std::span(pieces).first(count));
     TakeAway(moved.bytes);
     peer_.counters.sent_bytes.Add(moved.bytes);
+    written_bytes_ += static_cast<std::int64_t>(moved.bytes);
     if (moved.is_closed) {
       CloseNow();
     } else if (moved.is_blocked) {
       is_blocked_ = true;
-      blocked_since_ = Clock::now();
+      if (!pace_.is_running()) {
+        pace_.Begin(Clock::now(), TakenByPeer());
+      }
       Wake();
     }
   }
+  if (queue_.empty()) {
+    pace_.End();
+  }
+  Count();
 }
 
 void ReplyWriter::TakeAway(std::size_t bytes) {
@@ -92,6 +104,53 @@ void ReplyWriter::TakeAway(std::size_t bytes) {
     sent_bytes_ -= queue_.front().bytes().size();
     queue_.pop_front();
   }
+}
+
+void ReplyWriter::Reserve(std::size_t bytes) {
+  reserved_bytes_ += bytes;
+  Count();
+}
+
+void ReplyWriter::GiveBack(std::size_t bytes) {
+  reserved_bytes_ -= bytes;
+  Count();
+  Wake();
+}
+
+// What leaves at once is never counted: that would cost the threads a shared number a reply.
+void ReplyWriter::Count() {
+  const std::size_t bytes = queued_bytes_ + reserved_bytes_;
+  if (bytes > counted_bytes_) {
+    all_.Add(bytes - counted_bytes_);
+  } else if (bytes < counted_bytes_) {
+    all_.GiveBack(counted_bytes_ - bytes);
+  }
+  counted_bytes_ = bytes;
+}
+
+std::size_t ReplyWriter::RoomNow() {
+  const auto batch = [this] {
+    return std::max<std::size_t>(1, std::min(kReplyBatchBytes, max_bytes()));
+  };
+  if (!Fits(batch())) {
+    Flush();
+  }
+  return !is_closed_ && Fits(batch()) ? batch() : 0;
+}
+
+asio::awaitable<ReplyWriter::Room> ReplyWriter::TakeRoom(std::size_t wanted_bytes) {
+  while (!is_closed_) {
+    const std::size_t bytes = std::min(wanted_bytes, max_bytes());
+    if (Fits(bytes)) {
+      co_return Room(*this, bytes);
+    }
+    Flush();
+    if (!Fits(bytes)) {
+      error_code ignored;  // woken by cancelling
+      co_await changed_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+    }
+  }
+  co_return Room();
 }
 
 asio::awaitable<bool> ReplyWriter::WaitForRoom() {
@@ -165,11 +224,17 @@ void ReplyWriter::CloseNow() {
   stream_.Close();
   queue_.clear();
   queued_bytes_ = 0;
+  Count();
   Wake();
 }
 
-bool ReplyWriter::IsStalled(Clock::time_point now) const {
-  return is_blocked_ && now - blocked_since_ > options_.write_stall;
+// What the system still keeps for it is not taken: on a slow link that changes first.
+std::int64_t ReplyWriter::TakenByPeer() {
+  return written_bytes_ - static_cast<std::int64_t>(stream_.unacknowledged_bytes());
+}
+
+bool ReplyWriter::IsStalled(Clock::time_point now) {
+  return pace_.IsDue(now) && pace_.WasTooSlow(now, TakenByPeer());
 }
 
 }  // namespace atlas

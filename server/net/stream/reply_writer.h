@@ -2,31 +2,70 @@
 // call to the system. For the thread of the connection.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <stop_token>
+#include <utility>
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include "core/base/status.h"
 #include "proto/wire/envelope.h"
+#include "server/net/byte_budget.h"
 #include "server/net/net_options.h"
 #include "server/net/peer_record.h"
 #include "server/net/stream/peer_stream.h"
 #include "server/net/stream/reply_frame.h"
+#include "server/net/stream/write_pace.h"
 
 namespace atlas {
+
+// Of a reply of many frames that are made at a time.
+inline constexpr std::size_t kReplyBatchBytes = 512u << 10;
 
 class ReplyWriter {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // All outlive this.
-  ReplyWriter(PeerStream& stream, const PeerRecord& peer, const NetOptions& options);
+  // Set aside for frames that are being made, until it is destroyed. The writer outlives it.
+  class Room {
+   public:
+    Room() = default;  // none: the connection is gone
+    Room(ReplyWriter& writer, std::size_t bytes) : writer_(&writer), bytes_(bytes) {
+      writer.Reserve(bytes);
+    }
+    Room(Room&& other) noexcept
+        : writer_(std::exchange(other.writer_, nullptr)), bytes_(other.bytes_) {}
+    Room(const Room&) = delete;
+    Room& operator=(const Room&) = delete;
+    Room& operator=(Room&&) = delete;
+    ~Room() {
+      if (writer_ != nullptr) {
+        writer_->GiveBack(bytes_);
+      }
+    }
+
+    explicit operator bool() const { return writer_ != nullptr; }
+    std::size_t bytes() const { return bytes_; }
+
+   private:
+    ReplyWriter* writer_ = nullptr;
+    std::size_t bytes_ = 0;
+  };
+
+  // All outlive this; `all`: what is queued on all connections.
+  ReplyWriter(PeerStream& stream,
+              const PeerRecord& peer,
+              ByteBudget& all,
+              const NetOptions& options);
+  ReplyWriter(const ReplyWriter&) = delete;
+  ReplyWriter& operator=(const ReplyWriter&) = delete;
+  ~ReplyWriter() { all_.GiveBack(counted_bytes_); }
 
   // To whom it sends.
   const PeerRecord& peer() const { return peer_; }
@@ -39,7 +78,10 @@ class ReplyWriter {
   // Writes what the peer takes now; the rest leaves as it takes it.
   void Flush();
   // The peer takes what there is, as far as is known.
-  bool has_room() const { return queued_bytes_ <= options_.max_queued_bytes; }
+  bool has_room() const { return queued_bytes_ == 0 || queued_bytes_ <= max_bytes(); }
+  // As many bytes as the next frames of a reply may have now, and one frame more; 0: it has to
+  // wait.
+  std::size_t RoomNow();
 
   // Waits for room, queues and flushes. False when the connection is gone: stop replying.
   boost::asio::awaitable<bool> Send(wire::Envelope envelope);
@@ -47,6 +89,9 @@ class ReplyWriter {
   boost::asio::awaitable<bool> SendWithOthers(wire::Envelope envelope);
   boost::asio::awaitable<bool> SendError(std::uint64_t request_id, Status status);
   boost::asio::awaitable<bool> WaitForRoom();
+  // Waits for room and sets it aside, up to `wanted_bytes`, of which there may be less. Made
+  // before they have room, frames would be bounded by nothing.
+  boost::asio::awaitable<Room> TakeRoom(std::size_t wanted_bytes);
 
   // The one coroutine that waits for the peer to take more. Returns after CloseWhenEmpty() when
   // everything queued has left, and when the connection is closed.
@@ -54,8 +99,8 @@ class ReplyWriter {
   void CloseWhenEmpty();
   void CloseNow();
   bool is_closed() const { return is_closed_; }
-  // The peer has taken nothing of what there is for so long.
-  bool IsStalled(Clock::time_point now) const;
+  // The peer has taken too little of what there is for so long.
+  bool IsStalled(Clock::time_point now);
 
   // The peer sends no more or is gone: what only waits on its behalf ends.
   void NotePeerLeft() { peer_left_.request_stop(); }
@@ -72,16 +117,31 @@ class ReplyWriter {
   void PushBytes(ByteSpan bytes);
   void TakeAway(std::size_t bytes);
   void Wake() { changed_.cancel(); }
+  // That may be queued now: the less, the more the others have.
+  std::size_t max_bytes() const { return std::min(options_.max_queued_bytes, all_.share_bytes()); }
+  bool Fits(std::size_t bytes) const {
+    const std::size_t taken_bytes = queued_bytes_ + reserved_bytes_;
+    return taken_bytes == 0 || taken_bytes + bytes <= max_bytes();
+  }
+  void Reserve(std::size_t bytes);
+  void GiveBack(std::size_t bytes);
+  // Among all's.
+  void Count();
+  std::int64_t TakenByPeer();
 
   PeerStream& stream_;
   const PeerRecord& peer_;
+  ByteBudget& all_;
   const NetOptions& options_;
   boost::asio::steady_timer changed_;  // cancelled when what Run() or a waiting reply waits for is
   std::deque<Piece> queue_;
   std::size_t sent_bytes_ = 0;  // of the first one
   std::size_t queued_bytes_ = 0;
+  std::size_t reserved_bytes_ = 0;
+  std::size_t counted_bytes_ = 0;  // of these among all's
+  std::int64_t written_bytes_ = 0;
   bool is_blocked_ = false;  // by the peer: Run() waits for it
-  Clock::time_point blocked_since_;
+  WritePace pace_;           // of the peer, while something waits
   bool is_finishing_ = false;
   bool is_closed_ = false;
   std::stop_source peer_left_;

@@ -1,5 +1,5 @@
 // A crowd of connections to a daemon, beside which a good client is measured.
-// Usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much [tls]
+// Usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much|never_reads [tls]
 // Says {"open": N} when those that keep to the rules are connected, then lets the hostile ones go
 // until its standard input ends, and checks that the others have lost nothing.
 #include <csignal>
@@ -28,13 +28,19 @@ std::size_t CountOf(const char* text) {
   return static_cast<std::size_t>(std::atoi(text));
 }
 
+Hostility HostilityOf(const std::string& name) {
+  if (name == "asks_much") {
+    return Hostility::kAskMuch;
+  }
+  return name == "never_reads" ? Hostility::kNeverRead : Hostility::kBreakRules;
+}
+
 Status Run(int argc, char** argv) {
   if (argc != 6 && argc != 7) {
     return {StatusCode::kInvalidArgument,
-            "usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much [tls]"};
+            "usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much|never_reads [tls]"};
   }
-  const auto how =
-      std::string(argv[5]) == "asks_much" ? Hostility::kAskMuch : Hostility::kBreakRules;
+  const Hostility how = HostilityOf(argv[5]);
   const auto port = static_cast<std::uint16_t>(std::atoi(argv[1]));
   std::optional<LoadTls> tls;
   const LoadTls* const way = argc == 7 ? &tls.emplace() : nullptr;

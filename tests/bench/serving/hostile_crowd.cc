@@ -19,7 +19,8 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kPatience{2'000};  // of one who waits to be thrown out, or does not read
-constexpr int kQueriesUnread = 64;
+constexpr milliseconds kLongPatience{100'000};
+constexpr std::uint64_t kRequestsUnread = 64;
 
 // One visit.
 struct Visit {
@@ -123,13 +124,26 @@ void LeavesAtOnce(Visit& visit) {
 }
 
 // Asks for the whole atlas again and again, and reads nothing of it.
-void NeverReads(Visit& visit) {
+void AskAndNeverRead(Visit& visit, Bytes (*frame)(std::uint64_t), milliseconds patience) {
   visit.Greet();
-  for (int i = 0; i < kQueriesUnread; ++i) {
-    visit.Say(QueryFrame(static_cast<std::uint64_t>(i) + 2));
+  for (std::uint64_t i = 0; i < kRequestsUnread; ++i) {
+    visit.Say(frame(i + 2));
   }
-  visit.Idle(kPatience);
+  visit.Idle(patience);
   visit.socket.ResetAtClose();
+}
+
+void NeverReads(Visit& visit) {
+  AskAndNeverRead(visit, &QueryFrame, kPatience);
+}
+
+// Until the daemon has enough of it, or the crowd goes.
+void NeverReadsQueries(Visit& visit) {
+  AskAndNeverRead(visit, &QueryFrame, kLongPatience);
+}
+
+void NeverReadsSyncs(Visit& visit) {
+  AskAndNeverRead(visit, &SyncAllFrame, kLongPatience);
 }
 
 // Valid to the last bit but one: the message is none.
@@ -172,8 +186,18 @@ constexpr Behaviour kBreakRules[] = {&RandomBytes,     &ClaimsMoreThanThereMayBe
                                      &NeverReads,      &SendsNoMessage};
 constexpr Behaviour kAskMuch[] = {&CorrectsManyPoses, &HoldsManyTiles, &WatchesManyTiles};
 
+constexpr Behaviour kNeverRead[] = {&NeverReadsQueries, &NeverReadsSyncs};
+
 std::span<const Behaviour> BehavioursOf(Hostility how) {
-  return how == Hostility::kBreakRules ? std::span<const Behaviour>(kBreakRules) : kAskMuch;
+  switch (how) {
+    case Hostility::kAskMuch:
+      return kAskMuch;
+    case Hostility::kNeverRead:
+      return kNeverRead;
+    case Hostility::kBreakRules:
+      break;
+  }
+  return kBreakRules;
 }
 
 }  // namespace

@@ -29,4 +29,12 @@ inline Bytes QueryFrame(std::uint64_t request_id) {
   return EncodeEnvelopeFrame(request).value();
 }
 
+// The same of it to one who holds nothing.
+inline Bytes SyncAllFrame(std::uint64_t request_id) {
+  wire::Envelope request;
+  request.set_request_id(request_id);
+  request.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(10'000'000'000);
+  return EncodeEnvelopeFrame(request).value();
+}
+
 }  // namespace atlas::testing

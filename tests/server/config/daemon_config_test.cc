@@ -137,6 +137,7 @@ TEST_F(DaemonConfigTest, AValueOutOfRangeNamesWhereItWasGiven) {
               AllOf(HasSubstr("line 2: workers is '65'"), HasSubstr("0 to 64")));
   EXPECT_THAT(RefusedFile("data = '/x'\nworkers = 1.5\n"), HasSubstr("line 2"));
   EXPECT_THAT(RefusedFile("data = '/x'\ncache_mib = 7\n"), HasSubstr("line 2: cache_mib is '7'"));
+  EXPECT_THAT(RefusedFile("data = '/x'\nqueue_mib = 7\n"), HasSubstr("line 2: queue_mib is '7'"));
   EXPECT_THAT(Refusal({"--data", "/x", "--workers", "-1"}),
               HasSubstr("--workers: workers is '-1'"));
   SetVariable("ATLASD_WORKERS", "many");
@@ -333,6 +334,7 @@ TEST_F(DaemonConfigTest, HelpNamesTheDefaultsThatCount) {
   EXPECT_EQ(DefaultInHelp(help, "--workers N"), std::to_string(config.workers));
   EXPECT_EQ(DefaultInHelp(help, "--cache-mib MIB"), std::to_string(config.cache_mib));
   EXPECT_EQ(DefaultInHelp(help, "--survey-mib MIB"), std::to_string(config.survey_mib));
+  EXPECT_EQ(DefaultInHelp(help, "--queue-mib MIB"), std::to_string(config.queue_mib));
   EXPECT_EQ(DefaultInHelp(help, "--survey-disk-mib MIB"), std::to_string(config.survey_disk_mib));
   EXPECT_EQ(DefaultInHelp(help, "--log-level LEVEL"), config.log_level);
   EXPECT_DOUBLE_EQ(std::stod(DefaultInHelp(help, "--cell-size M")), map.cell_size_m());

@@ -154,6 +154,8 @@ TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
   EXPECT_EQ(metrics.at("roadatlas_connections"), 1);
   EXPECT_EQ(metrics.at("roadatlas_requests_in_flight"), 0);
   EXPECT_EQ(metrics.at("roadatlas_held_bytes"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_queued_reply_bytes"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_large_requests_closed_total"), 0);
   EXPECT_EQ(metrics.at("roadatlas_keyframes"), 1);
   EXPECT_EQ(metrics.at("roadatlas_revision"), 1);
   EXPECT_GT(metrics.at("roadatlas_dirty_tiles"), 0);

@@ -126,7 +126,7 @@ TEST_F(LargeRequestTest, CountsAsWhatIsMadeOfIt) {
     *update.mutable_key() = KeyToWire({{"a", "b"}, 1});
     *update.mutable_pose() = PoseToWire(QuantizedPose());
   }
-  net_.max_held_bytes = 2 * poses.ByteSizeLong();
+  net_.max_held_bytes = 2 * (kFrameHeaderBytes + poses.ByteSizeLong());
   Serve();
   const auto peer = Connect();
   peer->Send(poses);

@@ -204,6 +204,28 @@ TEST_F(LimitTest, MoreThanTheDaemonHoldsIsRefused) {
   ExpectServes();
 }
 
+TEST_F(LimitTest, WhoeverStallsMakesRoomForWhoeverComes) {
+  net_.max_held_bytes = 1u << 20;  // half of it for parts of large requests
+  Serve();
+  Bytes part = EncodeFrameHeader({});
+  part[6] = 0x08;  // 512 KiB, of which a fifth comes
+  part.resize(105'000);
+  std::vector<std::unique_ptr<BlockingPeer>> peers;
+  for (std::uint64_t i = 1; i <= 4; ++i) {
+    peers.push_back(Connect());
+    peers.back()->SendBytes(part);
+    ExpectHolds(i * part.size());
+  }
+  peers.push_back(Connect());
+  peers.back()->SendBytes(part);
+  const auto closed = peers.front()->Receive();
+  EXPECT_EQ(CodeOf(closed), StatusCode::kResourceExhausted);
+  EXPECT_TRUE(closed->error().retry());
+  EXPECT_TRUE(peers.front()->IsClosed());
+  EXPECT_EQ(server_->ReadFigures().parts_closed, 1u);
+  ExpectServes();
+}
+
 TEST_F(LimitTest, WhatIsAnsweredIsNoLongerHeld) {
   net_.max_held_bytes = 256u << 10;
   Serve();

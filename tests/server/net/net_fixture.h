@@ -59,12 +59,15 @@ class NetTest : public ServiceTest {
     EXPECT_EQ(reply->body_case(), wire::Envelope::kStatusReply);
   }
   // Nothing is left of any request, a moment after the reply to the last one.
-  void ExpectHoldsNothing() const {
+  void ExpectHoldsNothing() const { ExpectHolds(0); }
+  // So much of requests is there, in a moment.
+  void ExpectHolds(std::uint64_t bytes) const {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (server_->ReadFigures().held_bytes > 0 && std::chrono::steady_clock::now() < deadline) {
+    while (server_->ReadFigures().held_bytes != bytes &&
+           std::chrono::steady_clock::now() < deadline) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    EXPECT_EQ(server_->ReadFigures().held_bytes, 0u);
+    EXPECT_EQ(server_->ReadFigures().held_bytes, bytes);
   }
   // `count` queries, padded with a field that the daemon does not know: few of them fill a socket.
   static Bytes PaddedQueries(std::uint64_t count) {

@@ -101,14 +101,33 @@ TEST(WatchBudgetTest, GivesBackWhatItTookFromBoth) {
   WatchMemory memory(1'000, freed);
   ByteBudget one(700);
   ByteBudget other(700);
-  auto taken = memory.Take(600, one);
+  auto taken = memory.Take(600, one, nullptr);
   ASSERT_TRUE(taken.has_value());
-  EXPECT_FALSE(memory.Take(600, one).has_value());
-  EXPECT_FALSE(memory.Take(600, other).has_value());
+  EXPECT_FALSE(memory.Take(600, one, nullptr).has_value());
+  EXPECT_FALSE(memory.Take(600, other, nullptr).has_value());
   EXPECT_EQ(other.taken_bytes(), 0u) << "a refused one takes from neither";
   taken->reset();
   EXPECT_EQ(memory.taken_bytes() + one.taken_bytes(), 0u);
-  EXPECT_TRUE(memory.Take(600, other).has_value());
+  EXPECT_TRUE(memory.Take(600, other, nullptr).has_value());
+}
+
+TEST(WatchBudgetTest, OneNameLeavesRoomForOthers) {
+  FreedMemory freed({100, seconds(10)});
+  WatchMemory memory(1'000, freed);
+  ByteBudget one(700);
+  ByteBudget another(700);
+  NameLimits limits;
+  limits.watched_bytes = 300;
+  const auto alice = std::make_shared<PeerShare>("alice", limits);
+  auto taken = memory.Take(200, one, alice);
+  ASSERT_TRUE(taken.has_value());
+  const auto refused = memory.Take(200, another, alice);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().message().find("alice"), std::string::npos);
+  EXPECT_EQ(another.taken_bytes(), 0u);
+  EXPECT_TRUE(memory.Take(600, another, nullptr).has_value());
+  taken->reset();
+  EXPECT_EQ(alice->watched.taken_bytes(), 0u);
 }
 
 TEST(FreedMemoryTest, IsReturnedWhenItIsMuchAndNotOften) {

@@ -1,5 +1,4 @@
-// Uploads of one connection are checked side by side and reach the store in the order in which they
-// came, so that the last sequence number that is there tells what else is. For the thread of the
+// Requests of one connection whose turn comes in the order in which they did. For the thread of the
 // connection.
 #pragma once
 
@@ -15,17 +14,17 @@
 
 namespace atlas {
 
-class UploadOrder {
+class TurnOrder {
   using Line = std::list<std::monostate>;  // places, the first of them at the front
 
  public:
-  explicit UploadOrder(const boost::asio::any_io_executor& executor)
+  explicit TurnOrder(const boost::asio::any_io_executor& executor)
       : changed_(executor, boost::asio::steady_timer::time_point::max()) {}
 
-  // A place in the line; given up when it is destroyed, whatever became of the upload.
+  // A place in the line; given up when it is destroyed, whatever became of the request.
   class Turn {
    public:
-    explicit Turn(UploadOrder& order)
+    explicit Turn(TurnOrder& order)
         : order_(order), place_(order.line_.emplace(order.line_.end())) {}
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
@@ -49,10 +48,12 @@ class UploadOrder {
     }
 
    private:
-    UploadOrder& order_;
+    TurnOrder& order_;
     const Line::iterator place_;
     bool has_left_ = false;
   };
+
+  bool is_empty() const { return line_.empty(); }
 
  private:
   boost::asio::steady_timer changed_;  // cancelled when somebody left

@@ -1,0 +1,28 @@
+// What one name, or one address without one, may take of what all share: places of those who wait,
+// watches and their areas. Thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "server/net/byte_budget.h"
+#include "server/net/net_options.h"
+#include "server/net/places.h"
+
+namespace atlas {
+
+struct PeerShare {
+  PeerShare(std::string name, const NameLimits& limits)
+      : whose(std::move(name)),
+        waits(limits.waits),
+        watches(limits.watches),
+        watched(limits.watched_bytes) {}
+
+  const std::string whose;  // for messages
+  Places waits;
+  Places watches;
+  ByteBudget watched;
+};
+
+}  // namespace atlas

@@ -1,0 +1,126 @@
+// What one peer takes of what all share leaves the others theirs: of a name, of an address.
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "server/net/connection/peer_access.h"
+#include "tests/server/net/net_fixture.h"
+
+namespace atlas {
+namespace {
+
+using boost::asio::ip::make_address;
+using ::testing::HasSubstr;
+
+constexpr const char* kTokens =  // "alice", "bob"
+    "alice reader never 2bd806c97f0e00af1a1fc3328fa763a9269723c8db8fac4f93af71db186d6e90\n"
+    "bob reader never 81b637d8fcd2c6da6359e6963113a1170de795e4b725b84d1e0b4cfd9ec58ce9\n";
+
+class SharesTest : public NetTest {
+ protected:
+  void ServeAliceAndBob(unsigned workers) {
+    security_.access = std::make_shared<const AccessControl>(
+        TokenList::Parse(kTokens, "tokens").value(), Role::kAdmin);
+    Serve(workers);
+  }
+  std::unique_ptr<BlockingPeer> ConnectAs(const std::string& token) const {
+    auto peer = std::make_unique<BlockingPeer>(port_);
+    EXPECT_TRUE(peer->Greet(kProtocolMajor, "", token).has_hello_reply());
+    return peer;
+  }
+  static wire::Envelope WatchOf(std::uint64_t id) {
+    wire::Envelope envelope;
+    envelope.set_request_id(id);
+    envelope.mutable_watch_request()->mutable_area()->mutable_disc()->set_radius_um(1'000'000);
+    return envelope;
+  }
+  static std::string ErrorOf(const std::optional<wire::Envelope>& reply) {
+    EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
+    return reply ? reply->error().message() : "";
+  }
+};
+
+TEST_F(SharesTest, TheWaitsOfOneNameLeavePlacesForOthers) {
+  net_.max_waits = 2;
+  net_.of_name.waits = 1;
+  ServeAliceAndBob(0);  // nothing is ever fused
+  UploadDrive(1);
+  const auto alice = ConnectAs("alice");
+  const auto again = ConnectAs("alice");
+  const auto bob = ConnectAs("bob");
+  alice->Send(WaitOf(1, 60'000));
+  alice->Send(WaitOf(2, 60'000));
+  EXPECT_THAT(ErrorOf(alice->Receive()), HasSubstr("of alice"));
+  again->Send(WaitOf(3, 60'000));
+  EXPECT_THAT(ErrorOf(again->Receive()), HasSubstr("of alice"));
+  bob->Send(WaitOf(4, 60'000));
+  bob->Send(WaitOf(5, 60'000));
+  const auto busy = bob->Receive();
+  EXPECT_EQ(busy->request_id(), 5u) << "the first one has a place";
+  EXPECT_THAT(ErrorOf(busy), HasSubstr("of bob"));
+}
+
+TEST_F(SharesTest, TheWatchesOfOneNameLeavePlacesForOthers) {
+  net_.max_watches = 2;
+  net_.of_name.watches = 1;
+  ServeAliceAndBob(1);
+  const auto alice = ConnectAs("alice");
+  const auto again = ConnectAs("alice");
+  const auto bob = ConnectAs("bob");
+  alice->Send(WatchOf(1));
+  EXPECT_TRUE(alice->Receive()->has_watch_event());
+  again->Send(WatchOf(2));
+  EXPECT_THAT(ErrorOf(again->Receive()), HasSubstr("of alice"));
+  bob->Send(WatchOf(3));
+  EXPECT_TRUE(bob->Receive()->has_watch_event());
+}
+
+TEST_F(SharesTest, WhoeverComesWithoutANameIsLimitedByHisAddress) {
+  net_.is_loopback_limited = true;
+  net_.of_name.connections = 2;
+  Serve();
+  const auto first = Connect();
+  const auto second = Connect();
+  BlockingPeer third(port_);
+  const wire::Envelope reply = third.Greet();
+  EXPECT_THAT(ErrorOf(reply), HasSubstr("of 127.0.0.1 without a name"));
+  EXPECT_TRUE(third.IsClosed());
+}
+
+TEST_F(SharesTest, OnThisMachineNobodyIsLimitedByHisAddress) {
+  net_.of_name.connections = 1;
+  Serve();
+  const auto first = Connect();
+  const auto second = Connect();
+  ExpectServes();
+}
+
+TEST_F(SharesTest, AWaitForWhatIsThereTakesNoPlace) {
+  net_.max_waits = 0;
+  Serve();
+  UploadDrive(1);
+  Digest();
+  const auto peer = Connect();
+  wire::Envelope query = QueryOf(1);
+  query.mutable_query_region()->set_wait_revision(service_->revision());
+  query.mutable_query_region()->set_timeout_ms(60'000);
+  peer->Send(query);
+  EXPECT_TRUE(peer->Receive()->has_tile());
+}
+
+TEST(PeerAddressTest, AHouseOfIp6IsOne) {
+  EXPECT_EQ(SharedAddress(make_address("192.0.2.7")), "192.0.2.7");
+  EXPECT_EQ(SharedAddress(make_address("::ffff:192.0.2.7")), "192.0.2.7");
+  EXPECT_EQ(SharedAddress(make_address("2001:db8:1:2:3:4:5:6")), "2001:db8:1:2::/64");
+}
+
+TEST(PeerAddressTest, LoopbackIsThisMachine) {
+  for (const char* const address : {"127.0.0.1", "127.3.2.1", "::1", "::ffff:127.0.0.1"}) {
+    EXPECT_TRUE(IsOfThisMachine(make_address(address))) << address;
+  }
+  EXPECT_FALSE(IsOfThisMachine(make_address("192.0.2.7")));
+  EXPECT_FALSE(IsOfThisMachine(make_address("2001:db8::1")));
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,159 @@
+// Peers that ask for much and read little of it: what waits for them is bounded, for each and for
+// all together, and who takes nearly nothing is closed.
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "server/net/stream/write_pace.h"
+#include "tests/server/net/net_fixture.h"
+
+namespace atlas {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr std::uint64_t kRequests = 64;
+constexpr std::size_t kFrameBytes = 64u << 10;  // of the tiles here none is as large
+
+class SlowReadersTest : public NetTest {
+ protected:
+  void ServeTiles() {
+    Serve();
+    UploadDrive(12);
+    Digest();
+  }
+  static wire::Envelope SyncOf(std::uint64_t id) {
+    wire::Envelope envelope;
+    envelope.set_request_id(id);
+    envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(1'000'000'000);
+    return envelope;
+  }
+  // Of everything, again and again, as queries or as syncs.
+  static Bytes RequestsFor(bool is_sync) {
+    Bytes bytes;
+    for (std::uint64_t id = 1; id <= kRequests; ++id) {
+      const Bytes frame = EncodeEnvelopeFrame(is_sync ? SyncOf(id) : QueryOf(id)).value();
+      bytes.insert(bytes.end(), frame.begin(), frame.end());
+    }
+    return bytes;
+  }
+  // The most that was queued until nothing changes any more.
+  std::uint64_t MostQueued() const {
+    std::uint64_t most = 0;
+    NetFigures last;
+    for (int unchanged = 0; unchanged < 50;) {
+      std::this_thread::sleep_for(milliseconds(10));
+      const NetFigures now = server_->ReadFigures();
+      most = std::max(most, now.queued_bytes);
+      unchanged =
+          now.sent_bytes == last.sent_bytes && now.in_flight == last.in_flight ? unchanged + 1 : 0;
+      last = now;
+    }
+    return most;
+  }
+};
+
+TEST_F(SlowReadersTest, OneQueuesNoMoreThanItMay) {
+  net_.max_queued_bytes = 64u << 10;
+  ServeTiles();
+  for (const bool is_sync : {false, true}) {
+    const auto peer = Connect(4'096);
+    peer->SendBytes(RequestsFor(is_sync));
+    const std::uint64_t most = MostQueued();
+    EXPECT_GT(most, 0u);
+    EXPECT_LE(most, net_.max_queued_bytes + kFrameBytes);
+  }
+}
+
+TEST_F(SlowReadersTest, AllTogetherQueueNoMoreThanTheyMay) {
+  constexpr std::size_t kPeers = 40;
+  net_.max_all_queued_bytes = 512u << 10;
+  ServeTiles();
+  std::vector<std::unique_ptr<BlockingPeer>> peers;
+  for (std::size_t i = 0; i < kPeers; ++i) {
+    peers.push_back(Connect(4'096));
+    peers.back()->SendBytes(RequestsFor(i % 2 == 0));
+  }
+  const std::uint64_t most = MostQueued();
+  EXPECT_GT(most, net_.max_all_queued_bytes / 2);
+  EXPECT_LE(most, net_.max_all_queued_bytes + 4 * kFrameBytes);
+  // Another one gets all it asks for.
+  const auto good = Connect();
+  for (const wire::Envelope& request : {QueryOf(1), SyncOf(2)}) {
+    good->Send(request);
+    std::optional<wire::Envelope> reply;
+    do {
+      reply = good->Receive();
+      ASSERT_TRUE(reply.has_value());
+    } while (!reply->has_query_end() && !reply->has_sync_end());
+  }
+  peers.clear();
+  const auto deadline = std::chrono::steady_clock::now() + seconds(30);
+  while (server_->ReadFigures().queued_bytes > 0 && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(server_->ReadFigures().queued_bytes, 0u);
+}
+
+TEST_F(SlowReadersTest, RepliesOfOneConnectionAreMadeOneAfterTheOther) {
+  net_.max_queued_bytes = 4'096;  // each is made in many steps
+  ServeTiles();
+  const auto peer = Connect(4'096);
+  peer->SendBytes(RequestsFor(false));
+  for (std::uint64_t id = 1; id <= kRequests; ++id) {
+    std::optional<wire::Envelope> reply;
+    do {
+      reply = peer->Receive();
+      ASSERT_TRUE(reply.has_value());
+      ASSERT_EQ(reply->request_id(), id);
+    } while (!reply->has_query_end());
+  }
+}
+
+// It never stops for as long as a write may take: that alone once kept it.
+TEST_F(SlowReadersTest, AReaderThatTakesNearlyNothingIsClosed) {
+  net_.write_stall = milliseconds(500);
+  net_.min_write_bytes_per_s = 64u << 20;
+  ServeTiles();
+  const auto peer = Connect(4'096);
+  peer->SendBytes(RequestsFor(false));
+  std::uint64_t ended = 0;
+  while (const auto reply = peer->Receive()) {
+    ended += reply->has_query_end() ? 1u : 0u;
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  EXPECT_LT(ended, kRequests);
+  ExpectServes();
+}
+
+TEST(WritePaceTest, ASlowLinkIsBorneAndATrickleIsNot) {
+  NetOptions options;
+  const WritePace::Time start{};
+  for (const auto& [bytes_per_s, is_too_slow] : {std::pair(2'000, false), std::pair(400, true)}) {
+    WritePace pace(options);
+    EXPECT_FALSE(pace.IsDue(start + seconds(3'600))) << "nothing waits";
+    pace.Begin(start, 1'000);
+    EXPECT_FALSE(pace.IsDue(start + seconds(60)));
+    ASSERT_TRUE(pace.IsDue(start + seconds(61)));
+    EXPECT_EQ(pace.WasTooSlow(start + seconds(61), 1'000 + 61 * bytes_per_s), is_too_slow);
+    EXPECT_FALSE(pace.IsDue(start + seconds(100))) << "the next window";
+    pace.End();
+    EXPECT_FALSE(pace.IsDue(start + seconds(3'600)));
+  }
+}
+
+// However fast the first megabytes went.
+TEST(WritePaceTest, WhatWasTakenBeforeBuysNothing) {
+  NetOptions options;
+  const WritePace::Time start{};
+  WritePace pace(options);
+  pace.Begin(start, 0);
+  EXPECT_FALSE(pace.WasTooSlow(start + seconds(61), 100'000'000));
+  EXPECT_TRUE(pace.WasTooSlow(start + seconds(122), 100'000'000));
+}
+
+}  // namespace
+}  // namespace atlas
