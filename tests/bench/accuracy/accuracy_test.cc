@@ -25,8 +25,8 @@ double FreeCalledFree(const TraversabilityTable& table) {
   return Share{table.free_free, table.free_free + table.free_occupied + table.free_unknown}.value();
 }
 
-// What is measured is the same on every run (0.9954 of the street's surfaces, say): the bounds leave
-// room for twice to three times as many errors.
+// What is measured is the same on every run (0.9954 of the street's surfaces, say): the bounds
+// leave room for twice to three times as many errors.
 TEST(AccuracyTest, AStreetIsMappedAsItIs) {
   const AccuracyScore score = Score("street", 60, 90);
   EXPECT_GT(score.layers_right.whole, 30000U);
