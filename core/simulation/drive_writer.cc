@@ -19,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMaxPartials = 100;  // that others left
+
 static_assert(std::endian::native == std::endian::little, "scans are little-endian float32");
 static_assert(sizeof(SimulatedPoint) == 16, "a point in velodyne/*.bin is four float32");
 
@@ -26,18 +28,32 @@ struct FileCloser {
   void operator()(std::FILE* file) const { static_cast<void>(std::fclose(file)); }
 };
 
+// Its errors are told by Open, Write and Close, each once.
+class OutputFile {
+ public:
+  Status Open(const fs::path& path) {
+    path_ = path;
+    file_.reset(std::fopen(path.c_str(), "wb"));
+    return file_ ? Status() : DiskError("cannot create", path, errno);
+  }
+  Status Write(const void* bytes, std::size_t size) {
+    const bool is_written = size == 0 || std::fwrite(bytes, 1, size, file_.get()) == size;
+    return is_written ? Status() : DiskError("cannot write", path_, errno);
+  }
+  Status Close() {
+    return std::fclose(file_.release()) == 0 ? Status() : DiskError("cannot write", path_, errno);
+  }
+
+ private:
+  fs::path path_;
+  std::unique_ptr<std::FILE, FileCloser> file_;
+};
+
 Status WriteFile(const fs::path& path, const void* bytes, std::size_t size) {
-  std::unique_ptr<std::FILE, FileCloser> file(std::fopen(path.c_str(), "wb"));
-  if (!file) {
-    return DiskError("cannot create", path, errno);
-  }
-  if (size > 0 && std::fwrite(bytes, 1, size, file.get()) != size) {
-    return DiskError("cannot write", path, errno);
-  }
-  if (std::fclose(file.release()) != 0) {
-    return DiskError("cannot write", path, errno);
-  }
-  return {};
+  OutputFile file;
+  ATLAS_RETURN_IF_ERROR(file.Open(path));
+  ATLAS_RETURN_IF_ERROR(file.Write(bytes, size));
+  return file.Close();
 }
 
 std::string Numbered(std::size_t i, const char* extension) {
@@ -70,17 +86,12 @@ void AppendBox(const std::string& scan, const TruthBox& box, std::string& text) 
   AppendNumber(box.size_m.z(), "\n", text);
 }
 
-std::string BoxesText(const SimulatedDrive& drive) {
+Status WriteBoxes(const std::string& scan, const std::vector<TruthBox>& boxes, OutputFile& file) {
   std::string text;
-  for (const TruthBox& box : drive.parked_boxes()) {
-    AppendBox("all", box, text);
+  for (const TruthBox& box : boxes) {
+    AppendBox(scan, box, text);
   }
-  for (std::size_t i = 0; i < drive.scans(); ++i) {
-    for (const TruthBox& box : drive.moving_boxes(i)) {
-      AppendBox(std::to_string(i), box, text);
-    }
-  }
-  return text;
+  return file.Write(text.data(), text.size());
 }
 
 Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
@@ -93,8 +104,6 @@ Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
     }
     AppendNumber(drive.time_s(i), "\n", times);
   }
-  const std::string boxes = BoxesText(drive);
-  ATLAS_RETURN_IF_ERROR(WriteFile(folder / "boxes.txt", boxes.data(), boxes.size()));
   ATLAS_RETURN_IF_ERROR(WriteFile(folder / "times.txt", times.data(), times.size()));
   return WriteFile(folder / "poses.txt", poses.data(), poses.size());
 }
@@ -110,6 +119,9 @@ Status WriteInto(const SimulatedDrive& drive,
                  const DriveProgress& progress) {
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "velodyne"));
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "labels"));
+  OutputFile boxes;
+  ATLAS_RETURN_IF_ERROR(boxes.Open(folder / "boxes.txt"));
+  ATLAS_RETURN_IF_ERROR(WriteBoxes("all", drive.parked_boxes(), boxes));
   for (std::size_t i = 0; i < drive.scans(); ++i) {
     const SimulatedScan scan = drive.Scan(i);
     if (scan.points.empty()) {
@@ -117,10 +129,12 @@ Status WriteInto(const SimulatedDrive& drive,
                     StrCat("scan ", i, " sees nothing: does the drive lead through the world?"));
     }
     ATLAS_RETURN_IF_ERROR(WriteScan(scan, i, folder));
+    ATLAS_RETURN_IF_ERROR(WriteBoxes(std::to_string(i), drive.moving_boxes(i), boxes));
     if (progress) {
       progress(i + 1);
     }
   }
+  ATLAS_RETURN_IF_ERROR(boxes.Close());
   return WriteText(drive, folder);
 }
 
@@ -144,6 +158,29 @@ Status CheckTarget(const fs::path& folder) {
                                          " exists and is not empty, expected a new one"));
 }
 
+// A new folder beside `target`, which nobody else has.
+Status MakePartial(const fs::path& target, fs::path& partial) {
+  std::error_code error;
+  if (target.has_parent_path()) {
+    fs::create_directories(target.parent_path(), error);
+  }
+  if (error) {
+    return DiskError("cannot create folder", target, error.value());
+  }
+  for (int i = 0; i < kMaxPartials; ++i) {
+    partial = target;
+    partial += i == 0 ? ".partial" : StrCat(".partial", i);
+    if (fs::create_directory(partial, error)) {
+      return {};
+    }
+    if (error && error != std::errc::file_exists) {
+      return DiskError("cannot create folder", partial, error.value());
+    }
+  }
+  return {StatusCode::kConflict,
+          StrCat(partial.string(), " exists, and all before it: remove what others left")};
+}
+
 }  // namespace
 
 Status WriteDrive(const SimulatedDrive& drive,
@@ -152,12 +189,10 @@ Status WriteDrive(const SimulatedDrive& drive,
   ATLAS_RETURN_IF_ERROR(CheckTarget(folder));
   // "a/b/" and "a/b" are the same folder.
   const fs::path target = folder.has_filename() ? folder : folder.parent_path();
-  fs::path partial = target;
-  partial += ".partial";
+  fs::path partial;
+  ATLAS_RETURN_IF_ERROR(MakePartial(target, partial));
   std::error_code error;
-  fs::remove_all(partial, error);
-  Status status = error ? DiskError("cannot remove", partial, error.value())
-                        : WriteInto(drive, partial, progress);
+  Status status = WriteInto(drive, partial, progress);
   if (status.ok()) {
     fs::rename(partial, target, error);
     status = error ? DiskError("cannot create folder", target, error.value()) : Status();

@@ -134,11 +134,15 @@ WorldParts SimulatedDrive::PartsAround(std::size_t i) const {
   return still_->Around(sensor_pose(i).translation(), options_.sensor.max_range_m);
 }
 
+// Of the middles of things that a ray may hit.
+double SimulatedDrive::TrafficRadius() const {
+  return options_.sensor.max_range_m + kThing_m;
+}
+
 SimulatedScan SimulatedDrive::Scan(std::size_t i) const {
   const WorldParts parts = PartsAround(i);
   const Eigen::Vector3d origin = parts.empty() ? sensor_pose(i).translation() : parts[0]->origin_m;
-  const CastableMesh traffic =
-      traffic_->MeshAround(stops_[i].moment, options_.sensor.max_range_m + kThing_m, origin);
+  const CastableMesh traffic = traffic_->MeshAround(stops_[i].moment, TrafficRadius(), origin);
   return caster_.Cast(parts, traffic, sensor_pose(i), {options_.seed, i});
 }
 

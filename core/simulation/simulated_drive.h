@@ -28,6 +28,7 @@ struct DriveOptions {
   std::uint64_t seed = 0;
   // Which of the world's parked slots hold a car: 0 none, else every other one by chance.
   std::uint64_t parked_seed = 0;
+  double start_s = 0.0;           // of the first scan
   double spacing_m = 1.25;        // between scans, in plan, along the middle of the leg
   double sensor_height_m = 1.8;   // straight above the surface
   double scan_interval_s = 0.25;  // with the spacing: 18 km/h
@@ -54,15 +55,15 @@ class SimulatedDrive {
   double length_m() const { return length_m_; }  // sum over legs
   // T_world_sensor of scan i. Requires i < scans().
   const Pose& sensor_pose(std::size_t i) const { return stops_[i].moment.T_world_sensor; }
-  double time_s(std::size_t i) const { return stops_[i].time_s; }
+  double time_s(std::size_t i) const { return options_.start_s + stops_[i].time_s; }
   SimulatedScan Scan(std::size_t i) const;
   // What is there all the time, cast by another sensor: no traffic, no cars of this drive.
   SimulatedScan StillScan(std::size_t i, const ScanCaster& caster) const;
 
-  // Truth: what moves, where it is during scan i (nothing moves within a scan), and the cars that
-  // are parked in this drive and may be gone in another.
+  // Truth: what moves, where it is during scan i (nothing moves within a scan), as far as the
+  // sensor may reach it, and the cars that are parked in this drive and may be gone in another.
   std::vector<TruthBox> moving_boxes(std::size_t i) const {
-    return traffic_->MovingBoxes(stops_[i].moment);
+    return traffic_->MovingBoxes(stops_[i].moment, TrafficRadius());
   }
   const std::vector<TruthBox>& parked_boxes() const { return traffic_->parked_boxes(); }
 
@@ -78,6 +79,7 @@ class SimulatedDrive {
   Status AddLeg(const DrivePath& path, std::size_t leg, double left_m);
   void AddStop(const DriveMoment& moment, double time_s);
   WorldParts PartsAround(std::size_t i) const;
+  double TrafficRadius() const;
 
   DriveOptions options_;
   ScanCaster caster_;

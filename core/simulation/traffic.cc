@@ -42,6 +42,10 @@ TriangleMesh ParkedCar(const ParkedSlot& slot) {
   return CarMesh(TruthLabel(TruthClass::kCar, slot.deck));
 }
 
+bool IsWithin(const Eigen::Isometry3d& T_world_thing, const DriveMoment& moment, double radius_m) {
+  return (T_world_thing.translation() - moment.T_world_sensor.translation()).norm() < radius_m;
+}
+
 bool IsAtVehicle(const DriveMoment& moment, const Eigen::Isometry3d& T_world_participant) {
   const Eigen::Vector3d p =
       (moment.T_world_sensor.inverse() * T_world_participant.translation()).cwiseAbs();
@@ -94,10 +98,12 @@ std::vector<Traffic::Placed> Traffic::PlacedAt(const DriveMoment& moment) const 
   return placed;
 }
 
-std::vector<TruthBox> Traffic::MovingBoxes(const DriveMoment& moment) const {
+std::vector<TruthBox> Traffic::MovingBoxes(const DriveMoment& moment, double radius_m) const {
   std::vector<TruthBox> boxes;
   for (const Placed& placed : PlacedAt(moment)) {
-    boxes.push_back(Moved(participant_boxes_[placed.participant], placed.T_world_participant));
+    if (IsWithin(placed.T_world_participant, moment, radius_m)) {
+      boxes.push_back(Moved(participant_boxes_[placed.participant], placed.T_world_participant));
+    }
   }
   return boxes;
 }
@@ -107,8 +113,7 @@ CastableMesh Traffic::MeshAround(const DriveMoment& moment,
                                  const Eigen::Vector3d& origin) const {
   TriangleMesh mesh;
   const auto append = [&](const TriangleMesh& thing, const Eigen::Isometry3d& T_world_thing) {
-    const Eigen::Vector3d away = T_world_thing.translation() - moment.T_world_sensor.translation();
-    if (away.norm() < radius_m) {
+    if (IsWithin(T_world_thing, moment, radius_m)) {
       Eigen::Isometry3d T_part_thing = T_world_thing;
       T_part_thing.translation() -= origin;
       mesh.Append(thing, T_part_thing);

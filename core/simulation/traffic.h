@@ -36,9 +36,9 @@ class Traffic {
           const std::vector<ParkedSlot>& slots,
           const TrafficOptions& options);
 
-  // Everything that moves, at one moment. A participant that would be where the vehicle is (a loop
-  // brings it there) is not on the road for that moment.
-  std::vector<TruthBox> MovingBoxes(const DriveMoment& moment) const;
+  // Everything that moves within `radius_m` of the vehicle, at one moment. A participant that would
+  // be where the vehicle is (a loop brings it there) is not on the road for that moment.
+  std::vector<TruthBox> MovingBoxes(const DriveMoment& moment, double radius_m) const;
   const std::vector<TruthBox>& parked_boxes() const { return parked_boxes_; }
 
   // What stands within `radius_m` of the vehicle and is not the world's, relative to `origin`.

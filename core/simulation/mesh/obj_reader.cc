@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <system_error>
 #include <vector>
 
@@ -46,6 +47,21 @@ std::optional<T> Number(std::string_view word) {
     return std::nullopt;
   }
   return value;
+}
+
+std::string_view TakeLine(std::string_view& text) {
+  const std::size_t end = text.find('\n');
+  std::string_view line = text.substr(0, end);
+  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  if (line.ends_with('\r')) {
+    line.remove_suffix(1);
+  }
+  return line;
+}
+
+// By a backslash at its end, but not within a comment.
+bool IsContinued(std::string_view line) {
+  return line.ends_with('\\') && line.find('#') == std::string_view::npos;
 }
 
 class ObjParser {
@@ -131,10 +147,14 @@ class ObjParser {
 
 Result<ObjMesh> ParseObj(std::string_view text, std::string_view name) {
   ObjParser parser;
-  for (std::size_t line_number = 1; !text.empty(); ++line_number) {
-    const std::size_t end = text.find('\n');
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  std::size_t lines = 1;
+  for (std::size_t line_number = 1; !text.empty(); line_number += lines) {
+    std::string joined;
+    std::string_view line = TakeLine(text);
+    for (lines = 1; IsContinued(line) && !text.empty(); ++lines) {
+      joined = StrCat(line.substr(0, line.rfind('\\')), " ", TakeLine(text));
+      line = joined;
+    }
     if (const Status status = parser.Line(line); !status.ok()) {
       return Error(status.WithContext(StrCat(name, ": line ", line_number)));
     }

@@ -55,6 +55,18 @@ TEST_F(DriveWriterTest, WritesWhatTheDriveHolds) {
   EXPECT_FALSE(fs::exists(folder_ / "new/drive.partial"));
 }
 
+TEST_F(DriveWriterTest, WhatOthersHaveBesideItStays) {
+  const fs::path theirs = folder_ / "drive.partial";
+  fs::create_directory(theirs);
+  std::ofstream(theirs / "precious") << "notes";
+  std::ofstream(folder_ / "drive.partial1") << "a file";
+  ASSERT_TRUE(WriteDrive(ShortDrive(), folder_ / "drive", {}).ok());
+  EXPECT_EQ(ReadAll(theirs / "precious"), "notes");
+  EXPECT_EQ(ReadAll(folder_ / "drive.partial1"), "a file");
+  EXPECT_TRUE(fs::exists(folder_ / "drive/poses.txt"));
+  EXPECT_FALSE(fs::exists(folder_ / "drive.partial2"));
+}
+
 TEST_F(DriveWriterTest, PosesReadBackExactly) {
   const SimulatedDrive drive = ShortDrive();
   ASSERT_TRUE(WriteDrive(drive, folder_ / "drive/", {}).ok());

@@ -44,6 +44,13 @@ TEST(ObjReaderTest, ReadsEveryFormOfCornersAndSkipsTheRest) {
   }
 }
 
+TEST(ObjReaderTest, ABackslashGoesOnInTheNextLine) {
+  const ObjMesh obj =
+      Parse(std::string(kSquare) + "f 1 2 \\\r\n3 \\\n 4\n# a comment \\\nf 1 2 3");
+  EXPECT_EQ(obj.mesh.triangles.size(), 3U);
+  ExpectRefused(std::string(kSquare) + "f 1 2 \\\n 3\nf 1 2 9", "line 7");
+}
+
 TEST(ObjReaderTest, FarMeshesKeepTheirPrecision) {
   const ObjMesh obj = Parse(
       "v 4000000.125 5000000.25 100.5\nv 4000010.125 5000000.25 100.5\nv 4000010.125 5000010.25 "

@@ -87,7 +87,7 @@ TEST(TrafficTest, NothingDrivesThroughTheVehicle) {
     DriveMoment moment;
     moment.leg_time_s = 0.1 * i;
     moment.T_world_sensor.translation() = Eigen::Vector3d(50.0, 0.0, 1.8);
-    for (const TruthBox& box : traffic.MovingBoxes(moment)) {
+    for (const TruthBox& box : traffic.MovingBoxes(moment, 100.0)) {
       ++there;
       ASSERT_FALSE(box.Contains({50.0, 0.0, 0.5}, 1.0));
     }
@@ -102,10 +102,11 @@ TEST(TrafficTest, ALeadingCarKeepsItsDistance) {
   DriveMoment moment;
   moment.along_m = 30.0;
   moment.leg_time_s = 99.0;
-  ASSERT_EQ(traffic.MovingBoxes(moment).size(), 1U);
-  EXPECT_NEAR(traffic.MovingBoxes(moment)[0].T_world_box.translation().x(), 50.0, 0.1);
+  ASSERT_EQ(traffic.MovingBoxes(moment, 100.0).size(), 1U);
+  EXPECT_NEAR(traffic.MovingBoxes(moment, 100.0)[0].T_world_box.translation().x(), 50.0, 0.1);
+  EXPECT_TRUE(traffic.MovingBoxes(moment, 40.0).empty()) << "out of reach";
   moment.along_m = 90.0;
-  EXPECT_TRUE(traffic.MovingBoxes(moment).empty());
+  EXPECT_TRUE(traffic.MovingBoxes(moment, 100.0).empty());
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "client/cli/commands/drive/simulation_request.h"
 
+#include <algorithm>
+#include <cctype>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -11,6 +13,16 @@
 
 namespace atlas {
 namespace {
+
+constexpr std::uint64_t kMaxDay = 20'000;  // later ones are not over yet
+constexpr double kDay_s = 86'400.0;
+
+// Whether a file is a mesh, by its name, in letters of either case.
+bool IsObjName(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name.ends_with(".obj");
+}
 
 Result<Trajectory> ReadTrajectory(const std::string& path, const TrajectoryOptions& options) {
   const Result<std::vector<Pose>> poses = ReadPoses(path);
@@ -27,9 +39,12 @@ void SimulationRequest::Declare(ArgumentSet& arguments) {
                      "Where the drive goes; a city grows along any trajectory");
   arguments.Choice("--sensor", {"vlp16", "hdl32", "hdl64", "h350"}, sensor_, "The LiDAR");
   arguments.Optional("--seed", "K", seed_,
-                     "Odd: the other direction; also noise, lane and traffic [0]");
-  arguments.Optional("--parked", "K", parked_seed_,
-                     "Which of the street's or city's free slots hold a parked car [0: none]");
+                     "Noise and traffic; without a trajectory the lane, too, and odd ones drive in "
+                     "the other direction [0]");
+  arguments.Optional(
+      "--parked", "K", parked_seed_,
+      "The visit of day K: its times begin at K days, and it fills free slots of the "
+      "street or city with parked cars of its own [0: none]");
   arguments.Optional("--trajectory", "FILE", trajectory_,
                      "Sensor poses to drive along, 12 numbers a line as in poses.txt");
   arguments.Optional("--every", "M", every_m_,
@@ -43,13 +58,22 @@ Result<SimulatedDrive> SimulationRequest::MakeDrive() const {
   return is_city() ? DriveAnyCity(*options) : DriveBuiltIn(*options);
 }
 
+bool SimulationRequest::is_mesh() const {
+  return IsObjName(world_);
+}
+
 Result<DriveOptions> SimulationRequest::Options() const {
   DriveOptions options;
   Result<LidarSensor> sensor = LidarSensorByName(sensor_);
   if (!sensor) return Error(sensor.error());
   options.sensor = *std::move(sensor);
   options.seed = seed_;
+  if (parked_seed_ > kMaxDay) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("--parked ", parked_seed_, ": expected a day up to ", kMaxDay));
+  }
   options.parked_seed = parked_seed_;
+  options.start_s = kDay_s * static_cast<double>(parked_seed_);
   if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
   return options;
 }

@@ -25,7 +25,7 @@ class SimulationRequest {
   Result<SimulatedDrive> DriveAnyCity(const DriveOptions& options) const;
   Result<SimulatedDrive> DriveMesh(const DriveOptions& options) const;
 
-  bool is_mesh() const { return world_.ends_with(".obj"); }
+  bool is_mesh() const;
   bool is_city() const { return world_ == "city"; }
 
   std::string world_;
