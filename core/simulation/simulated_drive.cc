@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLaneJitter_m = 0.3;
 constexpr double kThing_m = 10.0;  // nothing that moves reaches further from its middle
+constexpr double kAhead_m = 13.0;
 
 bool IsWithin(double value, double low, double high) {
   return value >= low && value <= high;  // false for NaN
@@ -76,6 +77,7 @@ Result<SimulatedDrive> SimulatedDrive::Create(SimulatedWorld world, const DriveO
       return Error(status.WithContext(StrCat("drive, leg ", leg)));
     }
   }
+  drive.AddCarAhead(legs);
   drive.traffic_ = std::make_shared<const Traffic>(
       std::move(world.traffic), std::move(legs), std::move(oncoming_legs), world.parked_slots,
       TrafficOptions{options.seed, options.parked_seed});
@@ -96,6 +98,7 @@ Result<SimulatedDrive> SimulatedDrive::Create(TrajectoryWorld world,
                           : (i > 0 ? options.scan_interval_s : 0.0);
     drive.AddStop(moments[i], time_s);
   }
+  drive.AddCarAhead(world.legs);
   std::vector<DrivePath> oncoming_legs;
   for (const DrivePath& leg : world.legs) {
     oncoming_legs.push_back(leg.Reversed());
@@ -128,6 +131,19 @@ Status SimulatedDrive::AddLeg(const DrivePath& path, std::size_t leg, double lef
             static_cast<double>(stops_.size()) * options_.scan_interval_s);
   }
   return {};
+}
+
+void SimulatedDrive::AddCarAhead(const std::vector<DrivePath>& legs) {
+  for (Stop& stop : stops_) {
+    DriveMoment& moment = stop.moment;
+    if (!options_.has_car_ahead || moment.along_m + kAhead_m > legs[moment.leg].length_m()) {
+      continue;
+    }
+    const PathPoint at = legs[moment.leg].At(moment.along_m + kAhead_m);
+    if (const auto pose = PoseOnSurface(still_->Around(at.position, kThing_m), at, 0.0)) {
+      moment.T_world_ahead = *pose;
+    }
+  }
 }
 
 WorldParts SimulatedDrive::PartsAround(std::size_t i) const {

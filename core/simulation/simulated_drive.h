@@ -28,6 +28,8 @@ struct DriveOptions {
   std::uint64_t seed = 0;
   // Which of the world's parked slots hold a car: 0 none, else every other one by chance.
   std::uint64_t parked_seed = 0;
+  // A car drives ahead on the same way, wherever it finds ground to stand on.
+  bool has_car_ahead = false;
   double start_s = 0.0;           // of the first scan
   double spacing_m = 1.25;        // between scans, in plan, along the middle of the leg
   double sensor_height_m = 1.8;   // straight above the surface
@@ -78,6 +80,7 @@ class SimulatedDrive {
   SimulatedDrive(std::shared_ptr<const StaticWorld> still, const DriveOptions& options);
   Status AddLeg(const DrivePath& path, std::size_t leg, double left_m);
   void AddStop(const DriveMoment& moment, double time_s);
+  void AddCarAhead(const std::vector<DrivePath>& legs);
   WorldParts PartsAround(std::size_t i) const;
   double TrafficRadius() const;
 

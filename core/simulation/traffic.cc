@@ -63,6 +63,7 @@ Traffic::Traffic(std::vector<TrafficParticipant> participants,
       participants_(std::move(participants)),
       legs_(std::move(legs)),
       oncoming_legs_(std::move(oncoming_legs)) {
+  participants_.push_back({CarMesh(TruthLabel(TruthClass::kMovingCar))});
   for (const TrafficParticipant& participant : participants_) {
     participant_boxes_.push_back(BoxOf(participant.mesh));
   }
@@ -76,7 +77,8 @@ Traffic::Traffic(std::vector<TrafficParticipant> participants,
 
 std::vector<Traffic::Placed> Traffic::PlacedAt(const DriveMoment& moment) const {
   std::vector<Placed> placed;
-  for (std::size_t i = 0; i < participants_.size(); ++i) {
+  const std::size_t ahead = participants_.size() - 1;
+  for (std::size_t i = 0; i < ahead; ++i) {
     const TrafficParticipant& participant = participants_[i];
     if (participant.leg != moment.leg) {
       continue;
@@ -94,6 +96,9 @@ std::vector<Traffic::Placed> Traffic::PlacedAt(const DriveMoment& moment) const 
     if (!IsAtVehicle(moment, frame)) {
       placed.push_back({i, frame});
     }
+  }
+  if (moment.T_world_ahead && !IsAtVehicle(moment, *moment.T_world_ahead)) {
+    placed.push_back({ahead, *moment.T_world_ahead});
   }
   return placed;
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/geometry/pose.h"
@@ -20,6 +21,8 @@ struct DriveMoment {
   std::size_t leg = 0;
   double leg_time_s = 0.0;
   double along_m = 0.0;  // of the leg
+  // Of a car ahead on the same way, where there is one: x forward, on the ground, tilted as it is.
+  std::optional<Pose> T_world_ahead = {};
 };
 
 struct TrafficOptions {
@@ -54,7 +57,7 @@ class Traffic {
   std::vector<Placed> PlacedAt(const DriveMoment& moment) const;
 
   TrafficOptions options_;
-  std::vector<TrafficParticipant> participants_;
+  std::vector<TrafficParticipant> participants_;  // the last one is the car ahead
   std::vector<DrivePath> legs_;
   std::vector<DrivePath> oncoming_legs_;
   std::vector<TruthBox> participant_boxes_;  // in the participants' frames

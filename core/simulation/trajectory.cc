@@ -70,4 +70,15 @@ Result<Trajectory> PlanTrajectory(std::span<const Pose> poses, const TrajectoryO
   return walk.Take();
 }
 
+std::vector<DrivePath> GroundBelow(const Trajectory& trajectory, double sensor_height_m) {
+  std::vector<DrivePath> legs;
+  for (std::vector<Eigen::Vector3d> points : trajectory.legs) {
+    for (Eigen::Vector3d& point : points) {
+      point.z() -= sensor_height_m;
+    }
+    legs.push_back(DrivePath::Through(points));
+  }
+  return legs;
+}
+
 }  // namespace atlas

@@ -24,6 +24,9 @@ struct Trajectory {
   std::vector<std::vector<Eigen::Vector3d>> legs;
 };
 
+// The legs as a vehicle drives them whose sensor stands so high above the ground.
+std::vector<DrivePath> GroundBelow(const Trajectory& trajectory, double sensor_height_m);
+
 // kInvalidArgument on options out of range; kInvalidData without a pose.
 Result<Trajectory> PlanTrajectory(std::span<const Pose> poses, const TrajectoryOptions& options);
 

@@ -13,7 +13,8 @@ namespace atlas::testing {
 namespace {
 
 Result<SimulatedDrive> DriveMesh(const std::filesystem::path& mesh,
-                                 const std::filesystem::path& poses_file) {
+                                 const std::filesystem::path& poses_file,
+                                 const DriveOptions& options = {}) {
   Result<ObjMesh> obj = ReadObj(mesh);
   if (!obj) return Error(obj.error());
   const Result<std::vector<Pose>> poses = ReadPoses(poses_file);
@@ -23,7 +24,8 @@ Result<SimulatedDrive> DriveMesh(const std::filesystem::path& mesh,
   LabelMesh(obj->mesh);
   TrajectoryWorld world;
   world.still = std::make_shared<const MeshWorld>(std::move(obj->mesh), obj->origin_m);
-  return SimulatedDrive::Create(std::move(world), std::move(trajectory->moments), {});
+  world.legs = GroundBelow(*trajectory, options.sensor_height_m);
+  return SimulatedDrive::Create(std::move(world), std::move(trajectory->moments), options);
 }
 
 void RemoveCars(TriangleMesh& mesh) {
@@ -41,19 +43,25 @@ void RemoveCars(TriangleMesh& mesh) {
 }  // namespace
 
 Result<SimulatedDrive> MakeBenchDrive(std::string_view name, const std::filesystem::path& data) {
-  if (name == "mesh_garage") {
-    return DriveMesh(data / "meshes/parking_garage.obj", data / "sim_garage_A/poses.txt");
+  DriveOptions with_traffic;
+  with_traffic.has_car_ahead = true;
+  if (name == "mesh_garage" || name == "mesh_garage_with_traffic") {
+    return DriveMesh(data / "meshes/parking_garage.obj", data / "sim_garage_A/poses.txt",
+                     name == "mesh_garage" ? DriveOptions() : with_traffic);
   }
   if (name == "mesh_interchange") {
     return DriveMesh(data / "meshes/cloverleaf_interchange.obj", data / "sim_overpass_A/poses.txt");
   }
   const bool is_without_cars = name == "street_without_cars";
-  const Result<WorldKind> kind = WorldKindByName(is_without_cars ? "street" : name);
+  const bool has_traffic = name == "garage_with_traffic";
+  const Result<WorldKind> kind = WorldKindByName(is_without_cars ? "street"
+                                                 : has_traffic   ? "garage"
+                                                                 : name);
   if (!kind) return Error(kind.error());
   Result<SimulatedWorld> world = MakeWorld(*kind);
   if (!world) return Error(world.error());
   if (is_without_cars) RemoveCars(world->mesh);
-  return SimulatedDrive::Create(*std::move(world), {});
+  return SimulatedDrive::Create(*std::move(world), has_traffic ? with_traffic : DriveOptions());
 }
 
 }  // namespace atlas::testing

@@ -2,10 +2,12 @@
 #include "core/simulation/traffic.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "core/simulation/simulated_drive.h"
+#include "core/simulation/surface_pose.h"
 #include "core/simulation/truth_label.h"
 
 namespace atlas {
@@ -107,6 +109,40 @@ TEST(TrafficTest, ALeadingCarKeepsItsDistance) {
   EXPECT_TRUE(traffic.MovingBoxes(moment, 40.0).empty()) << "out of reach";
   moment.along_m = 90.0;
   EXPECT_TRUE(traffic.MovingBoxes(moment, 100.0).empty());
+}
+
+TEST(TrafficTest, ACarAheadStandsOnEachDeckAndTiltsWithItsRamps) {
+  DriveOptions options;
+  options.has_car_ahead = true;
+  options.spacing_m = 5.0;
+  const SimulatedDrive drive =
+      SimulatedDrive::Create(MakeWorld(WorldKind::kGarage).value(), options).value();
+  std::size_t there = 0;
+  double steepest = 0.0;
+  double highest_m = 0.0;
+  for (std::size_t i = 0; i < drive.scans(); ++i) {
+    const std::vector<TruthBox> boxes = drive.moving_boxes(i);
+    ASSERT_LE(boxes.size(), 1U);
+    if (boxes.empty()) {
+      continue;
+    }
+    ++there;
+    const TruthBox& box = boxes[0];
+    const Eigen::Vector3d up = box.T_world_box.linear().col(2);
+    const Eigen::Vector3d foot = box.T_world_box.translation() - 0.5 * box.size_m.z() * up;
+    const auto ground =
+        SurfaceNear(drive.still_world().Around(foot, 10.0), foot + Eigen::Vector3d(0, 0, 0.3));
+    ASSERT_TRUE(ground.has_value()) << i;
+    EXPECT_NEAR(ground->z(), foot.z(), 0.35) << i;  // a body stands clear of the ground
+    steepest = std::max(steepest, std::acos(up.z()));
+    highest_m = std::max(highest_m, foot.z());
+    const double away_m =
+        (box.T_world_box.translation() - drive.sensor_pose(i).translation()).norm();
+    EXPECT_LT(away_m, 15.0);
+  }
+  EXPECT_GT(there, drive.scans() * 3 / 4);
+  EXPECT_GT(steepest, 0.1);
+  EXPECT_GT(highest_m, 7.0);
 }
 
 }  // namespace

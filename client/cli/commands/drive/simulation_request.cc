@@ -45,6 +45,8 @@ void SimulationRequest::Declare(ArgumentSet& arguments) {
       "--parked", "K", parked_seed_,
       "The visit of day K: its times begin at K days, and it fills free slots of the "
       "street or city with parked cars of its own [0: none]");
+  arguments.Flag("--traffic", has_traffic_,
+                 "In a garage or mesh: a car drives ahead (the other worlds have traffic anyway)");
   arguments.Optional("--trajectory", "FILE", trajectory_,
                      "Sensor poses to drive along, 12 numbers a line as in poses.txt");
   arguments.Optional("--every", "M", every_m_,
@@ -73,6 +75,7 @@ Result<DriveOptions> SimulationRequest::Options() const {
                  StrCat("--parked ", parked_seed_, ": expected a day up to ", kMaxDay));
   }
   options.parked_seed = parked_seed_;
+  options.has_car_ahead = has_traffic_;
   options.start_s = kDay_s * static_cast<double>(parked_seed_);
   if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
   return options;
@@ -93,6 +96,7 @@ Result<SimulatedDrive> SimulationRequest::DriveBuiltIn(const DriveOptions& optio
   if (parked_seed_ != 0 && *kind != WorldKind::kStreet) {
     return Error(NoFreeSlots());
   }
+  if (has_traffic_ && *kind != WorldKind::kGarage) return Error(HasTraffic());
   Result<SimulatedWorld> world = MakeWorld(*kind);
   if (!world) return Error(world.error());
   return SimulatedDrive::Create(*std::move(world), options);
@@ -103,7 +107,13 @@ Status SimulationRequest::NoFreeSlots() const {
           StrCat(world_, " has no free slots: --parked is for street and city")};
 }
 
+Status SimulationRequest::HasTraffic() const {
+  return {StatusCode::kInvalidArgument,
+          StrCat(world_, " has traffic of its own: --traffic is for garage and FILE.obj")};
+}
+
 Result<SimulatedDrive> SimulationRequest::DriveAnyCity(const DriveOptions& options) const {
+  if (has_traffic_) return Error(HasTraffic());
   if (trajectory_.empty() && every_m_ != 0.0) {
     return Error(StatusCode::kInvalidArgument,
                  "--every thins a trajectory: give --trajectory FILE");
@@ -128,6 +138,7 @@ Result<SimulatedDrive> SimulationRequest::DriveMesh(const DriveOptions& options)
   LabelMesh(obj->mesh);
   TrajectoryWorld world;
   world.still = std::make_shared<const MeshWorld>(std::move(obj->mesh), obj->origin_m);
+  world.legs = GroundBelow(*trajectory, options.sensor_height_m);
   return SimulatedDrive::Create(std::move(world), std::move(trajectory->moments), options);
 }
 

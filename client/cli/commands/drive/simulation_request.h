@@ -21,6 +21,7 @@ class SimulationRequest {
  private:
   Result<DriveOptions> Options() const;
   Status NoFreeSlots() const;
+  Status HasTraffic() const;
   Result<SimulatedDrive> DriveBuiltIn(const DriveOptions& options) const;
   Result<SimulatedDrive> DriveAnyCity(const DriveOptions& options) const;
   Result<SimulatedDrive> DriveMesh(const DriveOptions& options) const;
@@ -34,6 +35,7 @@ class SimulationRequest {
   double every_m_ = 0.0;
   std::uint64_t seed_ = 0;
   std::uint64_t parked_seed_ = 0;
+  bool has_traffic_ = false;
 };
 
 }  // namespace atlas
