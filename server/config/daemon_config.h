@@ -32,7 +32,7 @@ struct DaemonConfig {
   bool is_fusing = true;       // else dirty tiles wait for a daemon that does
   int fusion_nice = 10;        // how far fusion threads stand back behind the others
   int network_threads = 0;     // that run connections; 0: one for every four cores
-  int cache_mib = 256;         // decoded keyframes, all workers together
+  int cache_mib = 512;         // decoded keyframes, all workers together
   int survey_mib = 1024;       // what tiles keep from one fusion to the next
   int survey_disk_mib = 4096;  // the same on disk; 0: nothing
   int reply_mib = 64;          // tiles ready to be sent

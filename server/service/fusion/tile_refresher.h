@@ -18,7 +18,7 @@
 namespace atlas {
 
 struct TileRefresherOptions {
-  std::size_t keyframe_bytes = std::size_t{256} << 20;  // decoded keyframes, all workers together
+  std::size_t keyframe_bytes = std::size_t{512} << 20;  // decoded keyframes, all workers together
   std::size_t tile_bytes = std::size_t{128} << 20;      // decoded tiles, all workers together
   SurveyCacheLimits surveys =                           // kept from one time to the next
       SurveyCacheLimits::OfTotal(std::size_t{1024} << 20);

@@ -73,7 +73,7 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
   EXPECT_EQ(config.host, "127.0.0.1");
   EXPECT_EQ(config.port, 7447);
   EXPECT_EQ(config.workers, 0);
-  EXPECT_EQ(config.cache_mib, 256);
+  EXPECT_EQ(config.cache_mib, 512);
   EXPECT_EQ(config.survey_mib, 1024);
   EXPECT_EQ(config.survey_disk_mib, 4096);
   EXPECT_EQ(config.log_level, "info");
