@@ -45,8 +45,7 @@ TEST(ObjReaderTest, ReadsEveryFormOfCornersAndSkipsTheRest) {
 }
 
 TEST(ObjReaderTest, ABackslashGoesOnInTheNextLine) {
-  const ObjMesh obj =
-      Parse(std::string(kSquare) + "f 1 2 \\\r\n3 \\\n 4\n# a comment \\\nf 1 2 3");
+  const ObjMesh obj = Parse(std::string(kSquare) + "f 1 2 \\\r\n3 \\\n 4\n# a comment \\\nf 1 2 3");
   EXPECT_EQ(obj.mesh.triangles.size(), 3U);
   ExpectRefused(std::string(kSquare) + "f 1 2 \\\n 3\nf 1 2 9", "line 7");
 }
