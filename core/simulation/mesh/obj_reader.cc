@@ -152,8 +152,11 @@ Result<ObjMesh> ParseObj(std::string_view text, std::string_view name) {
     std::string joined;
     std::string_view line = TakeLine(text);
     for (lines = 1; IsContinued(line) && !text.empty(); ++lines) {
-      joined = StrCat(line.substr(0, line.rfind('\\')), " ", TakeLine(text));
-      line = joined;
+      joined.append(line.substr(0, line.size() - 1)).append(" ");
+      line = TakeLine(text);
+    }
+    if (lines > 1) {
+      line = joined.append(line);
     }
     if (const Status status = parser.Line(line); !status.ok()) {
       return Error(status.WithContext(StrCat(name, ": line ", line_number)));
