@@ -109,9 +109,9 @@ def bench_fusion(bin_dir):
 def bench_accuracy(bin_dir):
     """Maps of simulated drives against the worlds that they were simulated in."""
     data = os.environ.get("ATLAS_DATA", "")
-    worlds = ["street", "street_without_cars", "overpass", "garage", "garage_with_traffic"]
+    worlds = ["street", "street_without_cars", "overpass", "garage", "garage_with_traffic", "garage_with_car_behind"]
     if (pathlib.Path(data) / "meshes").is_dir():
-        worlds += ["mesh_garage", "mesh_garage_with_traffic", "mesh_interchange"]
+        worlds += ["mesh_garage", "mesh_garage_with_traffic", "mesh_garage_with_car_behind", "mesh_interchange"]
     else:
         print("accuracy: no meshes in $ATLAS_DATA, built-in worlds only", file=sys.stderr)
     process = subprocess.Popen([bin_dir / "accuracy_bench", "--data", data, *worlds], stdout=subprocess.PIPE,

@@ -1,6 +1,7 @@
 // Where the vehicle stops, and the cast from there.
 #include "core/simulation/simulated_drive.h"
 
+#include <cmath>
 #include <utility>
 
 #include "core/base/hash_random.h"
@@ -12,7 +13,6 @@ namespace {
 
 constexpr double kLaneJitter_m = 0.3;
 constexpr double kThing_m = 10.0;  // nothing that moves reaches further from its middle
-constexpr double kAhead_m = 13.0;
 
 bool IsWithin(double value, double low, double high) {
   return value >= low && value <= high;  // false for NaN
@@ -50,6 +50,14 @@ Status ValidateDrive(const DriveOptions& options) {
   return ValidateSensor(options.sensor);
 }
 
+// Not with two wheels on a wall or beyond the edge of a ramp.
+bool StandsBeside(const PathPoint& way, const Pose& T_world_car) {
+  constexpr double kMaxStep_m = 0.3;
+  constexpr double kMaxRoll = 0.04;  // the sine
+  return std::abs(T_world_car.translation().z() - way.position.z()) < kMaxStep_m &&
+         std::abs(T_world_car.linear()(2, 1)) < kMaxRoll;
+}
+
 }  // namespace
 
 SimulatedDrive::SimulatedDrive(std::shared_ptr<const StaticWorld> still,
@@ -70,14 +78,15 @@ Result<SimulatedDrive> SimulatedDrive::Create(SimulatedWorld world, const DriveO
   if (options.seed % 2 == 1) {
     std::swap(legs, oncoming_legs);
   }
-  const double jitter_m =
-      options.seed == 0 ? 0.0 : HashRandom(options.seed).Uniform(-kLaneJitter_m, kLaneJitter_m);
+  const double left_m =
+      world.lane_left_m +
+      (options.seed == 0 ? 0.0 : HashRandom(options.seed).Uniform(-kLaneJitter_m, kLaneJitter_m));
   for (std::size_t leg = 0; leg < legs.size(); ++leg) {
-    if (Status status = drive.AddLeg(legs[leg], leg, world.lane_left_m + jitter_m); !status.ok()) {
+    if (Status status = drive.AddLeg(legs[leg], leg, left_m); !status.ok()) {
       return Error(status.WithContext(StrCat("drive, leg ", leg)));
     }
   }
-  drive.AddCarAhead(legs);
+  drive.AddConvoy(legs, left_m);
   drive.traffic_ = std::make_shared<const Traffic>(
       std::move(world.traffic), std::move(legs), std::move(oncoming_legs), world.parked_slots,
       TrafficOptions{options.seed, options.parked_seed});
@@ -98,7 +107,7 @@ Result<SimulatedDrive> SimulatedDrive::Create(TrajectoryWorld world,
                           : (i > 0 ? options.scan_interval_s : 0.0);
     drive.AddStop(moments[i], time_s);
   }
-  drive.AddCarAhead(world.legs);
+  drive.AddConvoy(world.legs, 0.0);
   std::vector<DrivePath> oncoming_legs;
   for (const DrivePath& leg : world.legs) {
     oncoming_legs.push_back(leg.Reversed());
@@ -133,15 +142,19 @@ Status SimulatedDrive::AddLeg(const DrivePath& path, std::size_t leg, double lef
   return {};
 }
 
-void SimulatedDrive::AddCarAhead(const std::vector<DrivePath>& legs) {
+void SimulatedDrive::AddConvoy(const std::vector<DrivePath>& legs, double left_m) {
   for (Stop& stop : stops_) {
     DriveMoment& moment = stop.moment;
-    if (!options_.has_car_ahead || moment.along_m + kAhead_m > legs[moment.leg].length_m()) {
-      continue;
-    }
-    const PathPoint at = legs[moment.leg].At(moment.along_m + kAhead_m);
-    if (const auto pose = PoseOnSurface(still_->Around(at.position, kThing_m), at, 0.0)) {
-      moment.T_world_ahead = *pose;
+    for (const ConvoyCar& car : options_.convoy) {
+      const double along_m = moment.along_m + car.ahead_m;
+      if (moment.leg >= legs.size() || along_m < 0.0 || along_m > legs[moment.leg].length_m()) {
+        continue;
+      }
+      const PathPoint at = legs[moment.leg].At(along_m, left_m + car.left_m);
+      const auto pose = PoseOnSurface(still_->Around(at.position, kThing_m), at, 0.0);
+      if (pose && StandsBeside(at, *pose)) {
+        moment.T_world_convoy.push_back(*pose);
+      }
     }
   }
 }

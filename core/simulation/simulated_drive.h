@@ -20,6 +20,17 @@
 
 namespace atlas {
 
+// A car that goes where the vehicle goes, tilted as the ground there is.
+struct ConvoyCar {
+  double ahead_m = 0.0;  // along the vehicle's way; negative: behind it
+  double left_m = 0.0;   // of the vehicle's own track
+};
+
+// One ahead in the vehicle's track, and one behind beside it, over ground that the vehicle itself
+// does not drive over.
+constexpr ConvoyCar kCarAhead = {13.0, 0.0};
+constexpr ConvoyCar kCarBehind = {-12.0, -1.8};
+
 struct DriveOptions {
   LidarSensor sensor = Vlp16Sensor();
   // Even seeds drive the legs forward, odd ones in the other direction and lane. Seed 0 keeps to
@@ -28,12 +39,11 @@ struct DriveOptions {
   std::uint64_t seed = 0;
   // Which of the world's parked slots hold a car: 0 none, else every other one by chance.
   std::uint64_t parked_seed = 0;
-  // A car drives ahead on the same way, wherever it finds ground to stand on.
-  bool has_car_ahead = false;
-  double start_s = 0.0;           // of the first scan
-  double spacing_m = 1.25;        // between scans, in plan, along the middle of the leg
-  double sensor_height_m = 1.8;   // straight above the surface
-  double scan_interval_s = 0.25;  // with the spacing: 18 km/h
+  std::vector<ConvoyCar> convoy = {};  // each wherever it finds ground to stand on
+  double start_s = 0.0;                // of the first scan
+  double spacing_m = 1.25;             // between scans, in plan, along the middle of the leg
+  double sensor_height_m = 1.8;        // straight above the surface
+  double scan_interval_s = 0.25;       // with the spacing: 18 km/h
 };
 
 // What a drive along a trajectory meets. Legs are the pieces of the trajectory, for traffic alone.
@@ -80,7 +90,7 @@ class SimulatedDrive {
   SimulatedDrive(std::shared_ptr<const StaticWorld> still, const DriveOptions& options);
   Status AddLeg(const DrivePath& path, std::size_t leg, double left_m);
   void AddStop(const DriveMoment& moment, double time_s);
-  void AddCarAhead(const std::vector<DrivePath>& legs);
+  void AddConvoy(const std::vector<DrivePath>& legs, double left_m);
   WorldParts PartsAround(std::size_t i) const;
   double TrafficRadius() const;
 

@@ -77,8 +77,8 @@ Traffic::Traffic(std::vector<TrafficParticipant> participants,
 
 std::vector<Traffic::Placed> Traffic::PlacedAt(const DriveMoment& moment) const {
   std::vector<Placed> placed;
-  const std::size_t ahead = participants_.size() - 1;
-  for (std::size_t i = 0; i < ahead; ++i) {
+  const std::size_t convoy = participants_.size() - 1;
+  for (std::size_t i = 0; i < convoy; ++i) {
     const TrafficParticipant& participant = participants_[i];
     if (participant.leg != moment.leg) {
       continue;
@@ -97,8 +97,10 @@ std::vector<Traffic::Placed> Traffic::PlacedAt(const DriveMoment& moment) const 
       placed.push_back({i, frame});
     }
   }
-  if (moment.T_world_ahead && !IsAtVehicle(moment, *moment.T_world_ahead)) {
-    placed.push_back({ahead, *moment.T_world_ahead});
+  for (const Pose& T_world_car : moment.T_world_convoy) {
+    if (!IsAtVehicle(moment, T_world_car)) {
+      placed.push_back({convoy, T_world_car});
+    }
   }
   return placed;
 }
@@ -117,18 +119,19 @@ CastableMesh Traffic::MeshAround(const DriveMoment& moment,
                                  double radius_m,
                                  const Eigen::Vector3d& origin) const {
   TriangleMesh mesh;
-  const auto append = [&](const TriangleMesh& thing, const Eigen::Isometry3d& T_world_thing) {
-    if (IsWithin(T_world_thing, moment, radius_m)) {
-      Eigen::Isometry3d T_part_thing = T_world_thing;
-      T_part_thing.translation() -= origin;
-      mesh.Append(thing, T_part_thing);
-    }
+  const auto append = [&](const TriangleMesh& thing, Eigen::Isometry3d T_part_thing) {
+    T_part_thing.translation() -= origin;
+    mesh.Append(thing, T_part_thing);
   };
   for (const Placed& placed : PlacedAt(moment)) {
-    append(participants_[placed.participant].mesh, placed.T_world_participant);
+    if (IsWithin(placed.T_world_participant, moment, radius_m)) {
+      append(participants_[placed.participant].mesh, placed.T_world_participant);
+    }
   }
   for (const ParkedSlot& slot : parked_) {
-    append(ParkedCar(slot), slot.T_world_car);
+    if (IsWithin(slot.T_world_car, moment, radius_m)) {
+      append(ParkedCar(slot), slot.T_world_car);
+    }
   }
   return CastableMesh(std::move(mesh), origin);
 }

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "core/geometry/pose.h"
@@ -21,8 +20,8 @@ struct DriveMoment {
   std::size_t leg = 0;
   double leg_time_s = 0.0;
   double along_m = 0.0;  // of the leg
-  // Of a car ahead on the same way, where there is one: x forward, on the ground, tilted as it is.
-  std::optional<Pose> T_world_ahead = {};
+  // Of cars ahead or behind on the same way: x forward, on the ground, tilted as it is.
+  std::vector<Pose> T_world_convoy = {};
 };
 
 struct TrafficOptions {
@@ -57,7 +56,7 @@ class Traffic {
   std::vector<Placed> PlacedAt(const DriveMoment& moment) const;
 
   TrafficOptions options_;
-  std::vector<TrafficParticipant> participants_;  // the last one is the car ahead
+  std::vector<TrafficParticipant> participants_;  // the last one is any car of the convoy
   std::vector<DrivePath> legs_;
   std::vector<DrivePath> oncoming_legs_;
   std::vector<TruthBox> participant_boxes_;  // in the participants' frames

@@ -10,13 +10,18 @@
 namespace atlas::testing {
 namespace {
 
-AccuracyScore Score(std::string_view world, std::size_t begin, std::size_t end) {
+// Of scans [begin, end), in a map of these and of `before` scans before them.
+AccuracyScore Score(std::string_view world,
+                    std::size_t begin,
+                    std::size_t end,
+                    std::size_t before = 0) {
   const SimulatedDrive drive = MakeBenchDrive(world, {}).value();
   TruthOptions options;
   options.begin = begin;
   options.end = end;
   const MapProfile profile;
-  const auto keyframes = BuildKeyframes(drive, begin, end, profile, options.range_m).value();
+  const auto keyframes =
+      BuildKeyframes(drive, begin - before, end, profile, options.range_m).value();
   return ScoreMap(DriveMap(keyframes, profile), MeasureTruth(drive, Vlp16Sensor(), options),
                   options);
 }
@@ -71,6 +76,15 @@ TEST(AccuracyTest, DecksOfAGarageAreMappedEachForItself) {
   EXPECT_GT(score.static_kept.value(), 0.925);
   EXPECT_GT(score.static_kept_nearby.value(), 0.95);
   EXPECT_GT(FreeCalledFree(score.traversability), 0.98);
+}
+
+// One that follows beside the vehicle's track: no wheel of the vehicle clears what it filled. What
+// clears it are rays ahead, before it comes; a map that began where it is has too few of them.
+TEST(AccuracyTest, ACarThatFollowsLeavesNoTrailOnADeck) {
+  const AccuracyScore score = Score("garage_with_car_behind", 100, 140, 20);
+  EXPECT_GT(score.moving_gone.whole, 1500U);
+  EXPECT_GT(score.moving_gone.value(), 0.99);
+  EXPECT_GT(score.static_kept.value(), 0.925);
 }
 
 class TilesOfDrive : public TileSource {

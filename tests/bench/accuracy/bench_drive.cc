@@ -14,7 +14,7 @@ namespace {
 
 Result<SimulatedDrive> DriveMesh(const std::filesystem::path& mesh,
                                  const std::filesystem::path& poses_file,
-                                 const DriveOptions& options = {}) {
+                                 const DriveOptions& options) {
   Result<ObjMesh> obj = ReadObj(mesh);
   if (!obj) return Error(obj.error());
   const Result<std::vector<Pose>> poses = ReadPoses(poses_file);
@@ -43,25 +43,31 @@ void RemoveCars(TriangleMesh& mesh) {
 }  // namespace
 
 Result<SimulatedDrive> MakeBenchDrive(std::string_view name, const std::filesystem::path& data) {
-  DriveOptions with_traffic;
-  with_traffic.has_car_ahead = true;
-  if (name == "mesh_garage" || name == "mesh_garage_with_traffic") {
-    return DriveMesh(data / "meshes/parking_garage.obj", data / "sim_garage_A/poses.txt",
-                     name == "mesh_garage" ? DriveOptions() : with_traffic);
+  const auto takes = [&name](std::string_view suffix) {
+    if (!name.ends_with(suffix)) return false;
+    name.remove_suffix(suffix.size());
+    return true;
+  };
+  DriveOptions options;
+  if (takes("_with_traffic")) {
+    options.convoy = {kCarAhead, kCarBehind};
+  } else if (takes("_with_car_behind")) {
+    options.convoy = {kCarBehind};
+  }
+  if (name == "mesh_garage") {
+    return DriveMesh(data / "meshes/parking_garage.obj", data / "sim_garage_A/poses.txt", options);
   }
   if (name == "mesh_interchange") {
-    return DriveMesh(data / "meshes/cloverleaf_interchange.obj", data / "sim_overpass_A/poses.txt");
+    return DriveMesh(data / "meshes/cloverleaf_interchange.obj", data / "sim_overpass_A/poses.txt",
+                     options);
   }
-  const bool is_without_cars = name == "street_without_cars";
-  const bool has_traffic = name == "garage_with_traffic";
-  const Result<WorldKind> kind = WorldKindByName(is_without_cars ? "street"
-                                                 : has_traffic   ? "garage"
-                                                                 : name);
+  const bool is_without_cars = takes("_without_cars");
+  const Result<WorldKind> kind = WorldKindByName(name);
   if (!kind) return Error(kind.error());
   Result<SimulatedWorld> world = MakeWorld(*kind);
   if (!world) return Error(world.error());
   if (is_without_cars) RemoveCars(world->mesh);
-  return SimulatedDrive::Create(*std::move(world), has_traffic ? with_traffic : DriveOptions());
+  return SimulatedDrive::Create(*std::move(world), options);
 }
 
 }  // namespace atlas::testing

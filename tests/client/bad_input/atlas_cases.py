@@ -165,7 +165,7 @@ def target_cases(cases, drives, work):
     cases.forbidden("query into a closed folder", ["query", *near, "-o", closed / "tiles"], "tiles", is_stream=True)
     cases.refused("simulate over a drive", ["simulate", "street", "-o", drives.good], "conflict", "good")
     cases.forbidden("simulate into a closed folder", ["simulate", "street", "-o", closed / "drive"], "drive")
-    left = [path for path in drives.folder.rglob("*.partial")] + list(closed.iterdir())
+    left = [path for path in drives.folder.rglob("*.partial*")] + list(closed.iterdir())
     cases.report.equal("nothing half-written", left, [])
     full = pathlib.Path("/dev/full")
     if full.exists():

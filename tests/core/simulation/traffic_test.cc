@@ -111,38 +111,74 @@ TEST(TrafficTest, ALeadingCarKeepsItsDistance) {
   EXPECT_TRUE(traffic.MovingBoxes(moment, 100.0).empty());
 }
 
-TEST(TrafficTest, ACarAheadStandsOnEachDeckAndTiltsWithItsRamps) {
+// The highest and the lowest a wheel's foot stands above the ground below it.
+Eigen::Vector2d Clearance(const SimulatedDrive& drive, const TruthBox& box) {
+  Eigen::Vector2d high_low(-1.0, 1.0);
+  for (const double x : {-1.35, 1.35}) {
+    for (const double y : {-0.75, 0.75}) {
+      const Eigen::Vector3d foot = box.T_world_box * Eigen::Vector3d(x, y, -0.5 * box.size_m.z());
+      const auto ground = SurfaceNear(drive.still_world().Around(foot, 10.0), foot);
+      const double up_m = foot.z() - ground.value().z();
+      high_low = {std::max(high_low.x(), up_m), std::min(high_low.y(), up_m)};
+    }
+  }
+  return high_low;
+}
+
+TEST(TrafficTest, AConvoyStandsOnEachDeckAndTiltsWithItsRamps) {
   DriveOptions options;
-  options.has_car_ahead = true;
+  options.convoy = {kCarAhead, kCarBehind};
   options.spacing_m = 5.0;
   const SimulatedDrive drive =
       SimulatedDrive::Create(MakeWorld(WorldKind::kGarage).value(), options).value();
-  std::size_t there = 0;
+  std::size_t ahead = 0;
+  std::size_t behind = 0;
   double steepest = 0.0;
   double highest_m = 0.0;
   for (std::size_t i = 0; i < drive.scans(); ++i) {
-    const std::vector<TruthBox> boxes = drive.moving_boxes(i);
-    ASSERT_LE(boxes.size(), 1U);
-    if (boxes.empty()) {
-      continue;
+    for (const TruthBox& box : drive.moving_boxes(i)) {
+      const Eigen::Vector2d clearance = Clearance(drive, box);
+      EXPECT_LT(clearance.x(), 0.05) << i;  // on the kinks of a ramp
+      EXPECT_GT(clearance.y(), -0.05) << i;
+      steepest = std::max(steepest, std::acos(box.T_world_box.linear()(2, 2)));
+      highest_m = std::max(highest_m, box.T_world_box.translation().z());
+      const Eigen::Vector3d p_sensor =
+          drive.sensor_pose(i).inverse() * box.T_world_box.translation();
+      EXPECT_LT(p_sensor.norm(), 15.0) << i;
+      ++(p_sensor.x() > 0.0 ? ahead : behind);
     }
-    ++there;
-    const TruthBox& box = boxes[0];
-    const Eigen::Vector3d up = box.T_world_box.linear().col(2);
-    const Eigen::Vector3d foot = box.T_world_box.translation() - 0.5 * box.size_m.z() * up;
-    const auto ground =
-        SurfaceNear(drive.still_world().Around(foot, 10.0), foot + Eigen::Vector3d(0, 0, 0.3));
-    ASSERT_TRUE(ground.has_value()) << i;
-    EXPECT_NEAR(ground->z(), foot.z(), 0.35) << i;  // a body stands clear of the ground
-    steepest = std::max(steepest, std::acos(up.z()));
-    highest_m = std::max(highest_m, foot.z());
-    const double away_m =
-        (box.T_world_box.translation() - drive.sensor_pose(i).translation()).norm();
-    EXPECT_LT(away_m, 15.0);
   }
-  EXPECT_GT(there, drive.scans() * 3 / 4);
+  EXPECT_GT(ahead, drive.scans() * 3 / 4);
+  EXPECT_GT(behind, drive.scans() * 2 / 3);
   EXPECT_GT(steepest, 0.1);
   EXPECT_GT(highest_m, 7.0);
+}
+
+// On the way as driven, not on the leg's middle; and nowhere where the way has no more ground.
+TEST(TrafficTest, AConvoyKeepsToTheVehiclesLane) {
+  DriveOptions options;
+  options.convoy = {{10.0, 0.0}};
+  options.spacing_m = 10.0;
+  SimulatedWorld world = MakeStreetWorld();
+  world.traffic.clear();
+  const SimulatedDrive drive = SimulatedDrive::Create(std::move(world), options).value();
+  for (std::size_t i = 0; i + 1 < drive.scans(); ++i) {
+    const std::vector<TruthBox> boxes = drive.moving_boxes(i);
+    ASSERT_EQ(boxes.size(), 1U) << i;
+    const Eigen::Vector3d away =
+        boxes[0].T_world_box.translation() - drive.sensor_pose(i + 1).translation();
+    EXPECT_LT(away.head<2>().norm(), 0.1) << i;
+  }
+}
+
+TEST(TrafficTest, AWorldWithoutLegsHasNoConvoy) {
+  TrajectoryWorld world;
+  world.still = std::make_shared<const MeshWorld>(TriangleMesh());
+  DriveOptions options;
+  options.convoy = {kCarAhead};
+  const auto drive = SimulatedDrive::Create(std::move(world), {DriveMoment()}, options);
+  ASSERT_TRUE(drive.has_value());
+  EXPECT_TRUE(drive->moving_boxes(0).empty());
 }
 
 }  // namespace

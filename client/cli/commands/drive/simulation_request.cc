@@ -46,7 +46,8 @@ void SimulationRequest::Declare(ArgumentSet& arguments) {
       "The visit of day K: its times begin at K days, and it fills free slots of the "
       "street or city with parked cars of its own [0: none]");
   arguments.Flag("--traffic", has_traffic_,
-                 "In a garage or mesh: a car drives ahead (the other worlds have traffic anyway)");
+                 "In a garage or mesh: a car 13 m ahead and one 12 m behind (the other worlds have "
+                 "traffic anyway)");
   arguments.Optional("--trajectory", "FILE", trajectory_,
                      "Sensor poses to drive along, 12 numbers a line as in poses.txt");
   arguments.Optional("--every", "M", every_m_,
@@ -75,7 +76,7 @@ Result<DriveOptions> SimulationRequest::Options() const {
                  StrCat("--parked ", parked_seed_, ": expected a day up to ", kMaxDay));
   }
   options.parked_seed = parked_seed_;
-  options.has_car_ahead = has_traffic_;
+  if (has_traffic_) options.convoy = {kCarAhead, kCarBehind};
   options.start_s = kDay_s * static_cast<double>(parked_seed_);
   if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
   return options;
