@@ -29,7 +29,7 @@ struct ConvoyCar {
 // One ahead in the vehicle's track, and one behind beside it, over ground that the vehicle itself
 // does not drive over.
 constexpr ConvoyCar kCarAhead = {13.0, 0.0};
-constexpr ConvoyCar kCarBehind = {-12.0, -1.8};
+constexpr ConvoyCar kCarBehind = {-12.0, -2.1};
 
 struct DriveOptions {
   LidarSensor sensor = Vlp16Sensor();

@@ -1,6 +1,7 @@
 #include "core/fusion/combination/evidence_folder.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 #include <limits>
 #include <numeric>
@@ -16,6 +17,11 @@ std::uint8_t FlagsOf(const CellLayer& layer, int occupancy) {
   return static_cast<std::uint8_t>(
       (is_free ? TileLayer::kTraversable | TileLayer::kTraversableAny : 0) |
       (layer.is_measured ? TileLayer::kMeasured : 0));
+}
+
+// How many values of a layer's column are published.
+std::size_t ValuesIn(const ColumnSpan& span) {
+  return static_cast<std::size_t>(std::popcount(span.mask)) / 4;
 }
 
 // Seconds since 1970, as a tile says them; times before are 0.
@@ -51,10 +57,15 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
                    .column = segment.column};
     drives_.Hear(say);
     Sum& sum = sums_[labels[i]];
+    const bool was_occupied = sum.occupancy > 0;
     sum.occupancy = FoldEvidence(sum.occupancy, say.occupancy, clamp);
+    const std::int64_t offset = std::int64_t{sum.span.base} - say.column_base;
+    const ColumnSum before = sum.column;
     if (segment.column_seen != 0) {
-      sum.column.Fold(say.column, segment.column_seen,
-                      std::int64_t{sum.span.base} - say.column_base, clamp);
+      sum.column.Fold(say.column, segment.column_seen, offset, clamp);
+    }
+    if (was_occupied && sum.occupancy < 0 && segment.is_strong && can_stand_) {
+      sum.column.DropWhatStood(before, say.column, offset, ValuesIn(sum.span));
     }
   }
   for (std::size_t layer = 0; layer < layers.size(); ++layer) {

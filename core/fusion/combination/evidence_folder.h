@@ -20,7 +20,8 @@ namespace atlas {
 class EvidenceFolder {
  public:
   // `profile` must outlive the folder.
-  explicit EvidenceFolder(const MapProfile& profile) : profile_(profile), drives_(profile) {}
+  explicit EvidenceFolder(const MapProfile& profile)
+      : profile_(profile), can_stand_(profile.preset != FusionPreset::kPaper), drives_(profile) {}
 
   // Appends the layers to `out`, complete. Segments in canonical order with the layer of each, or
   // kNoLayer; `above_mm`: the altitude of the cell's next layer above these, or null.
@@ -46,6 +47,7 @@ class EvidenceFolder {
   static TileLayer Finish(const CellLayer& surface, const Sum& sum);
 
   const MapProfile& profile_;
+  const bool can_stand_;  // what is seen of a column stands on its layer
   RecentDrives drives_;
   std::vector<Sum> sums_;
   std::vector<std::uint32_t> order_;

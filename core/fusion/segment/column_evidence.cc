@@ -158,6 +158,23 @@ void ColumnSum::Fold(const ColumnLanes& said,
   evidence_ = std::bit_cast<ColumnLanes>(says == Lanes{} ? before : sum);
 }
 
+void ColumnSum::DropWhatStood(const ColumnSum& before,
+                              const ColumnLanes& said,
+                              std::int64_t offset,
+                              std::size_t values) {
+  const auto says = std::bit_cast<ColumnLanes>(From(said, offset));
+  const std::size_t begin = before.evidence_[0] > 0 ? 0 : 1;
+  std::size_t end = begin;
+  for (; end < values && before.evidence_[end] > 0; ++end) {
+    if (says[end] > 0) {
+      return;  // some of it is there
+    }
+  }
+  for (std::size_t k = begin; k < end; ++k) {
+    evidence_[k] = std::min<std::int8_t>(evidence_[k], 0);
+  }
+}
+
 std::uint64_t ColumnSum::Nibbles(std::uint64_t mask) const {
   std::uint64_t nibbles = 0;
   for (std::size_t k = 0; k < evidence_.size(); ++k) {

@@ -63,6 +63,14 @@ class ColumnSum {
             std::uint16_t said_seen,
             std::int64_t offset,
             const FoldClamp& clamp);
+  // What stood on a place that is free now is gone, too: evidence above 0 `before` this stretch
+  // spoke, without a gap from the lowest value or the next one upwards, becomes 0; but not where
+  // the stretch, whose column is taken from value `offset` on, saw some of it. `values`: that are
+  // published.
+  void DropWhatStood(const ColumnSum& before,
+                     const ColumnLanes& said,
+                     std::int64_t offset,
+                     std::size_t values);
   // The nibbles of the segments in `mask`; 0 where nothing was said.
   std::uint64_t Nibbles(std::uint64_t mask) const;
 

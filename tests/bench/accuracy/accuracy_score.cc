@@ -112,9 +112,9 @@ class Scorer {
 
   void AddMoving(const TileLayer* layer, double ground_m) {
     const bool in_column =
-        layer != nullptr &&
+        layer == nullptr ||  // a cell that is not in the map tells nothing
         IsColumnOccupied(*layer, map_.profile(), ground_m, options_.moving_low_m, options_.high_m);
-    const bool on_surface = layer != nullptr && layer->occupancy > 0;
+    const bool on_surface = layer == nullptr || layer->occupancy > 0;
     score_.moving_gone.Add(!in_column && !on_surface);
     score_.moving_gone_columns.Add(!in_column);
     score_.moving_gone_surface.Add(!on_surface);

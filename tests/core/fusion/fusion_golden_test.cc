@@ -45,7 +45,7 @@ Bytes PayloadHashes() {
 
 TEST(FusionGoldenTest, PayloadsAreTheSameEverywhere) {
   const Bytes hashes = PayloadHashes();
-  EXPECT_EQ(hashes, testing::GoldenFile("fusion_payloads_v3.bin", hashes));
+  EXPECT_EQ(hashes, testing::GoldenFile("fusion_payloads_v4.bin", hashes));
 }
 
 }  // namespace

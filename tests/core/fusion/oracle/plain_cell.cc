@@ -28,23 +28,37 @@ struct TimedSay {
   int units;
 };
 
-// By time; hits do not count for a while after the session's vehicle was there itself.
-int FoldedAll(std::span<const TimedSay> says, const MapProfile& profile) {
-  int sum = 0;
-  for (std::size_t i = 0; i < says.size(); ++i) {
-    const bool follows_vehicle = std::any_of(
-        says.begin(), says.begin() + static_cast<std::ptrdiff_t>(i), [&](const TimedSay& before) {
-          return IsStretchsLastWord(before.units, profile) &&
-                 before.last->key.session == says[i].last->key.session &&
-                 says[i].last->time_ms - std::min(before.driven->time_ms, before.last->time_ms) <=
-                     profile.driven_hold_ms;
-        });
-    sum = Folded(sum, follows_vehicle ? std::min(says[i].units, 0) : says[i].units, profile);
-  }
-  return sum;
-}
-
 }  // namespace
+
+// What the says so far add up to, of a surface or of a segment of its column.
+class PlainSum {
+ public:
+  explicit PlainSum(const MapProfile& profile) : profile_(profile) {}
+
+  // By time; hits do not count for a while after the session's vehicle was there itself. What it
+  // counted for.
+  int Add(const TimedSay& say) {
+    const bool follows_vehicle =
+        std::any_of(says_.begin(), says_.end(), [&](const TimedSay& before) {
+          return IsStretchsLastWord(before.units, profile_) &&
+                 before.last->key.session == say.last->key.session &&
+                 say.last->time_ms - std::min(before.driven->time_ms, before.last->time_ms) <=
+                     profile_.driven_hold_ms;
+        });
+    says_.push_back(say);
+    const int counted = follows_vehicle ? std::min(say.units, 0) : say.units;
+    units_ = Folded(units_, counted, profile_);
+    return counted;
+  }
+  void DropHits() { units_ = std::min(units_, 0); }
+  int units() const { return units_; }
+  bool is_told() const { return !says_.empty(); }
+
+ private:
+  const MapProfile& profile_;
+  std::vector<TimedSay> says_;
+  int units_ = 0;
+};
 
 void PlainCell::Fuse(std::span<const PlainObservation> observations,
                      std::set<const SessionKey*>& used,
@@ -240,16 +254,21 @@ TileLayer PlainCell::Publish(std::size_t index) const {
     return std::tie(a->last->time_ms, a->last->key) < std::tie(b->last->time_ms, b->last->key);
   });
   const Layer& layer = layers_[index];
-  std::vector<TimedSay> occupancies;
+  PlainSum surface(profile_);
+  std::vector<PlainSum> column(PublishedSegments(index), PlainSum(profile_));
   for (const Segment* segment : in_order) {
+    const bool was_occupied = surface.units() > 0;
     const bool is_wrong_guess =
         profile_.preset != FusionPreset::kPaper && layer.is_measured && !segment->is_strong &&
         std::abs(segment->representative->altitude_mm - layer.altitude_mm) > profile_.same_layer_mm;
     if (!is_wrong_guess) {
-      occupancies.push_back({segment->last, segment->driven, segment->occupancy});
+      surface.Add({segment->last, segment->driven, segment->occupancy});
     }
+    const bool is_foot_gone = profile_.preset != FusionPreset::kPaper && segment->is_strong &&
+                              was_occupied && surface.units() < 0;
+    AddToColumn(*segment, index, is_foot_gone, column);
   }
-  const int occupancy = FoldedAll(occupancies, profile_);
+  const int occupancy = surface.units();
   TileLayer out;
   out.altitude_mm = static_cast<std::int32_t>(layer.altitude_mm);
   out.sigma_100um = sigmas_.SigmaOfWeight100um(layer.weight);
@@ -260,34 +279,60 @@ TileLayer PlainCell::Publish(std::size_t index) const {
   out.observations = static_cast<std::uint16_t>(std::min<std::int64_t>(layer.observations, 65'535));
   out.confirmed_s = static_cast<std::uint32_t>(
       std::clamp<std::int64_t>(FloorDiv(layer.time_ms, 1'000), 0, 0xFFFFFFFF));
-  out.column = PublishColumn(in_order, index);
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    if (column[k].is_told()) {
+      out.column |= std::uint64_t{NibbleFromEvidence(column[k].units())} << (4 * k);
+    }
+  }
   return out;
 }
 
-std::uint64_t PlainCell::PublishColumn(std::span<const Segment* const> in_order,
-                                       std::size_t index) const {
+// Up to the slab of the next layer.
+std::size_t PlainCell::PublishedSegments(std::size_t index) const {
+  int segments = 0;
+  while (segments < profile_.column_segments &&
+         (index + 1 == layers_.size() ||
+          (LatticeOf(index, segments) + 1) * profile_.segment_height_mm <=
+              layers_[index + 1].altitude_mm - profile_.slab_margin_mm)) {
+    ++segments;
+  }
+  return static_cast<std::size_t>(segments);
+}
+
+std::int64_t PlainCell::LatticeOf(std::size_t index, int k) const {
   const auto altitude_mm = static_cast<std::int32_t>(layers_[index].altitude_mm);
-  std::uint64_t column = 0;
-  for (int k = 0; k < profile_.column_segments; ++k) {
-    const std::int64_t lattice = std::int64_t{ColumnBaseIndex(altitude_mm, profile_)} + k;
-    if (index + 1 < layers_.size() &&
-        (lattice + 1) * profile_.segment_height_mm >
-            layers_[index + 1].altitude_mm - profile_.slab_margin_mm) {
-      break;  // it would reach into the slab of the next layer
-    }
-    std::vector<TimedSay> says;
-    for (const Segment* segment : in_order) {
-      const std::int64_t own = lattice - segment->column_base;
-      if (own >= 0 && own < 16 && segment->is_seen[static_cast<std::size_t>(own)]) {
-        says.push_back(
-            {segment->last, segment->driven, segment->column[static_cast<std::size_t>(own)]});
-      }
-    }
-    if (!says.empty()) {
-      column |= std::uint64_t{NibbleFromEvidence(FoldedAll(says, profile_))} << (4 * k);
+  return std::int64_t{ColumnBaseIndex(altitude_mm, profile_)} + k;
+}
+
+// And where the foot of what stood there is gone, so is the rest of it, unless some of it was seen.
+void PlainCell::AddToColumn(const Segment& segment,
+                            std::size_t index,
+                            bool is_foot_gone,
+                            std::span<PlainSum> column) const {
+  std::vector<int> before;
+  std::vector<int> said;
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    before.push_back(column[k].units());
+    const std::int64_t own = LatticeOf(index, static_cast<int>(k)) - segment.column_base;
+    const bool is_told = own >= 0 && own < 16 && segment.is_seen[static_cast<std::size_t>(own)];
+    said.push_back(is_told ? column[k].Add({segment.last, segment.driven,
+                                            segment.column[static_cast<std::size_t>(own)]})
+                           : 0);
+  }
+  if (!is_foot_gone || column.empty()) {
+    return;
+  }
+  std::vector<std::size_t> stood;  // the lowest one may be free: most of it was above
+  for (std::size_t k = before[0] > 0 ? 0 : 1; k < column.size() && before[k] > 0; ++k) {
+    stood.push_back(k);
+  }
+  const bool is_seen =
+      std::any_of(stood.begin(), stood.end(), [&](std::size_t k) { return said[k] > 0; });
+  for (const std::size_t k : stood) {
+    if (!is_seen) {
+      column[k].DropHits();
     }
   }
-  return column;
 }
 
 }  // namespace atlas::testing

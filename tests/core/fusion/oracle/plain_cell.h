@@ -12,6 +12,8 @@
 
 namespace atlas::testing {
 
+class PlainSum;
+
 class PlainCell {
  public:
   PlainCell(const MapProfile& profile, const SigmaTable& sigmas)
@@ -41,7 +43,12 @@ class PlainCell {
   void KeepBestLayers();
   void AdoptWeak();
   TileLayer Publish(std::size_t index) const;
-  std::uint64_t PublishColumn(std::span<const Segment* const> in_order, std::size_t index) const;
+  std::size_t PublishedSegments(std::size_t index) const;
+  std::int64_t LatticeOf(std::size_t index, int k) const;
+  void AddToColumn(const Segment& segment,
+                   std::size_t index,
+                   bool is_foot_gone,
+                   std::span<PlainSum> column) const;
 
   const MapProfile& profile_;
   const SigmaTable& sigmas_;
