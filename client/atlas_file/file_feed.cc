@@ -52,7 +52,7 @@ class Filling {
   bool IsHeld(const TileFacts& facts) const {
     const TileFacts* held = store_.Find(facts.id);
     return held != nullptr && held->payload_hash == facts.payload_hash &&
-           (options_.sections & ~held->sections) == 0;
+           (options_.sections & ~held->sections) == 0 && !store_.ComesWhole(facts.id);
   }
 
   Status Take(const TileId& id) {

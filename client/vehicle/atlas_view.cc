@@ -61,21 +61,21 @@ AtlasView::AtlasView(TileStore& store, AtlasLink* link, std::size_t max_decoded_
 AtlasView::AtlasView(TileStore& store, TileFeed& feed, std::size_t max_decoded_bytes)
     : store_(store), feed_(&feed), max_decoded_bytes_(max_decoded_bytes) {}
 
-std::shared_ptr<const Tile> AtlasView::Decode(const TileId& id) {
+Result<std::shared_ptr<const Tile>> AtlasView::Decode(const TileId& id) {
   const TileFacts* facts = store_.Find(id);
-  if (facts == nullptr) return nullptr;
+  if (facts == nullptr) return Error(StatusCode::kNotFound, StrCat("tile ", id, ": not held"));
   const Decoded* known = decoded_.Use(id.Key());
   if (known != nullptr && known->payload_hash == facts->payload_hash &&
       known->sections == facts->sections) {
     return known->tile;
   }
   Decoded fresh{facts->payload_hash, facts->sections, nullptr};
-  const std::shared_ptr<const Bytes> blob = store_.Read(id);
-  if (blob == nullptr) return nullptr;
-  Result<Tile> tile = DecodeTile(*blob, store_.atlas().profile);
+  const Result<std::shared_ptr<const Bytes>> blob = store_.Read(id);
+  if (!blob) return Error(blob.error());
+  Result<Tile> tile = DecodeTile(**blob, store_.atlas().profile);
   if (!tile) {
     store_.Remove(id);
-    return nullptr;
+    return Error(tile.error());
   }
   fresh.tile = std::make_shared<const Tile>(*std::move(tile));
   decoded_.Insert(id.Key(), fresh, MemoryBytes(*fresh.tile));
@@ -84,14 +84,17 @@ std::shared_ptr<const Tile> AtlasView::Decode(const TileId& id) {
   return fresh.tile;
 }
 
-std::uint64_t AtlasView::MissingBelow(const Tile& tile, const DiscArea& disc) const {
+std::uint64_t AtlasView::MissingBelow(const Tile& tile,
+                                      const DiscArea& disc,
+                                      const std::set<TileId>& unread) const {
   const MapProfile& profile = store_.atlas().profile;
   const auto quarters = QuartersWithLayers(tile, profile);
   const auto children = tile.id.Children();
   std::uint64_t missing = 0;
   for (std::size_t i = 0; i < children.size(); ++i) {
     const bool is_wanted = quarters[i] && Touches(disc, children[i], profile);
-    missing += is_wanted && store_.Find(children[i]) == nullptr ? 1U : 0U;
+    const bool is_there = store_.Find(children[i]) != nullptr && !unread.contains(children[i]);
+    missing += is_wanted && !is_there ? 1U : 0U;
   }
   return missing;
 }
@@ -100,18 +103,26 @@ bool AtlasView::Collect(const DiscArea& disc, const AroundOptions& options, MapA
   map.tiles.clear();
   map.finest_places = 0;
   map.coarse_places = 0;
+  map.disk = Status();
+  std::set<TileId> unread;
   std::vector<TileId> ids = store_.TilesIn(disc, options.finest_level);
   // Finest first, so that a tile found damaged is missing when its parent is looked at.
   for (const TileId& id : ids) {
-    const std::shared_ptr<const Tile> tile = Decode(id);
-    if (tile == nullptr) return false;
+    const Result<std::shared_ptr<const Tile>> tile = Decode(id);
+    if (!tile && store_.Find(id) == nullptr) return false;
+    if (!tile) {
+      unread.insert(id);
+      if (map.disk.ok()) map.disk = tile.error();
+      continue;
+    }
     const bool is_finest = id.level == options.finest_level;
-    const std::uint64_t missing = is_finest ? 0 : MissingBelow(*tile, disc);
+    const std::uint64_t missing = is_finest ? 0 : MissingBelow(**tile, disc, unread);
     if (!is_finest && missing == 0) continue;
     map.finest_places += is_finest ? 1U : 0U;
     map.coarse_places += missing;
-    map.tiles.push_back(tile);
+    map.tiles.push_back(*tile);
   }
+  map.is_current = map.is_current && map.disk.ok();
   std::reverse(map.tiles.begin(), map.tiles.end());
   return true;
 }

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,10 +28,11 @@ struct MapAround {
   std::uint64_t coarse_places = 0;  // tiles that the atlas has below the coarse ones: not held
   bool is_current = false;          // its source said in this call that this is all there is
   std::uint64_t revision = 0;       // of the atlas then
-  Status sync;                      // why it is not current; ok where budget or time ended
+  Status sync;  // why it is not current; ok where budget or time ended, or see the next
+  Status disk;  // why it lacks tiles that are held: their files cannot be read now
   StoreSyncReport transfer;
 
-  bool is_finest_everywhere() const { return coarse_places == 0 && !tiles.empty(); }
+  bool is_finest_everywhere() const { return coarse_places == 0 && disk.ok() && !tiles.empty(); }
 };
 
 class AtlasView {
@@ -60,12 +62,15 @@ class AtlasView {
     std::shared_ptr<const Tile> tile;
   };
 
-  // Null: not held, or without what a map needs.
-  std::shared_ptr<const Tile> Decode(const TileId& id);
+  // As TileStore::Read. What does not decode is not held any more.
+  Result<std::shared_ptr<const Tile>> Decode(const TileId& id);
   void NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) const;
-  // Decodes; false when a held tile turned out to be damaged, and is not held any more.
+  // Decodes; false when a held tile turned out to be damaged, and is not held any more. Where one
+  // cannot be read now, it is missing in the map.
   bool Collect(const DiscArea& disc, const AroundOptions& options, MapAround& map);
-  std::uint64_t MissingBelow(const Tile& tile, const DiscArea& disc) const;
+  std::uint64_t MissingBelow(const Tile& tile,
+                             const DiscArea& disc,
+                             const std::set<TileId>& unread) const;
 
   TileStore& store_;
   std::unique_ptr<TileFeed> own_feed_;  // over the link; null: somebody else's

@@ -10,10 +10,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Calls back with each file and its bytes until that says no. False then.
+// Calls back with each file and its bytes until that says no. False then. `error`: there may be
+// more.
 template <typename OnFile>
-bool EachFile(const fs::path& folder, const OnFile& on_file) {
-  std::error_code error;
+bool EachFile(const fs::path& folder, std::error_code& error, const OnFile& on_file) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     std::error_code unreadable;
@@ -29,7 +29,8 @@ OtherAtlases::OtherAtlases(const fs::path& root, const fs::path& open) {
   for (const fs::path& folder : AtlasFolders(root)) {
     if (folder == open) continue;
     Other& other = others_.emplace_back(folder, 0);
-    EachFile(folder, [&](const fs::path&, std::uint64_t bytes) {
+    std::error_code ignored;  // it counts as much as was found
+    EachFile(folder, ignored, [&](const fs::path&, std::uint64_t bytes) {
       other.bytes += bytes;
       return true;
     });
@@ -39,26 +40,30 @@ OtherAtlases::OtherAtlases(const fs::path& root, const fs::path& open) {
 
 void OtherAtlases::Remove(std::uint64_t bytes) {
   std::uint64_t gone = 0;
-  while (gone < bytes && !others_.empty()) {
-    Other& oldest = others_.front();
+  for (auto oldest = others_.begin(); gone < bytes && oldest != others_.end();) {
     // The file that says when it was opened last goes last, so that what is left goes first again.
-    const bool is_empty = EachFile(oldest.folder, [&](const fs::path& file, std::uint64_t size) {
+    std::error_code error;
+    const auto remove = [&](const fs::path& file, std::uint64_t size) {
       if (file.filename() == kAtlasFileName) return true;
       if (gone >= bytes) return false;
       std::error_code ignored;  // it is not counted any more: others go in its place
       fs::remove(file, ignored);
       gone += size;
-      oldest.bytes -= std::min(oldest.bytes, size);
+      oldest->bytes -= std::min(oldest->bytes, size);
       bytes_ -= std::min(bytes_, size);
       return true;
-    });
-    if (!is_empty) return;
+    };
+    if (!EachFile(oldest->folder, error, remove)) return;
+    if (error) {  // it is looked into the next time
+      ++oldest;
+      continue;
+    }
     std::error_code ignored;
-    fs::remove(oldest.folder / kAtlasFileName, ignored);
-    fs::remove(oldest.folder, ignored);
-    gone += oldest.bytes;
-    bytes_ -= std::min(bytes_, oldest.bytes);
-    others_.pop_front();
+    fs::remove(oldest->folder / kAtlasFileName, ignored);
+    fs::remove(oldest->folder, ignored);
+    gone += oldest->bytes;
+    bytes_ -= std::min(bytes_, oldest->bytes);
+    oldest = others_.erase(oldest);
   }
 }
 

@@ -76,7 +76,7 @@ class Transfer {
     return is_failure ? reply.error() : Status();
   }
 
-  // Of deltas in the last reply: these tiles are not held now, and come as a whole.
+  // Of tiles in the last reply: they are not told any more, and come as a whole.
   bool has_lost_bases() const { return has_lost_bases_; }
   std::uint64_t bytes() const { return client_.bytes_received() - bytes_before_; }
   StoreSyncReport Report(bool is_complete) const {
@@ -94,7 +94,8 @@ class Transfer {
       ++report_.tiles;
       report_.deltas += is_delta ? 1U : 0U;
       Status status = store_.Put(tile, asked);
-      const bool is_lost = !status.ok() && is_delta;
+      const bool is_unread = !status.ok() && status.code() != StatusCode::kInvalidData;
+      const bool is_lost = is_unread || (!status.ok() && is_delta);
       has_lost_bases_ |= is_lost;
       return is_lost ? Status() : status;
     };

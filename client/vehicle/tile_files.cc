@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "client/vehicle/stored_file.h"
+#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
 
@@ -88,7 +89,7 @@ fs::path TileFiles::PathOf(const TileFacts& facts) const {
   return folder_ / NameOf(facts);
 }
 
-std::vector<TileFiles::Found> TileFiles::List() {
+Result<std::vector<TileFiles::Found>> TileFiles::List() {
   std::map<TileId, Dated> newest;
   std::error_code error;
   for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
@@ -105,6 +106,7 @@ std::vector<TileFiles::Found> TileFiles::List() {
     if (other->second.found.facts.revision < facts->revision) std::swap(other->second, dated);
     Remove(dated.found.facts);
   }
+  if (error) return Error(DiskError("cannot read folder", folder_, error.value()));
   std::vector<Dated> by_time;
   by_time.reserve(newest.size());
   for (const auto& [id, dated] : newest) {

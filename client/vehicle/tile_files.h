@@ -20,6 +20,8 @@ struct TileFacts {
   std::uint64_t revision = 0;
   std::uint64_t payload_hash = 0;
   SectionBits sections = kEverySection;  // asked for, whether the tile has them or not
+
+  friend bool operator==(const TileFacts&, const TileFacts&) = default;
 };
 
 class TileFiles {
@@ -33,11 +35,12 @@ class TileFiles {
   static Result<TileFiles> Open(const std::filesystem::path& root, const AtlasKey& atlas);
 
   // By when they were written, the last one last. Removes what writes that never ended left, and
-  // the older of two of a tile.
-  std::vector<Found> List();
+  // the older of two of a tile. Fails where the folder cannot be read to its end.
+  Result<std::vector<Found>> List();
   // The bytes that the file takes.
   Result<std::uint64_t> Write(const TileFacts& facts, ByteSpan blob);
-  // kInvalidData: damaged, or of another tile or atlas than its name says.
+  // kInvalidData: damaged, or of another tile or atlas than its name says. kNotFound: the file is
+  // gone. Else what the disk said, which is nothing about the tile.
   Result<Bytes> Read(const TileFacts& facts) const;
   void Remove(const TileFacts& facts);
   const std::filesystem::path& folder() const { return folder_; }

@@ -40,6 +40,18 @@ SectionBits SectionsThatCame(const TileBlob& tile, const AskedSections& asked) {
   return is_rest ? asked.sections & ~held->second.sections : asked.sections;
 }
 
+// What came, with what it is to be joined with; null: nothing that is held.
+Result<Bytes> Joined(const TileBlob& tile, const Bytes* base) {
+  if (tile.base_hash == 0) return base == nullptr ? tile.blob : MergeSections(*base, tile.blob);
+  if (base == nullptr) return Error(StatusCode::kInvalidData, "a delta to what is not held");
+  return ApplyTileDelta(*base, tile.blob);
+}
+
+// Nothing is left to be read. All else the disk may say and have the file all the same.
+bool IsLost(StatusCode code) {
+  return code == StatusCode::kInvalidData || code == StatusCode::kNotFound;
+}
+
 }  // namespace
 
 TileStore::TileStore(AtlasKey atlas, const TileStoreOptions& options)
@@ -64,9 +76,11 @@ Status TileStore::OpenFolder() {
   if (lock) lock_ = *std::move(lock);
   Result<TileFiles> files = TileFiles::Open(options_.folder, atlas_);
   if (!files) return files.error();
+  const Result<std::vector<TileFiles::Found>> found_tiles = files->List();
+  if (!found_tiles) return found_tiles.error();
   files_ = *std::move(files);
   others_ = OtherAtlases(options_.folder, files_->folder());
-  for (const TileFiles::Found& found : files_->List()) {
+  for (const TileFiles::Found& found : *found_tiles) {
     disk_.Insert(found.facts.id, found.bytes);
     tiles_[found.facts.id.Key()] = {found.facts, nullptr, true};
   }
@@ -79,18 +93,29 @@ const TileFacts* TileStore::Find(const TileId& id) const {
   return found == tiles_.end() ? nullptr : &found->second.facts;
 }
 
-std::shared_ptr<const Bytes> TileStore::Read(const TileId& id) {
+bool TileStore::ComesWhole(const TileId& id) const {
   const auto found = tiles_.find(id.Key());
-  if (found == tiles_.end()) return nullptr;
+  return found != tiles_.end() && found->second.comes_whole;
+}
+
+Result<std::shared_ptr<const Bytes>> TileStore::Read(const TileId& id) {
+  const auto found = tiles_.find(id.Key());
+  if (found == tiles_.end()) return Error(StatusCode::kNotFound, StrCat("tile ", id, ": not held"));
   Entry& entry = found->second;
   memory_.Use(id);
   disk_.Use(id);
   if (entry.blob != nullptr) return entry.blob;
   Result<Bytes> blob = files_->Read(entry.facts);
   if (!blob) {
-    Erase(found);
-    return nullptr;
+    const StatusCode code = blob.error().code();
+    if (IsLost(code)) {
+      Erase(found);
+    } else if (code != StatusCode::kResourceExhausted) {  // that would be the process, not the file
+      entry.comes_whole = true;
+    }
+    return Error(blob.error());
   }
+  entry.comes_whole = false;
   auto shared = std::make_shared<const Bytes>(*std::move(blob));
   entry.blob = shared;
   memory_.Insert(id, shared->size());
@@ -98,37 +123,36 @@ std::shared_ptr<const Bytes> TileStore::Read(const TileId& id) {
   return shared;
 }
 
-// What came, made of what is held where it is a delta.
-Result<Bytes> TileStore::Whole(const TileBlob& tile) {
-  if (tile.base_hash == 0) return tile.blob;
-  const TileFacts* held = Find(tile.id);
-  const bool is_held = held != nullptr && held->payload_hash == tile.base_hash;
-  const std::shared_ptr<const Bytes> base = is_held ? Read(tile.id) : nullptr;
-  if (base == nullptr) {
-    return Error(StatusCode::kInvalidData, "a delta to what is not held");
+// What is held that the tile is to be joined with, whose sections are added to those that came: the
+// base of a delta, or more sections of the same content. Null: nothing.
+Result<std::shared_ptr<const Bytes>> TileStore::BaseOf(const TileBlob& tile,
+                                                       SectionBits& sections) {
+  const auto held = tiles_.find(tile.id.Key());
+  if (held == tiles_.end()) return nullptr;
+  const TileFacts facts = held->second.facts;
+  const bool is_delta = tile.base_hash != 0;
+  const bool is_rest = sections != kEverySection && !held->second.comes_whole;
+  const bool is_base = is_delta ? facts.payload_hash == tile.base_hash
+                                : is_rest && facts.payload_hash == tile.payload_hash;
+  if (!is_base) return nullptr;
+  auto blob = Read(tile.id);
+  if (blob) {
+    if (!is_delta) sections |= facts.sections;
+    return blob;
   }
-  return ApplyTileDelta(*base, tile.blob);
-}
-
-// The blob with what is held of the same content, whose sections are added to those of the blob.
-Result<Bytes> TileStore::Joined(const TileBlob& tile, SectionBits& sections) {
-  if (tile.base_hash != 0) return Whole(tile);
-  if (sections == kEverySection) return tile.blob;
-  const TileFacts* held = Find(tile.id);
-  if (held == nullptr || held->payload_hash != tile.payload_hash) return tile.blob;
-  const SectionBits held_sections = held->sections;
-  const std::shared_ptr<const Bytes> blob = Read(tile.id);
-  if (blob == nullptr) return tile.blob;
-  sections |= held_sections;
-  return MergeSections(*blob, tile.blob);
+  if (IsLost(blob.error().code())) return nullptr;
+  held->second.comes_whole = true;
+  return blob;
 }
 
 Status TileStore::Put(const TileBlob& tile, const AskedSections& asked) {
   SectionBits sections = SectionsThatCame(tile, asked);
-  Result<Bytes> blob = Joined(tile, sections);
+  const Result<std::shared_ptr<const Bytes>> base = BaseOf(tile, sections);
+  if (!base) return base.error().WithContext(StrCat("tile ", tile.id));
+  Result<Bytes> blob = Joined(tile, base->get());
   Status status = blob ? CheckBlob(*blob, tile, atlas_.profile, sections) : blob.error();
-  Remove(tile.id);
   if (!status.ok()) {
+    Remove(tile.id);
     return Status(StatusCode::kInvalidData, status.message()).WithContext(StrCat("tile ", tile.id));
   }
   Keep({tile.id, tile.revision, tile.payload_hash, sections}, *std::move(blob));
@@ -136,10 +160,14 @@ Status TileStore::Put(const TileBlob& tile, const AskedSections& asked) {
 }
 
 void TileStore::Keep(const TileFacts& facts, Bytes blob) {
-  Entry entry{facts, nullptr, false};
+  const auto old = tiles_.find(facts.id.Key());
+  // A file of this name is written over, and stays as it is where that fails.
+  const bool has_file = old != tiles_.end() && old->second.is_on_disk && old->second.facts == facts;
+  if (old != tiles_.end() && !has_file) Erase(old);
+  Entry entry{facts, nullptr, has_file};
   if (files_) {
     const Result<std::uint64_t> written = files_->Write(facts, blob);
-    entry.is_on_disk = written.has_value();
+    entry.is_on_disk = has_file || written;
     if (written) disk_.Insert(facts.id, *written);
   }
   disk_failures_ += !options_.folder.empty() && !entry.is_on_disk ? 1U : 0U;
@@ -200,7 +228,7 @@ std::vector<HeldGroup> TileStore::Held(const MapArea& area,
   for (auto entry = tiles_.lower_bound(first); entry != tiles_.end() && entry->first < last;
        ++entry) {
     const TileFacts& facts = entry->second.facts;
-    if (!bounds.MayTouchBlock(facts.id)) continue;
+    if (entry->second.comes_whole || !bounds.MayTouchBlock(facts.id)) continue;
     summary.Add(facts);
     if (facts.sections != kEverySection) in_part[entry->first] = facts;
   }

@@ -60,12 +60,18 @@ class TileStore {
 
   // Null: not held.
   const TileFacts* Find(const TileId& id) const;
-  // The blob; null when it is not held, or was damaged on disk, and then is not held any more.
-  std::shared_ptr<const Bytes> Read(const TileId& id);
+  // The blob, never null. kNotFound: not held. kInvalidData, or kNotFound: its file was damaged, or
+  // is gone, and it is not held any more. Any other: what the disk said; the tile is held still and
+  // may be read later.
+  Result<std::shared_ptr<const Bytes>> Read(const TileId& id);
   // A tile that came with the sections `asked` of it, or as a delta to what is held. Sections that
   // are held of the same content are kept. kInvalidData, and that tile not held, when the blob is
-  // not what the hash says, or the delta's base is not held any more.
+  // not what the hash says, or the delta's base is not held any more. Errors of Read where what it
+  // is to be joined with cannot be read now: that stays held, and the tile is to come as a whole.
   Status Put(const TileBlob& tile, const AskedSections& asked = {});
+  // Held, but of no use until all of it came once more: a delta came that could not be applied to
+  // it, or the disk failed at its file. Not told to a daemon; a Read that succeeds ends it.
+  bool ComesWhole(const TileId& id) const;
   void Remove(const TileId& id);
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
   void Apply(const SyncSummary& summary);
@@ -85,13 +91,13 @@ class TileStore {
     TileFacts facts;
     std::shared_ptr<const Bytes> blob;  // null: only on disk
     bool is_on_disk = false;
+    bool comes_whole = false;
   };
   using Entries = std::map<std::uint64_t, Entry>;  // by key
 
   TileStore(AtlasKey atlas, const TileStoreOptions& options);
   Status OpenFolder();
-  Result<Bytes> Whole(const TileBlob& tile);
-  Result<Bytes> Joined(const TileBlob& tile, SectionBits& sections);
+  Result<std::shared_ptr<const Bytes>> BaseOf(const TileBlob& tile, SectionBits& sections);
   void Keep(const TileFacts& facts, Bytes blob);
   void Trim();
   void Erase(Entries::iterator entry);

@@ -19,6 +19,7 @@ StatusCode CodeOf(int error) {
     case EFBIG:
     case EMFILE:
     case ENFILE:
+    case ENOMEM:
       return StatusCode::kResourceExhausted;
     case ENOENT:
       return StatusCode::kNotFound;

@@ -8,9 +8,9 @@
 
 namespace atlas {
 
-// "WHAT PATH: REASON" for an errno. Forbidden: kPermissionDenied. Full, or no descriptor left:
-// kResourceExhausted. Not there: kNotFound. Something else under the name: kConflict. Everything
-// else: kUnavailable.
+// "WHAT PATH: REASON" for an errno. Forbidden: kPermissionDenied. Full, or no descriptor or memory
+// left: kResourceExhausted. Not there: kNotFound. Something else under the name: kConflict.
+// Everything else: kUnavailable.
 Status DiskError(std::string_view what, const std::filesystem::path& path, int error);
 
 }  // namespace atlas

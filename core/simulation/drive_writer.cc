@@ -131,7 +131,7 @@ Status WriteInto(const SimulatedDrive& drive,
     ATLAS_RETURN_IF_ERROR(WriteScan(scan, i, folder));
     ATLAS_RETURN_IF_ERROR(WriteBoxes(std::to_string(i), drive.moving_boxes(i), boxes));
     if (progress) {
-      progress(i + 1);
+      ATLAS_RETURN_IF_ERROR(progress(i + 1));
     }
   }
   ATLAS_RETURN_IF_ERROR(boxes.Close());

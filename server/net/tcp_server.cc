@@ -19,6 +19,7 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
+#include "server/base/line_budget.h"
 #include "server/net/connection/net_thread.h"
 #include "server/net/connection/shared_limits.h"
 #include "server/net/connection/visit_pace.h"
@@ -144,7 +145,7 @@ class TcpServer::Impl {
       }
       if (error) {
         // Out of descriptors or a peer that left: wait a little, serve the others meanwhile.
-        spdlog::warn("accept: {}", error.message());
+        NoteAcceptError(error);
         asio::steady_timer pause(io_, std::chrono::milliseconds(50));
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
         continue;
@@ -201,15 +202,18 @@ class TcpServer::Impl {
     thread.Serve({std::move(socket), std::move(place), std::move(session), security_});
   }
 
-  // One line a second, however many come.
+  // These write one line a second, however many come.
+  void NoteAcceptError(const error_code& error) {
+    if (accept_error_lines_.Take(std::chrono::steady_clock::now())) {
+      spdlog::warn("accept: {}", error.message());
+    }
+  }
   void NoteRefusal() {
     refused_.Add();
-    const auto now = std::chrono::steady_clock::now();
-    if (now - refusal_noted_at_ < std::chrono::seconds(1)) {
-      return;
+    if (refusal_lines_.Take(std::chrono::steady_clock::now())) {
+      spdlog::warn("connections refused: {} by now, {} are open", refused_.value(),
+                   places_.taken());
     }
-    spdlog::warn("connections refused: {} by now, {} are open", refused_.value(), places_.taken());
-    refusal_noted_at_ = now;
   }
 
   // Says why, as far as the socket takes it at once.
@@ -273,7 +277,8 @@ class TcpServer::Impl {
   asio::steady_timer accept_pause_;
   asio::signal_set signals_;
   ThreadCounter refused_;  // connections
-  std::chrono::steady_clock::time_point refusal_noted_at_;
+  LineBudget refusal_lines_{1};
+  LineBudget accept_error_lines_{1};
   std::unique_ptr<asio::steady_timer> drain_limit_;
 };
 

@@ -1,6 +1,9 @@
 // The map around a vehicle from an atlas file, and what a store becomes by it.
 #include "client/atlas_file/file_feed.h"
 
+#include <filesystem>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "client/vehicle/atlas_view.h"
@@ -156,6 +159,37 @@ TEST_F(FileFeedTest, ADamagedTileIsNamedAndTheOthersCome) {
   EXPECT_FALSE(map->is_current);
   EXPECT_EQ(map->finest_places, 3U);
   EXPECT_EQ(map->coarse_places, 1U);
+}
+
+// Links to themselves cannot be opened, also not by root.
+TEST_F(FileFeedTest, HeldTilesWhoseFilesCannotBeReadComeAgain) {
+  namespace fs = std::filesystem;
+  const fs::path folder = written_.path().parent_path().parent_path() / "tiles";
+  AtlasFile file = Opened();
+  FileFeed feed(file);
+  store_ = *TileStore::Open(TinyAtlas(), {.folder = folder});
+  const auto all = AtlasView(store_, feed).Around(kMiddle, 20.0);
+  ASSERT_TRUE(all && all->is_current);
+  store_ = *TileStore::Open(TinyAtlas(), {});  // lets the folder go
+  store_ = *TileStore::Open(TinyAtlas(), {.folder = folder});
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == ".tile") paths.push_back(entry.path());
+  }
+  for (const fs::path& path : paths) {
+    fs::remove(path);
+    fs::create_symlink(path.filename(), path);
+  }
+  AtlasView view(store_, feed);
+  const auto none = view.Around(kMiddle, 20.0);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->disk.code(), StatusCode::kUnavailable);
+  EXPECT_TRUE(none->tiles.empty());
+  EXPECT_EQ(store_.size(), paths.size());
+  const auto again = view.Around(kMiddle, 20.0);
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(again->is_current) << again->disk.message();
+  EXPECT_EQ(again->transfer.tiles, all->transfer.tiles);
 }
 
 TEST_F(FileFeedTest, AnotherAtlasIsAConflict) {

@@ -71,7 +71,7 @@ class CutReplyTest : public VehicleTest {
       EXPECT_EQ(is_covered, store.Find(place) != nullptr) << id;
     }
     for (const TileId& id : store.Tiles()) {
-      EXPECT_NE(store.Read(id), nullptr) << id;
+      EXPECT_TRUE(store.Read(id)) << id;
       EXPECT_TRUE(id.level == coarsest || store.Find(id.Parent()) != nullptr) << id;
     }
   }

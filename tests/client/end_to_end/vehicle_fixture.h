@@ -55,7 +55,7 @@ class VehicleTest : public EndToEndTest {
   static HashById Held(TileStore& store) {
     HashById tiles;
     for (const TileId& id : store.Tiles()) {
-      EXPECT_NE(store.Read(id), nullptr) << id;
+      EXPECT_TRUE(store.Read(id)) << id;
       tiles[id] = store.Find(id)->payload_hash;
     }
     return tiles;

@@ -9,6 +9,7 @@
 #include "client/vehicle/tile_store.h"
 #include "tests/client/vehicle/sync_peer.h"
 #include "tests/client/vehicle/test_folder.h"
+#include "tests/core/support/no_descriptors.h"
 
 namespace atlas {
 namespace {
@@ -141,6 +142,22 @@ TEST_F(OtherAtlasesTest, AFolderThatSaysNothingGoesFirstAndWhatIsNotOursStays) {
   EXPECT_EQ(others.bytes(), 0U);
   EXPECT_EQ(BytesBelow(folder_.path()), 2'000U);
   others.Remove(1);
+}
+
+TEST_F(OtherAtlasesTest, AFolderThatCannotBeReadNowStays) {
+  Fill(Atlas(7));
+  OtherAtlases others(folder_.path(), folder_.path() / "none");
+  const std::uint64_t before = others.bytes();
+  {
+    const NoDescriptors none;
+    others.Remove(~std::uint64_t{0});
+  }
+  EXPECT_EQ(others.bytes(), before);
+  EXPECT_EQ(KnownAtlases(folder_.path()), std::vector{Atlas(7)});
+  EXPECT_EQ(TilesOf(7), world_.tiles().size());
+  others.Remove(~std::uint64_t{0});
+  EXPECT_EQ(others.bytes(), 0U);
+  EXPECT_TRUE(AtlasFolders(folder_.path()).empty());
 }
 
 }  // namespace

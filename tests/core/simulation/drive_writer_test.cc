@@ -43,8 +43,10 @@ TEST_F(DriveWriterTest, WritesWhatTheDriveHolds) {
   const SimulatedDrive drive = ShortDrive();
   ASSERT_EQ(drive.scans(), 4U);
   std::size_t reported = 0;
-  const Status status =
-      WriteDrive(drive, folder_ / "new" / "drive", [&](std::size_t done) { reported = done; });
+  const Status status = WriteDrive(drive, folder_ / "new" / "drive", [&](std::size_t done) {
+    reported = done;
+    return Status();
+  });
   ASSERT_TRUE(status.ok()) << status.message();
   EXPECT_EQ(reported, drive.scans());
   const SimulatedScan scan = drive.Scan(2);
@@ -125,6 +127,17 @@ TEST_F(DriveWriterTest, AScanThatSeesNothingIsATypedErrorThatLeavesNothing) {
   const auto drive = SimulatedDrive::Create(std::move(world), {DriveMoment()}, {});
   const Status status = WriteDrive(*drive, folder_ / "drive", {});
   EXPECT_EQ(status.code(), StatusCode::kInvalidData);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(DriveWriterTest, AnErrorOfTheProgressEndsItAndLeavesNothing) {
+  std::size_t calls = 0;
+  const Status status = WriteDrive(ShortDrive(), folder_ / "drive", [&](std::size_t done) {
+    ++calls;
+    return done < 2 ? Status() : Status(StatusCode::kUnavailable, "signal 15");
+  });
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+  EXPECT_EQ(calls, 2U);
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 

@@ -1,4 +1,14 @@
 // Peers that stall, flood or come in crowds: each within its limits, the others served.
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include <arpa/inet.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include "tests/core/support/no_descriptors.h"
 #include "tests/server/net/net_fixture.h"
 
 namespace atlas {
@@ -10,6 +20,40 @@ class LimitTest : public NetTest {
  protected:
   static constexpr milliseconds kSoon{1'000};
 };
+
+// Looked at again every 50 ms, said once a second.
+TEST_F(LimitTest, WithoutDescriptorsTheLogHasFewLinesAndWhoWaitsIsServedLater) {
+  const auto before = spdlog::default_logger();
+  std::ostringstream log;
+  const auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(log);
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("atlasd", sink));
+  Serve();
+  ExpectServes();
+  const auto begin = std::chrono::steady_clock::now();
+  const int waiting = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  {
+    const NoDescriptors none;
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port_);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(waiting, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    std::this_thread::sleep_for(milliseconds(600));
+  }
+  ExpectServes();
+  const auto time = std::chrono::steady_clock::now() - begin;
+  ::close(waiting);
+  StopServer();
+  spdlog::set_default_logger(before);
+  const std::string line = "accept: Too many open files";
+  int lines = 0;
+  for (std::size_t at = log.str().find(line); at != std::string::npos;
+       at = log.str().find(line, at + 1)) {
+    ++lines;
+  }
+  EXPECT_GE(lines, 1) << log.str();
+  EXPECT_LE(lines, 1 + time / std::chrono::seconds(1)) << log.str();
+}
 
 TEST_F(LimitTest, SilenceBeforeTheHelloEnds) {
   net_.handshake = kSoon;

@@ -1,4 +1,5 @@
 // `atlas simulate`: a drive through a world that is built in or a mesh, as a folder of scans.
+#include "client/cli/command_line/interruption.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/simulation_request.h"
 #include "client/cli/output/json_text.h"
@@ -22,9 +23,12 @@ class SimulateCommand : public Command {
     const auto drive = request_.MakeDrive();
     if (!drive) return drive.error();
     {
+      const Interruption interruption;
       ProgressBar bar(context.err, context.is_err_terminal, "simulate", drive->scans());
-      ATLAS_RETURN_IF_ERROR(
-          WriteDrive(*drive, directory_, [&bar](std::size_t written) { bar.Update(written); }));
+      ATLAS_RETURN_IF_ERROR(WriteDrive(*drive, directory_, [&](std::size_t written) {
+        bar.Update(written);
+        return interruption.Check();
+      }));
     }
     const double metres = Rounded(drive->length_m(), 3);
     if (context.is_json) {
