@@ -12,6 +12,7 @@
 #include "core/base/str_cat.h"
 #include "server/net/access/access_check.h"
 #include "server/net/connection/completion.h"
+#include "server/net/connection/reading_turn.h"
 
 namespace atlas {
 namespace {
@@ -19,8 +20,7 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-constexpr std::size_t kBytesInTurn = 256u << 10;  // of one peer that has more
-constexpr std::size_t kMaxClientBytes = 100;      // of its name that are kept for the log
+constexpr std::size_t kMaxClientBytes = 100;  // of its name that are kept for the log
 
 }  // namespace
 
@@ -75,7 +75,7 @@ asio::awaitable<void> PeerConnection::Read() {
 }
 
 asio::awaitable<Status> PeerConnection::ReadRequests() {
-  std::size_t turn_bytes = 0;
+  ReadingTurn turn(stream_);
   while (true) {
     if (!HasRoom()) {
       co_await WaitForRoom();
@@ -105,13 +105,8 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
         co_await KeepToRate(came.bytes);
       }
     }
-    turn_bytes += came.bytes;
-    if (came.is_blocked && !is_draining_ && !is_refused_) {
-      turn_bytes = 0;
-      co_await stream_.WaitUntilReadable(stop_reading_.slot());
-    } else if (turn_bytes >= kBytesInTurn) {
-      turn_bytes = 0;
-      co_await asio::post(stream_.executor(), asio::use_awaitable);  // the others'
+    if (!is_draining_ && !is_refused_) {
+      co_await turn.Next(came, stop_reading_.slot());
     }
   }
 }
@@ -269,6 +264,7 @@ PeerConnection::MaybeAwaited PeerConnection::Answer(Request request, const Statu
   ++unpaid_requests_;
   if (!denied.ok()) {
     const wire::Envelope& message = *request.message;
+    handler_.NoteDenied(message, denied, as_peer_);
     RequestRecord(peer_, message, request.began).End(denied);
     writer_.PushError(message.request_id(), denied);
     return std::nullopt;
@@ -334,14 +330,13 @@ asio::awaitable<void> PeerConnection::Linger() {
   stream_.CloseSending();
   phase_ = Phase::kLingering;
   linger_until_ = Clock::now() + (is_refused_ ? options_.linger : options_.drain);
+  ReadingTurn turn(stream_);
   while (phase_ == Phase::kLingering) {
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
       break;
     }
-    if (came.is_blocked) {
-      co_await stream_.WaitUntilReadable({});
-    }
+    co_await turn.Next(came, {});
   }
 }
 

@@ -21,6 +21,7 @@
 #include "server/net/requests/sync_reply.h"
 #include "server/net/requests/tile_frames.h"
 #include "server/net/requests/watch_requests.h"
+#include "server/net/requests/write_requests.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
@@ -29,6 +30,8 @@ namespace atlas {
 // Shared by all connections and their threads. What may block runs on `pool`, what reads the whole
 // store on `reading_pool`. All arguments outlive this.
 class RequestHandler {
+  using Envelope = wire::Envelope;
+
  public:
   RequestHandler(AtlasService& service,
                  boost::asio::thread_pool& pool,
@@ -52,6 +55,12 @@ class RequestHandler {
   // Every later one, which gets its replies, or one error. What can be answered from memory is, at
   // once; else the rest is to be awaited.
   std::optional<boost::asio::awaitable<void>> Handle(Request request, Peer& peer);
+  // Of one that is refused before it is handled: what comes behind it may have to wait for it.
+  static void NoteDenied(const Envelope& request, const Status& denied, Peer& peer) {
+    if (request.has_upload_keyframe()) {
+      NoteRefusedUpload(request.upload_keyframe(), denied, peer);
+    }
+  }
   // Those of frames that are large; to be handled as any other then.
   boost::asio::awaitable<Result<LargeRequests::Outcome>> ReadLarge(LargeFrame frame,
                                                                    const Identity& identity) {
@@ -63,8 +72,6 @@ class RequestHandler {
   void ReturnFreed(FreedMemory::Clock::time_point now);
 
  private:
-  using Envelope = wire::Envelope;
-
   boost::asio::awaitable<void> Await(Request request, Peer& peer);
   boost::asio::awaitable<void> Resume(SessionKey session,
                                       Envelope reply,

@@ -49,13 +49,13 @@ asio::awaitable<Result<NewKeyframe>> CheckUpload(RequestContext& context,
   co_return co_await OnPool(context.pool, check);
 }
 
-void NoteRefusal(const wire::UploadKeyframe& message, const Status& why, MissingUploads& missing) {
+}  // namespace
+
+void NoteRefusedUpload(const wire::UploadKeyframe& message, const Status& why, Peer& peer) {
   if (const Result<KeyframeKey> key = KeyFromWire(message.key())) {
-    missing.NoteEnd(*key, why);
+    peer.missing->NoteEnd(*key, why);
   }
 }
-
-}  // namespace
 
 asio::awaitable<Status> AnswerUpload(RequestContext& context,
                                      const wire::Envelope& request,
@@ -64,7 +64,7 @@ asio::awaitable<Status> AnswerUpload(RequestContext& context,
   Result<NewKeyframe> keyframe = co_await CheckUpload(context, request.upload_keyframe());
   co_await turn.Come();
   if (!keyframe) {
-    NoteRefusal(request.upload_keyframe(), keyframe.error(), *peer.missing);
+    NoteRefusedUpload(request.upload_keyframe(), keyframe.error(), peer);
     co_return keyframe.error();
   }
   keyframe->missing = peer.missing;

@@ -16,6 +16,9 @@ namespace atlas {
 boost::asio::awaitable<Status> AnswerUpload(RequestContext& context,
                                             const wire::Envelope& request,
                                             Peer& peer);
+// Of a keyframe that is refused, wherever that is: those behind it in its session may have to wait
+// for it.
+void NoteRefusedUpload(const wire::UploadKeyframe& message, const Status& why, Peer& peer);
 boost::asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
                                                  const Request& request,
                                                  ReplyWriter& out);

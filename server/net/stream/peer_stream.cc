@@ -24,6 +24,11 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
+// A peer changes its key now and then, after gigabytes. Each time costs ours a derivation, so who
+// does nothing else has to go: so many are free, and one for so many bytes.
+constexpr std::uint64_t kFreeKeyUpdates = 16;
+constexpr std::uint64_t kBytesForKeyUpdate = 1u << 20;
+
 // Of what a call to the socket returned.
 PeerStream::Moved MovedBy(ssize_t result, std::size_t asked) {
   if (result < 0) {
@@ -43,6 +48,27 @@ PeerStream::PeerStream(tcp::socket socket, SslSession session)
   if (error) {  // it would hold up its thread
     Close();
   }
+  if (session_ != nullptr) {
+    SSL_set_msg_callback(session_.get(), &CountKeyUpdates);
+    SSL_set_msg_callback_arg(session_.get(), this);
+  }
+}
+
+void PeerStream::CountKeyUpdates(int is_written,
+                                 int /*version*/,
+                                 int content_type,
+                                 const void* message,
+                                 std::size_t size,
+                                 ssl_st* /*session*/,
+                                 void* stream) {
+  if (is_written == 0 && content_type == SSL3_RT_HANDSHAKE && size > 0 &&
+      *static_cast<const std::uint8_t*>(message) == SSL3_MT_KEY_UPDATE) {
+    ++static_cast<PeerStream*>(stream)->key_updates_;
+  }
+}
+
+bool PeerStream::HasTooManyKeyUpdates() const {
+  return key_updates_ > kFreeKeyUpdates + received_bytes_ / kBytesForKeyUpdate;
 }
 
 asio::ip::address PeerStream::PeerAddress() const {
@@ -84,6 +110,11 @@ PeerStream::Moved PeerStream::ReadSession(std::span<std::uint8_t> into) {
   ERR_clear_error();
   std::size_t size = 0;
   const int result = SSL_read_ex(session_.get(), into.data(), into.size(), &size);
+  if (HasTooManyKeyUpdates()) {
+    failure_ = StrCat(key_updates_, " changes of the key with ", received_bytes_, " bytes");
+    return {0, false, true};
+  }
+  received_bytes_ += size;
   return result == 1 ? Moved{size} : NotMovedBy(result, read_waits_to_write_);
 }
 

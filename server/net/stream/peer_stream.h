@@ -30,6 +30,9 @@ class PeerStream {
   // Without a session the bytes go as they are; with one, the first reads and writes are its
   // handshake.
   explicit PeerStream(boost::asio::ip::tcp::socket socket, SslSession session = nullptr);
+  PeerStream(const PeerStream&) = delete;
+  PeerStream& operator=(const PeerStream&) = delete;
+  ~PeerStream() = default;
 
   // Of the peer; none when it is gone.
   boost::asio::ip::address PeerAddress() const;
@@ -64,6 +67,15 @@ class PeerStream {
  private:
   Moved ReadSession(std::span<std::uint8_t> into);
   Moved WriteSession(std::span<const ByteSpan> pieces);
+  // For OpenSSL, of each message of TLS itself that came or leaves; `stream`: whose.
+  static void CountKeyUpdates(int is_written,
+                              int version,
+                              int content_type,
+                              const void* message,
+                              std::size_t size,
+                              ssl_st* session,
+                              void* stream);
+  bool HasTooManyKeyUpdates() const;
   // Of a call to the session that did not succeed.
   Moved NotMovedBy(int result, bool& waits_for_other);
 
@@ -71,6 +83,8 @@ class PeerStream {
   SslSession session_;
   bool read_waits_to_write_ = false;  // in a handshake
   bool write_waits_to_read_ = false;
+  std::uint64_t received_bytes_ = 0;  // without those of TLS
+  std::uint64_t key_updates_ = 0;     // that the peer made
   std::string failure_;
 };
 

@@ -73,6 +73,9 @@ Status Configure(SSL_CTX& context, const TlsFiles& files) {
   SSL_CTX_set_mode(&context, SSL_MODE_RELEASE_BUFFERS | SSL_MODE_ENABLE_PARTIAL_WRITE |
                                  SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
   SSL_CTX_set_read_ahead(&context, 1);  // a call for many records
+  // A call ends with what came so far; else a peer that sends nothing but messages of TLS itself
+  // would hold its thread for as long as it likes.
+  SSL_CTX_clear_mode(&context, SSL_MODE_AUTO_RETRY);
   // Frames tell themselves whether they are whole: a peer that just goes is no failure.
   SSL_CTX_set_options(&context, SSL_OP_IGNORE_UNEXPECTED_EOF);
   // Vehicles stay connected: tickets for the next handshake would only cost bytes.

@@ -76,6 +76,15 @@ std::string BlockingPeer::PeerName() const {
   return name.data();
 }
 
+bool BlockingPeer::ChangeKeys(int times) {
+  bool is_sent = true;
+  for (int i = 0; is_sent && i < times; ++i) {
+    is_sent = SSL_key_update(session_.get(), SSL_KEY_UPDATE_NOT_REQUESTED) == 1 &&
+              SSL_do_handshake(session_.get()) == 1;
+  }
+  return is_sent;
+}
+
 BlockingPeer::~BlockingPeer() {
   if (fd_ >= 0) {
     ::close(fd_);

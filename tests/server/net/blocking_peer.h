@@ -38,6 +38,8 @@ class BlockingPeer {
   // The common name that the daemon showed.
   std::string PeerName() const;
 
+  // Changes the key of what is sent, so many times. False when the daemon closed.
+  bool ChangeKeys(int times);
   // False when the daemon closed.
   bool SendBytes(ByteSpan bytes) const;
   bool Send(const wire::Envelope& envelope) const;

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <future>
 #include <map>
+#include <memory>
+#include <vector>
 
 #include "server/store/tile_block.h"
 #include "tests/server/net/net_fixture.h"
@@ -87,6 +89,15 @@ class LargeRequestTest : public NetTest {
     }
     return tiles;
   }
+  // The same, of so many bytes, by a field that the daemon does not know.
+  static wire::Envelope Padded(wire::Envelope envelope, std::size_t bytes) {
+    auto* const unknown = envelope.GetReflection()->MutableUnknownFields(&envelope);
+    auto* const padding = unknown->AddLengthDelimited(1'000);
+    padding->assign(bytes - envelope.ByteSizeLong(), 'x');
+    padding->resize(padding->size() -
+                    (envelope.ByteSizeLong() - bytes));  // its size has bytes, too
+    return envelope;
+  }
   static StatusCode LastWords(BlockingPeer& peer) {
     const auto reply = peer.Receive();
     EXPECT_TRUE(reply.has_value());
@@ -136,6 +147,34 @@ TEST_F(LargeRequestTest, CountsAsWhatIsMadeOfIt) {
   peer->Send(CancelOf(5));
   EXPECT_TRUE(peer->Receive()->has_cancel_reply()) << "the connection goes on";
   ExpectHoldsNothing();
+}
+
+// A keyframe that there was no room for is missing, as one that was refused later would be: those
+// behind it wait for it.
+TEST_F(LargeRequestTest, BehindAKeyframeWithoutRoomNothingIsTaken) {
+  net_.max_held_bytes = 256u << 10;
+  net_.copied_frame_bytes = 0;
+  Serve(0);  // nothing is ever fused: whoever waits for that holds his request
+  UploadDrive(1);
+  std::vector<std::unique_ptr<BlockingPeer>> waiting;
+  for (int i = 0; i < 10; ++i) {
+    waiting.push_back(Connect());
+    waiting.back()->Send(Padded(WaitOf(2, 60'000), 15'000));
+  }
+  ExpectHolds(10 * (15'000 + kFrameHeaderBytes));
+  const auto peer = Connect();
+  wire::Envelope large = UploadOf(1, 3);
+  large.mutable_upload_keyframe()->mutable_blob()->resize(80'000);
+  peer->Send(large);
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kResourceExhausted);
+  peer->Send(UploadOf(2, 4));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kUnavailable);
+  for (std::uint32_t i = 1; i < 3; ++i) {
+    peer->Send(UploadOf(i, 5));
+    const auto reply = peer->Receive();
+    EXPECT_TRUE(reply && reply->has_upload_reply()) << i;
+  }
+  EXPECT_EQ(service_->ReadStatus()->counts.keyframes, 3U);
 }
 
 TEST_F(LargeRequestTest, ASyncThatTellsMuchGetsWhatASmallOneGets) {

@@ -1,0 +1,40 @@
+// How a connection waits for what its peer sends, and lets the others of its thread have their turn
+// when that comes without a pause.
+#pragma once
+
+#include <cstddef>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/cancellation_signal.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/net/stream/peer_stream.h"
+
+namespace atlas {
+
+class ReadingTurn {
+ public:
+  // `stream` outlives this.
+  explicit ReadingTurn(PeerStream& stream) : stream_(stream) {}
+
+  // After each read, whatever it gave: until another one is worth it, or `stop` is emitted.
+  boost::asio::awaitable<void> Next(PeerStream::Moved came, boost::asio::cancellation_slot stop) {
+    bytes_ += came.bytes;
+    if (came.is_blocked) {
+      bytes_ = 0;
+      co_await stream_.WaitUntilReadable(stop);
+    } else if (bytes_ >= kBytesInTurn) {
+      bytes_ = 0;
+      co_await boost::asio::post(stream_.executor(), boost::asio::use_awaitable);
+    }
+  }
+
+ private:
+  static constexpr std::size_t kBytesInTurn = 256u << 10;  // of one peer that has more
+
+  PeerStream& stream_;
+  std::size_t bytes_ = 0;  // in this turn
+};
+
+}  // namespace atlas
