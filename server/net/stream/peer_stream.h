@@ -47,6 +47,8 @@ class PeerStream {
 
   // Given to the system, and not known to have come.
   std::size_t unacknowledged_bytes();
+  // Bytes have come and were read, those of a handshake, too.
+  bool has_received() const;
   // Bytes have come that were not read.
   bool has_unread();
   // That the peer showed and that was verified; once bytes were read.
@@ -69,6 +71,7 @@ class PeerStream {
 
   boost::asio::ip::tcp::socket socket_;
   SslSession session_;
+  bool has_read_ = false;             // in the clear
   bool read_waits_to_write_ = false;  // in a handshake
   bool write_waits_to_read_ = false;
   std::string failure_;
