@@ -96,18 +96,23 @@ TEST_F(NewcomerLimitTest, WhoComesAndGoesLeavesTheirTurnToOtherAddresses) {
 TEST_F(NewcomerLimitTest, WhoeverIsGoneIsNotWaitedFor) {
   net_.clear_visits_per_s = 1;
   Serve();
+  for (int i = 0; i < 4; ++i) {  // two seconds of them are owed: a queue forms
+    EXPECT_TRUE(IsLetIn({2}));
+    WaitUntilNobodyIsThere();
+  }
   OpenSilent(300, {2}).clear();
-  EXPECT_LT(TimeToServe(), seconds(10));
+  EXPECT_LT(TimeToServe(), seconds(10)) << "not 0.1 s for each of them";
 }
 
 TEST_F(NewcomerLimitTest, WhoComesAndSaysSomethingIsWaitedFor) {
   net_.clear_visits_per_s = 1;
   Serve();
-  for (int i = 0; i < 4; ++i) {
+  const auto began = Clock::now();
+  for (int i = 0; i < 10; ++i) {
     EXPECT_TRUE(IsLetIn({2}));
     WaitUntilNobodyIsThere();
   }
-  EXPECT_GT(TimeToServe(), milliseconds(50));
+  EXPECT_GT(Clock::now() - began, milliseconds(500));
 }
 
 }  // namespace
