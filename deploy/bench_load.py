@@ -11,6 +11,7 @@ import tempfile
 import time
 
 from bench_daemon import Atlas, Certificate, rows_of
+from bench_newcomers import emit_newcomers
 from bench_serving import CONNECTIONS, ROUNDS, THREADS, fill, write_tile_files
 
 ROUND_MS = 3000
@@ -183,7 +184,8 @@ def uploads(bin_dir, atlas, keyframes, vehicles, number):
 
 def bench_connections(bin_dir, emit, drive):
     """A good client beside 2,000 quiet connections and 50 hostile ones: that break rules, in the clear and with TLS,
-    that keep to them but ask for as much as may be asked, and that read nothing of what they ask for."""
+    that keep to them but ask for as much as may be asked, and that read nothing of what they ask for. Also
+    how long a newcomer waits."""
     for name, with_tls, hostility, asked in (("connections", False, "breaks_rules", "asked at most 64"),
                                              ("connections_tls", True, "breaks_rules", "asked at most 160"),
                                              ("connections_heavy", False, "asks_much", "none"),
@@ -200,6 +202,8 @@ def bench_connections(bin_dir, emit, drive):
                 pairs = [crowd_round(bin_dir, atlas, tiles, number, connections, hostility, with_tls)
                          for number in range(-1, ROUNDS)][1:]  # the first one warms up
                 emit_crowd(emit, f"{name}.{connections}", pairs, before, asked)
+            if hostility == "breaks_rules":
+                emit_newcomers(emit, name, atlas, crowd_of(bin_dir, atlas, hostility, with_tls))
 
 
 def crowd_round(bin_dir, atlas, tiles, number, connections, hostility, with_tls):
@@ -208,9 +212,12 @@ def crowd_round(bin_dir, atlas, tiles, number, connections, hostility, with_tls)
                      lambda: crowded(bin_dir, atlas, tiles, number, connections, hostility, with_tls))
 
 
+def crowd_of(bin_dir, atlas, hostility, with_tls):
+    return Beside(bin_dir / "crowd_bench", atlas.port, IDLE, SLOW, HOSTILE, hostility, *(["tls"] if with_tls else []))
+
+
 def crowded(bin_dir, atlas, tiles, number, connections, hostility, with_tls):
-    with Beside(bin_dir / "crowd_bench", atlas.port, IDLE, SLOW, HOSTILE, hostility,
-                *(["tls"] if with_tls else [])) as crowd:
+    with crowd_of(bin_dir, atlas, hostility, with_tls) as crowd:
         time.sleep(0.5)
         row = load(bin_dir, atlas.port, tiles, "single", number, connections=connections, tls=with_tls)
         row["open"] = atlas.metric("roadatlas_connections")

@@ -41,10 +41,17 @@ struct NetOptions {
   // runs the daemon, unless `is_loopback_limited`.
   NameLimits of_name;
   bool is_loopback_limited = false;
-  double short_visits_per_s = 200;            // connections of less than a second; 0: no limit
-  std::size_t max_arrivals = 32;              // accepted and not begun yet, a thread
-  std::size_t max_watches = 1024;             // all connections
-  std::size_t max_watched_bytes = 64u << 20;  // areas of these
+  // Connections of less than a second, or of whoever never said who he is: so many a second of each
+  // kind alone. A TLS handshake takes a millisecond, a visit in the clear less than a tenth of it.
+  double clear_visits_per_s = 1'000;  // that sent something; 0: no limit of any kind
+  double tls_visits_per_s = 200;      // the same, with TLS
+  double silent_visits_per_s = 2'000;
+  double gone_visits_per_s = 4'000;  // before their turn, or closed at once
+  // Of these rates, one address.
+  double address_share = 0.25;
+  std::size_t max_arrivals = 32;                        // accepted and not begun yet, a thread
+  std::size_t max_watches = 1024;                       // all connections
+  std::size_t max_watched_bytes = 64u << 20;            // areas of these
   std::size_t max_connection_watched_bytes = 2u << 20;  // of one connection
   std::size_t max_waits = 16;  // waits, digests, verifications, all connections
   int service_threads = 4;     // that may block on the disk

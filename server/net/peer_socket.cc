@@ -23,8 +23,13 @@ void PreparePeerSocket(tcp::socket& socket, int max_unsent_bytes) {
 }
 
 bool IsGone(tcp::socket& socket) {
-  pollfd state{socket.native_handle(), 0, 0};
-  return ::poll(&state, 1, 0) > 0;
+  pollfd state{socket.native_handle(), POLLIN, 0};
+  if (::poll(&state, 1, 0) <= 0) {
+    return false;
+  }
+  char byte = 0;
+  return (state.revents & (POLLERR | POLLHUP)) != 0 ||
+         ::recv(state.fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
 }
 
 }  // namespace atlas

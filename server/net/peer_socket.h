@@ -11,7 +11,8 @@ namespace atlas {
 // than a peer may take nothing. An option that fails is none that replies depend on.
 void PreparePeerSocket(boost::asio::ip::tcp::socket& socket, int max_unsent_bytes);
 
-// It was reset while it waited for its turn.
+// While it waited for its turn its peer reset it, or closed it and had sent nothing: one that sends
+// its Hello and no more is there.
 bool IsGone(boost::asio::ip::tcp::socket& socket);
 
 }  // namespace atlas

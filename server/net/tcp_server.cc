@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <exception>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,7 +22,10 @@
 #include "proto/wire/convert.h"
 #include "server/base/line_budget.h"
 #include "server/net/connection/net_thread.h"
+#include "server/net/connection/newcomers.h"
+#include "server/net/connection/peer_access.h"
 #include "server/net/connection/shared_limits.h"
+#include "server/net/connection/visit.h"
 #include "server/net/connection/visit_pace.h"
 #include "server/net/peer_socket.h"
 #include "server/net/places.h"
@@ -37,10 +41,20 @@ using boost::system::error_code;
 // How soon to look again whether the threads have begun what they were given.
 constexpr std::chrono::milliseconds kArrivalPause{1};
 
-VisitPace::Options PaceFrom(const NetOptions& options) {
+VisitPace::Options PaceFrom(const NetOptions& options, bool is_encrypted) {
   VisitPace::Options pace;
-  pace.short_visits_per_s = options.short_visits_per_s;
+  pace.full_per_s = is_encrypted ? options.tls_visits_per_s : options.clear_visits_per_s;
+  pace.silent_per_s = options.silent_visits_per_s;
+  pace.gone_per_s = options.gone_visits_per_s;
   return pace;
+}
+
+// Half of the places are for those who were let in.
+Newcomers::Options NewcomersFrom(const NetOptions& options, bool is_encrypted) {
+  Newcomers::Options newcomers;
+  newcomers.max_open = std::max<std::size_t>(1, options.max_connections / 2);
+  newcomers.cost_per_s = options.address_share * PaceFrom(options, is_encrypted).full_per_s;
+  return newcomers;
 }
 
 }  // namespace
@@ -59,7 +73,8 @@ class TcpServer::Impl {
         handler_(service, pool_, reading_pool_, options_),
         limits_(options),
         places_(options.max_connections),
-        pace_(PaceFrom(options)),
+        pace_(PaceFrom(options, security_.tls != nullptr)),
+        newcomers_(NewcomersFrom(options, security_.tls != nullptr)),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()),
         accept_pause_(io_),
         signals_(io_, SIGTERM, SIGINT) {
@@ -138,8 +153,9 @@ class TcpServer::Impl {
       }
       NetThread& thread = LeastBusyThread();
       error_code error;
+      tcp::endpoint peer;
       tcp::socket socket = co_await acceptor_.async_accept(
-          thread.io(), asio::redirect_error(asio::use_awaitable, error));
+          thread.io(), peer, asio::redirect_error(asio::use_awaitable, error));
       if (error == asio::error::operation_aborted) {
         co_return;
       }
@@ -151,9 +167,9 @@ class TcpServer::Impl {
         continue;
       }
       if (IsGone(socket)) {
-        pace_.NoteGone();
+        pace_.Note(VisitKind::kGone);
       } else {
-        Admit(std::move(socket), thread);
+        Admit(std::move(socket), peer.address(), thread);
       }
     }
   }
@@ -181,15 +197,24 @@ class TcpServer::Impl {
     });
   }
 
-  void Admit(tcp::socket socket, NetThread& thread) {
+  void Admit(tcp::socket socket, const asio::ip::address& peer, NetThread& thread) {
     Places::Place place = places_.Take();
     if (place == nullptr) {
-      NoteRefusal();
-      pace_.NoteRefusal();
+      NoteRefusal(peer);
+      pace_.Note(VisitKind::kSilent);
       Refuse(std::move(socket));
       return;
     }
-    place = pace_.Begin(std::move(place), std::chrono::steady_clock::now());
+    // Those of this machine are left out, as by name.
+    const bool is_limited = options_.is_loopback_limited || !IsOfThisMachine(peer);
+    const std::string address = is_limited ? SharedAddress(peer) : "";
+    const auto now = std::chrono::steady_clock::now();
+    if (!newcomers_.Enter(address, now)) {
+      NoteRefusal(peer);
+      pace_.Note(VisitKind::kGone);  // to say why would cost more than that
+      return;
+    }
+    auto visit = std::make_shared<Visit>(pace_, newcomers_, address, std::move(place), now);
     PreparePeerSocket(socket, options_.max_unsent_bytes);
     SslSession session;
     if (security_.tls != nullptr) {
@@ -199,7 +224,7 @@ class TcpServer::Impl {
         return;
       }
     }
-    thread.Serve({std::move(socket), std::move(place), std::move(session), security_});
+    thread.Serve({std::move(socket), std::move(visit), std::move(session), security_});
   }
 
   // These write one line a second, however many come.
@@ -208,11 +233,12 @@ class TcpServer::Impl {
       spdlog::warn("accept: {}", error.message());
     }
   }
-  void NoteRefusal() {
+  void NoteRefusal(const asio::ip::address& peer) {
     refused_.Add();
     if (refusal_lines_.Take(std::chrono::steady_clock::now())) {
-      spdlog::warn("connections refused: {} by now, {} are open", refused_.value(),
-                   places_.taken());
+      spdlog::warn(
+          "connections refused: {} by now, the last one of {}; {} are open, {} of them not greeted",
+          refused_.value(), SharedAddress(peer), places_.taken(), newcomers_.open());
     }
   }
 
@@ -271,6 +297,7 @@ class TcpServer::Impl {
   SharedLimits limits_;
   Places places_;  // of connections
   VisitPace pace_;
+  Newcomers newcomers_;
   std::vector<std::unique_ptr<NetThread>> threads_;
   asio::io_context io_{1};  // what accepts; after what its coroutines refer to
   tcp::acceptor acceptor_;

@@ -41,8 +41,7 @@ NetThread::NetThread(RequestHandler& handler, SharedLimits& limits, const NetOpt
 
 void NetThread::Serve(PeerConnection::Arrival arrival) {
   // A place here, beside the server's own, only counts: the server gives no more than there are.
-  using Pair = std::pair<Places::Place, Places::Place>;
-  arrival.place = std::make_shared<Pair>(std::move(arrival.place), connection_places_.Take());
+  arrival.visit->Hold(connection_places_.Take());
   ++arrivals_;
   auto begin = [this, arrival = std::move(arrival)]() mutable {
     --arrivals_;

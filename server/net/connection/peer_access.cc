@@ -55,6 +55,7 @@ Status PeerAccess::TakePlace() {
              options_.is_loopback_limited || !IsOfThisMachine(address)) {
     allowance = limits_.OfAddress(SharedAddress(address), now);
   } else {
+    visit_->LetIn();
     return {};
   }
   place_ = allowance->TakeConnection();
@@ -64,7 +65,16 @@ Status PeerAccess::TakePlace() {
                    " are open already; try again later")};
   }
   allowance_ = std::move(allowance);
+  visit_->LetIn();
   return {};
+}
+
+void PeerAccess::GiveBackPlaces() {
+  if (visit_ != nullptr && stream_.has_received()) {
+    visit_->NoteSent();
+  }
+  visit_.reset();
+  place_.reset();
 }
 
 }  // namespace atlas

@@ -14,6 +14,8 @@
 #include "core/base/status.h"
 #include "server/net/access/access_control.h"
 #include "server/net/connection/identity_limits.h"
+#include "server/net/connection/shared_limits.h"
+#include "server/net/connection/visit.h"
 #include "server/net/net_options.h"
 #include "server/net/places.h"
 #include "server/net/server_security.h"
@@ -34,10 +36,18 @@ class PeerAccess {
 
   // All outlive this.
   PeerAccess(const PeerStream& stream,
-             IdentityLimits& limits,
+             SharedLimits& limits,
              const NetOptions& options,
-             ServerSecurity security)
-      : stream_(stream), limits_(limits), options_(options), security_(std::move(security)) {}
+             ServerSecurity security,
+             std::shared_ptr<Visit> visit)
+      : stream_(stream),
+        limits_(limits.identities),
+        options_(options),
+        security_(std::move(security)),
+        visit_(std::move(visit)) {}
+  PeerAccess(const PeerAccess&) = delete;
+  PeerAccess& operator=(const PeerAccess&) = delete;
+  ~PeerAccess() { GiveBackPlaces(); }
 
   void set_security(ServerSecurity security) { security_ = std::move(security); }
 
@@ -47,9 +57,10 @@ class PeerAccess {
   Status IdentifyAgain(std::int64_t now_ms);
   // To be called again.
   bool IsDue(Clock::time_point now) const { return now >= again_at_; }
-  // One of the connections that it may have: kUnavailable.
+  // One of the connections that it may have, and it is no newcomer any more: kUnavailable.
   Status TakePlace();
-  void GiveBackPlace() { place_.reset(); }
+  // This, and what its visit has.
+  void GiveBackPlaces();
 
   const Identity& identity() const { return identity_; }
   // Null: it may have what there is.
@@ -64,7 +75,8 @@ class PeerAccess {
   Identity identity_;
   Clock::time_point again_at_ = Clock::time_point::max();
   std::shared_ptr<IdentityAllowance> allowance_;
-  Places::Place place_;
+  std::shared_ptr<Visit> visit_;
+  Places::Place place_;  // by name or address
 };
 
 }  // namespace atlas

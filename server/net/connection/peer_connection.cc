@@ -26,7 +26,6 @@ constexpr std::size_t kMaxClientBytes = 100;  // of its name that are kept for t
 
 PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings)
     : stream_(std::move(arrival.socket), std::move(arrival.session)),
-      place_(std::move(arrival.place)),
       handler_(surroundings.handler),
       limits_(surroundings.limits),
       buffer_(surroundings.buffer),
@@ -39,7 +38,7 @@ PeerConnection::PeerConnection(Arrival arrival, const Surroundings& surroundings
       held_(limits_, options_),
       changed_(stream_.executor(), asio::steady_timer::time_point::max()),
       frame_clock_(Clock::now(), options_),
-      access_(stream_, limits_.identities, options_, std::move(arrival.security)),
+      access_(stream_, limits_, options_, std::move(arrival.security), std::move(arrival.visit)),
       rate_pause_(stream_.executor()) {}
 
 void PeerConnection::Start() {
@@ -56,8 +55,7 @@ void PeerConnection::Drain() {
 
 void PeerConnection::CloseNow() {
   phase_ = Phase::kClosed;
-  place_.reset();  // before the peer can see it
-  access_.GiveBackPlace();
+  access_.GiveBackPlaces();  // before the peer can see it
   writer_.CloseNow();
   changed_.cancel();
   rate_pause_.cancel();

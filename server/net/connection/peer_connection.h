@@ -22,9 +22,9 @@
 #include "server/net/connection/held_bytes.h"
 #include "server/net/connection/peer_access.h"
 #include "server/net/connection/shared_limits.h"
+#include "server/net/connection/visit.h"
 #include "server/net/net_options.h"
 #include "server/net/peer_record.h"
-#include "server/net/places.h"
 #include "server/net/requests/request_handler.h"
 #include "server/net/server_security.h"
 #include "server/net/stream/peer_stream.h"
@@ -50,7 +50,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // A socket that was accepted, and what it may do.
   struct Arrival {
     boost::asio::ip::tcp::socket socket;
-    Places::Place place;
+    std::shared_ptr<Visit> visit;
     SslSession session;  // null: in the clear
     ServerSecurity security;
   };
@@ -120,7 +120,6 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   void Finish();
 
   PeerStream stream_;
-  Places::Place place_;
   RequestHandler& handler_;
   SharedLimits& limits_;
   const std::span<std::uint8_t> buffer_;

@@ -1,74 +1,69 @@
 // How fast new connections are taken. One that comes and goes again and again costs more than any
-// other, a TLS handshake each time: beyond so many short visits a second whoever comes next waits
-// in the system's queue, and those who are there are served. Thread-safe.
+// other, a TLS handshake each time: beyond so much of that a second whoever comes next waits in the
+// system's queue, and those who are there are served. Thread-safe.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
-#include <memory>
-#include <utility>
+#include <cstdint>
 
 #include "server/net/connection/token_bucket.h"
-#include "server/net/places.h"
 
 namespace atlas {
+
+// What became of one who came, and so what it cost.
+enum class VisitKind : std::uint8_t {
+  kFull,    // it sent something
+  kSilent,  // it was begun and sent nothing, or was told that there is no place
+  kGone,    // it was gone before its turn, or closed where it was accepted
+};
 
 class VisitPace {
  public:
   using Clock = std::chrono::steady_clock;
 
+  // So many a second of each kind alone.
   struct Options {
-    double short_visits_per_s = 200;  // 0: no limit
-    Clock::duration short_visit = std::chrono::seconds(1);
-    double gone_to_one = 20;  // of those who never began, for one visit
+    double full_per_s = 200;  // 0: no limit of any kind
+    double silent_per_s = 2'000;
+    double gone_per_s = 4'000;
     Clock::duration max_pause = std::chrono::milliseconds(100);  // whatever was before
   };
 
-  explicit VisitPace(const Options& options)
-      : options_(options), allowed_(options.short_visits_per_s) {}
+  explicit VisitPace(const Options& options) : options_(options), allowed_(options.full_per_s) {}
 
-  // A place that tells, when it is given back, how long it was taken. May outlive this.
-  Places::Place Begin(Places::Place place, Clock::time_point now) {
-    return std::make_shared<Visit>(std::move(place), ended_, now + options_.short_visit);
+  // From any thread.
+  void Note(VisitKind kind) { ended_[static_cast<std::size_t>(kind)].fetch_add(1); }
+  // In full ones.
+  double CostOf(VisitKind kind, double visits = 1.0) const {
+    switch (kind) {
+      case VisitKind::kSilent:
+        return visits * options_.full_per_s / options_.silent_per_s;
+      case VisitKind::kGone:
+        return visits * options_.full_per_s / options_.gone_per_s;
+      case VisitKind::kFull:
+        break;
+    }
+    return visits;
   }
-  // Of somebody who was not let in at all.
-  void NoteRefusal() { ended_->fetch_add(1); }
-  // Of somebody who was gone before it was his turn: that costs next to nothing, and who stands
-  // behind him in the queue is not to wait for it. For one thread, as is the next.
-  void NoteGone() { gone_ += 1.0; }
 
-  // Before the next one is taken.
+  // Before the next one is taken. For one thread.
   Clock::duration Pause(Clock::time_point now) {
-    const double gone = std::exchange(gone_, 0.0) / options_.gone_to_one;
-    const double ended = static_cast<double>(ended_->exchange(0)) + gone;
-    return std::min(allowed_.Take(ended, now), options_.max_pause);
+    double cost = 0.0;
+    for (const VisitKind kind : {VisitKind::kFull, VisitKind::kSilent, VisitKind::kGone}) {
+      auto& ended = ended_[static_cast<std::size_t>(kind)];
+      cost += CostOf(kind, static_cast<double>(ended.exchange(0)));
+    }
+    return std::min(allowed_.Take(cost, now), options_.max_pause);
   }
 
  private:
-  using Count = std::atomic<std::size_t>;
-
-  struct Visit {
-    Visit(Places::Place taken, std::shared_ptr<Count> count, Clock::time_point until)
-        : place(std::move(taken)), ended(std::move(count)), short_until(until) {}
-    Visit(const Visit&) = delete;
-    Visit& operator=(const Visit&) = delete;
-    ~Visit() {
-      if (Clock::now() < short_until) {
-        ended->fetch_add(1);
-      }
-    }
-
-    Places::Place place;
-    std::shared_ptr<Count> ended;
-    Clock::time_point short_until;
-  };
-
-  Options options_;
+  const Options options_;
   TokenBucket allowed_;
-  double gone_ = 0.0;                                          // since the last pause
-  std::shared_ptr<Count> ended_ = std::make_shared<Count>(0);  // short ones since the last pause
+  std::array<std::atomic<std::size_t>, 3> ended_{};  // since the last pause, by kind
 };
 
 }  // namespace atlas

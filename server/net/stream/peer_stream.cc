@@ -9,6 +9,7 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <linux/sockios.h>
+#include <openssl/bio.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <sys/ioctl.h>
@@ -86,7 +87,10 @@ PeerStream::Moved PeerStream::Read(std::span<std::uint8_t> into) {
   if (session_ != nullptr) {
     return ReadSession(into);
   }
-  return MovedBy(::recv(socket_.native_handle(), into.data(), into.size(), 0), into.size());
+  const Moved came =
+      MovedBy(::recv(socket_.native_handle(), into.data(), into.size(), 0), into.size());
+  has_read_ = has_read_ || came.bytes > 0;
+  return came;
 }
 
 PeerStream::Moved PeerStream::Write(std::span<const ByteSpan> pieces) {
@@ -164,6 +168,10 @@ std::size_t PeerStream::unacknowledged_bytes() {
   int bytes = 0;
   return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? static_cast<std::size_t>(bytes)
                                                                  : 0;
+}
+
+bool PeerStream::has_received() const {
+  return has_read_ || (session_ != nullptr && BIO_number_read(SSL_get_rbio(session_.get())) > 0);
 }
 
 bool PeerStream::has_unread() {

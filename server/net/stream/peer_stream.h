@@ -50,6 +50,8 @@ class PeerStream {
 
   // Given to the system, and not known to have come.
   std::size_t unacknowledged_bytes();
+  // Bytes have come and were read, those of a handshake, too.
+  bool has_received() const;
   // Bytes have come that were not read.
   bool has_unread();
   // That the peer showed and that was verified; once bytes were read.
@@ -81,6 +83,7 @@ class PeerStream {
 
   boost::asio::ip::tcp::socket socket_;
   SslSession session_;
+  bool has_read_ = false;             // in the clear
   bool read_waits_to_write_ = false;  // in a handshake
   bool write_waits_to_read_ = false;
   std::uint64_t received_bytes_ = 0;  // without those of TLS

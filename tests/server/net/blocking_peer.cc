@@ -17,7 +17,15 @@ namespace {
 
 constexpr timeval kPatience{30, 0};
 
-int Connect(std::uint16_t port, int buffer_bytes) {
+sockaddr_in AddressOf(std::uint16_t port, std::uint8_t host) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl((INADDR_LOOPBACK & ~0xFFu) | host);
+  return address;
+}
+
+int Connect(std::uint16_t port, int buffer_bytes, std::uint8_t from = 1) {
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (buffer_bytes != 0) {
     ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &buffer_bytes, sizeof buffer_bytes);
@@ -25,11 +33,10 @@ int Connect(std::uint16_t port, int buffer_bytes) {
   }
   ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
   ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port);
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+  const sockaddr_in own = AddressOf(0, from);
+  const sockaddr_in address = AddressOf(port, 1);
+  if (::bind(fd, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0 &&
+      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
     return fd;
   }
   ::close(fd);
@@ -46,6 +53,8 @@ bool IsWritable(int fd, std::chrono::milliseconds patience) {
 
 BlockingPeer::BlockingPeer(std::uint16_t port, int buffer_bytes)
     : fd_(Connect(port, buffer_bytes)) {}
+
+BlockingPeer::BlockingPeer(std::uint16_t port, From from) : fd_(Connect(port, 0, from.host)) {}
 
 BlockingPeer::BlockingPeer(std::uint16_t port, const Tls& tls, int buffer_bytes)
     : fd_(Connect(port, buffer_bytes)) {

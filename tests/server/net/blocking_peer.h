@@ -20,6 +20,11 @@ class BlockingPeer {
  public:
   // Connects to a port of loopback. `buffer_bytes`: of the socket's buffers; 0 leaves the system's.
   explicit BlockingPeer(std::uint16_t port, int buffer_bytes = 0);
+  // From another address of loopback: 127.0.0.`host`.
+  struct From {
+    std::uint8_t host = 1;
+  };
+  BlockingPeer(std::uint16_t port, From from);
   // Through TLS: whom it believes, and what it shows if asked. `max_version` as OpenSSL has it; 0:
   // the newest.
   struct Tls {

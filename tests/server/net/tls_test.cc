@@ -205,6 +205,26 @@ TEST_F(TlsTest, AHandshakeHasADeadline) {
   EXPECT_TRUE(half.IsClosed());
 }
 
+TEST_F(TlsTest, AVisitThatSaidNothingCostsLessThanOneThatShookHands) {
+  net_.tls_visits_per_s = 1;
+  net_.silent_visits_per_s = 10'000;
+  ServeTls();
+  const auto time_to_come = [this] {
+    const auto began = std::chrono::steady_clock::now();
+    EXPECT_TRUE(BlockingPeer(port_, Anonymous()).is_encrypted());
+    return std::chrono::steady_clock::now() - began;
+  };
+  for (int i = 0; i < 300; ++i) {
+    BlockingPeer silent(port_);
+  }
+  EXPECT_LT(time_to_come(), std::chrono::seconds(10)) << "not 300 times what may wait";
+  std::chrono::steady_clock::duration slowest{};
+  for (int i = 0; i < 4; ++i) {
+    slowest = std::max(slowest, time_to_come());
+  }
+  EXPECT_GT(slowest, std::chrono::milliseconds(50));
+}
+
 TEST_F(TlsTest, LargeRepliesComeWholeThroughSmallBuffers) {
   ServeTls();
   UploadDrive(12);
