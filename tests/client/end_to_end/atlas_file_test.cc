@@ -209,7 +209,7 @@ TEST_F(AtlasFileEndToEndTest, TheMapAroundAPoseIsTheDaemons) {
     EXPECT_EQ(IdsOf(*found), IdsOf(*expected));
     ASSERT_EQ(from_file.Tiles(), from_daemon.Tiles());
     for (const TileId& id : from_file.Tiles()) {
-      EXPECT_EQ(*from_file.Read(id), *from_daemon.Read(id)) << id;
+      EXPECT_EQ(**from_file.Read(id), **from_daemon.Read(id)) << id;
     }
   }
 }
