@@ -60,12 +60,12 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
     const bool was_occupied = sum.occupancy > 0;
     sum.occupancy = FoldEvidence(sum.occupancy, say.occupancy, clamp);
     const std::int64_t offset = std::int64_t{sum.span.base} - say.column_base;
-    const ColumnSum before = sum.column;
-    if (segment.column_seen != 0) {
-      sum.column.Fold(say.column, segment.column_seen, offset, clamp);
-    }
     if (was_occupied && sum.occupancy < 0 && segment.is_strong && can_stand_) {
+      const ColumnSum before = sum.column;
+      sum.column.Fold(say.column, segment.column_seen, offset, clamp);
       sum.column.DropWhatStood(before, say.column, offset, ValuesIn(sum.span));
+    } else if (segment.column_seen != 0) {
+      sum.column.Fold(say.column, segment.column_seen, offset, clamp);
     }
   }
   for (std::size_t layer = 0; layer < layers.size(); ++layer) {

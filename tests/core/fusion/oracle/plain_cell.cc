@@ -1,6 +1,7 @@
 #include "tests/core/fusion/oracle/plain_cell.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <tuple>
 
@@ -254,8 +255,9 @@ TileLayer PlainCell::Publish(std::size_t index) const {
     return std::tie(a->last->time_ms, a->last->key) < std::tie(b->last->time_ms, b->last->key);
   });
   const Layer& layer = layers_[index];
+  const std::int32_t base = ColumnBaseIndex(static_cast<std::int32_t>(layer.altitude_mm), profile_);
   PlainSum surface(profile_);
-  std::vector<PlainSum> column(PublishedSegments(index), PlainSum(profile_));
+  std::vector<PlainSum> column(PublishedSegments(index, base), PlainSum(profile_));
   for (const Segment* segment : in_order) {
     const bool was_occupied = surface.units() > 0;
     const bool is_wrong_guess =
@@ -266,7 +268,7 @@ TileLayer PlainCell::Publish(std::size_t index) const {
     }
     const bool is_foot_gone = profile_.preset != FusionPreset::kPaper && segment->is_strong &&
                               was_occupied && surface.units() < 0;
-    AddToColumn(*segment, index, is_foot_gone, column);
+    AddToColumn(*segment, base, is_foot_gone, column);
   }
   const int occupancy = surface.units();
   TileLayer out;
@@ -288,50 +290,43 @@ TileLayer PlainCell::Publish(std::size_t index) const {
 }
 
 // Up to the slab of the next layer.
-std::size_t PlainCell::PublishedSegments(std::size_t index) const {
+std::size_t PlainCell::PublishedSegments(std::size_t index, std::int64_t base) const {
   int segments = 0;
   while (segments < profile_.column_segments &&
          (index + 1 == layers_.size() ||
-          (LatticeOf(index, segments) + 1) * profile_.segment_height_mm <=
+          (base + segments + 1) * profile_.segment_height_mm <=
               layers_[index + 1].altitude_mm - profile_.slab_margin_mm)) {
     ++segments;
   }
   return static_cast<std::size_t>(segments);
 }
 
-std::int64_t PlainCell::LatticeOf(std::size_t index, int k) const {
-  const auto altitude_mm = static_cast<std::int32_t>(layers_[index].altitude_mm);
-  return std::int64_t{ColumnBaseIndex(altitude_mm, profile_)} + k;
-}
-
 // And where the foot of what stood there is gone, so is the rest of it, unless some of it was seen.
 void PlainCell::AddToColumn(const Segment& segment,
-                            std::size_t index,
+                            std::int64_t base,
                             bool is_foot_gone,
                             std::span<PlainSum> column) const {
-  std::vector<int> before;
-  std::vector<int> said;
+  std::array<int, 16> before{};
+  std::array<int, 16> said{};
   for (std::size_t k = 0; k < column.size(); ++k) {
-    before.push_back(column[k].units());
-    const std::int64_t own = LatticeOf(index, static_cast<int>(k)) - segment.column_base;
-    const bool is_told = own >= 0 && own < 16 && segment.is_seen[static_cast<std::size_t>(own)];
-    said.push_back(is_told ? column[k].Add({segment.last, segment.driven,
-                                            segment.column[static_cast<std::size_t>(own)]})
-                           : 0);
+    before[k] = column[k].units();
+    const std::int64_t own = base + static_cast<std::int64_t>(k) - segment.column_base;
+    if (own >= 0 && own < 16 && segment.is_seen[static_cast<std::size_t>(own)]) {
+      const int units = segment.column[static_cast<std::size_t>(own)];
+      said[k] = column[k].Add({segment.last, segment.driven, units});
+    }
   }
   if (!is_foot_gone || column.empty()) {
     return;
   }
-  std::vector<std::size_t> stood;  // the lowest one may be free: most of it was above
-  for (std::size_t k = before[0] > 0 ? 0 : 1; k < column.size() && before[k] > 0; ++k) {
-    stood.push_back(k);
+  const std::size_t begin = before[0] > 0 ? 0 : 1;  // the lowest one may be free: most was above
+  std::size_t end = begin;
+  bool is_seen = false;
+  for (; end < column.size() && before[end] > 0; ++end) {
+    is_seen |= said[end] > 0;
   }
-  const bool is_seen =
-      std::any_of(stood.begin(), stood.end(), [&](std::size_t k) { return said[k] > 0; });
-  for (const std::size_t k : stood) {
-    if (!is_seen) {
-      column[k].DropHits();
-    }
+  for (std::size_t k = begin; k < end && !is_seen; ++k) {
+    column[k].DropHits();
   }
 }
 

@@ -43,10 +43,9 @@ class PlainCell {
   void KeepBestLayers();
   void AdoptWeak();
   TileLayer Publish(std::size_t index) const;
-  std::size_t PublishedSegments(std::size_t index) const;
-  std::int64_t LatticeOf(std::size_t index, int k) const;
+  std::size_t PublishedSegments(std::size_t index, std::int64_t base) const;
   void AddToColumn(const Segment& segment,
-                   std::size_t index,
+                   std::int64_t base,
                    bool is_foot_gone,
                    std::span<PlainSum> column) const;
 
