@@ -1,8 +1,6 @@
 // One walk over the poses.
 #include "core/simulation/trajectory.h"
 
-#include <optional>
-
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -16,7 +14,7 @@ class Walk {
 
   void Step(const Pose& pose) {
     const Eigen::Vector3d& p = pose.translation();
-    if (!last_ || (p - *last_).norm() > options_.jump_m) {
+    if (trajectory_.legs.empty() || (p - last_).norm() > options_.jump_m) {
       BeginLeg(p);
     }
     last_ = p;
@@ -26,7 +24,7 @@ class Walk {
       nodes.push_back(p);
       along_m_ += step_m;
     }
-    if (!kept_ || (p - *kept_).norm() >= options_.every_m) {
+    if (leg_steps_ == 0.0 || (p - kept_).norm() >= options_.every_m) {
       kept_ = p;
       const double beyond_m = (p - nodes.back()).head<2>().norm();
       trajectory_.moments.push_back({pose, trajectory_.legs.size() - 1,
@@ -42,13 +40,12 @@ class Walk {
     trajectory_.legs.push_back({p});
     along_m_ = 0.0;
     leg_steps_ = 0.0;
-    kept_.reset();
   }
 
   const TrajectoryOptions& options_;
   Trajectory trajectory_;
-  std::optional<Eigen::Vector3d> last_;
-  std::optional<Eigen::Vector3d> kept_;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();  // once a leg has begun, as is the next
+  Eigen::Vector3d kept_ = Eigen::Vector3d::Zero();
   double along_m_ = 0.0;
   double leg_steps_ = 0.0;
 };

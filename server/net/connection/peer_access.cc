@@ -55,7 +55,7 @@ Status PeerAccess::TakePlace() {
              options_.is_loopback_limited || !IsOfThisMachine(address)) {
     allowance = limits_.OfAddress(SharedAddress(address), now);
   } else {
-    visit_->LetIn();
+    visit_->LetIn(false);
     return {};
   }
   place_ = allowance->TakeConnection();
@@ -65,7 +65,7 @@ Status PeerAccess::TakePlace() {
                    " are open already; try again later")};
   }
   allowance_ = std::move(allowance);
-  visit_->LetIn();
+  visit_->LetIn(!identity_.name.empty());
   return {};
 }
 

@@ -36,7 +36,9 @@ class Visit {
     if (!is_let_in_ || now < short_until_) {  // who says nothing may cost as much in two seconds
       const VisitKind kind = has_sent_ ? VisitKind::kFull : VisitKind::kSilent;
       pace_.Note(kind);
-      newcomers_.Charge(address_, pace_.CostOf(kind), now);
+      if (!is_named_) {
+        newcomers_.Charge(address_, pace_.CostOf(kind), now);
+      }
     }
     if (!is_let_in_) {
       newcomers_.Leave(address_);
@@ -47,8 +49,10 @@ class Visit {
   void Hold(Places::Place place) { place_ = Places::Both(std::move(place_), std::move(place)); }
   // Its peer has sent something.
   void NoteSent() { has_sent_ = true; }
-  // Its peer has said who it is.
-  void LetIn() {
+  // Its peer has said who it is. With a name, which has limits of its own, it costs its address
+  // nothing: others of that one may be anybody.
+  void LetIn(bool is_named) {
+    is_named_ = is_named;
     if (!is_let_in_) {
       is_let_in_ = true;
       newcomers_.Leave(address_);
@@ -63,6 +67,7 @@ class Visit {
   const Clock::time_point short_until_;
   bool has_sent_ = false;
   bool is_let_in_ = false;
+  bool is_named_ = false;
 };
 
 }  // namespace atlas

@@ -73,7 +73,7 @@ class VisitTest : public ::testing::Test {
 };
 
 TEST_F(VisitTest, WhoWasLetInAndStaysCostsNothing) {
-  Come(seconds(2))->LetIn();
+  Come(seconds(2))->LetIn(true);
   EXPECT_EQ(newcomers_.open(), 0u);
   EXPECT_EQ(Ended(), 0.0);
 }
@@ -85,7 +85,7 @@ TEST_F(VisitTest, WhoGoesAgainAtOnceCostsWhatItDid) {
   EXPECT_NEAR(Ended(), 1.0, 1e-6);
   const auto visit = Come();
   visit->NoteSent();
-  visit->LetIn();
+  visit->LetIn(true);
   EXPECT_EQ(newcomers_.open(), 0u) << "while it is there";
 }
 
@@ -93,6 +93,24 @@ TEST_F(VisitTest, WhoNeverSaysWhoHeIsCostsHoweverLongHeStays) {
   Come(seconds(2))->NoteSent();
   EXPECT_NEAR(Ended(), 1.0, 1e-6);
   EXPECT_EQ(newcomers_.open(), 0u);
+}
+
+TEST_F(VisitTest, OnlyThoseWithoutANameCostTheirAddress) {
+  Newcomers newcomers{{100, 2, 8}};
+  const auto comes_often = [&](bool is_named) {
+    int entered = 0;
+    for (int i = 0; i < 20; ++i) {
+      if (newcomers.Enter("192.0.2.9", now_)) {
+        Visit visit(pace_, newcomers, "192.0.2.9", nullptr, Clock::now());
+        visit.NoteSent();
+        visit.LetIn(is_named);
+        ++entered;
+      }
+    }
+    return entered;
+  };
+  EXPECT_EQ(comes_often(true), 20);
+  EXPECT_LT(comes_often(false), 10);
 }
 
 }  // namespace
