@@ -246,7 +246,7 @@ TEST_F(RequestTest, AHelloThatResumesIsToldTheLastSequence) {
 // Vehicles that never hear a refusal: the store takes one write at a time and refuses the others,
 // each connection goes on behind what is there.
 TEST_F(RequestTest, BehindTheLastSequenceNothingIsMissing) {
-  constexpr std::uint32_t kCount = 60;
+  constexpr std::uint32_t kCount = 150;
   max_queued_writes_ = 1;
   Serve(0);
   std::uint32_t next = 0;
@@ -264,7 +264,7 @@ TEST_F(RequestTest, BehindTheLastSequenceNothingIsMissing) {
       ASSERT_TRUE(peer.Receive().has_value());
     }
   }
-  EXPECT_GT(connections, 2);  // or nothing was ever refused
+  EXPECT_GT(connections, 1);  // or nothing was ever refused
 }
 
 TEST_F(RequestTest, AWaitThatRunsOutSaysSo) {
