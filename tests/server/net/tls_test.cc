@@ -10,103 +10,10 @@
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
 
-#include "tests/server/net/net_fixture.h"
-#include "tests/server/net/test_certificates.h"
+#include "tests/server/net/tls_fixture.h"
 
 namespace atlas {
 namespace {
-
-constexpr const char* kTokenLine =  // "open sesame"
-    " never 41ef4bb0b23661e66301aac36066912dac037827b4ae63a7b1165a5aa93ed4eb\n";
-
-std::shared_ptr<const AccessControl> AccessOf(const std::string& tokens,
-                                              Role anonymous = Role::kNone) {
-  return std::make_shared<const AccessControl>(TokenList::Parse(tokens, "tokens").value(),
-                                               anonymous);
-}
-
-class TlsTest : public NetTest {
- protected:
-  // Certificates of vehicles count, and the token of a `role`.
-  void ServeTls(const std::string& role = "admin", std::string daemon_name = "daemon") {
-    ca_ = std::make_unique<TestAuthority>(directory_, "fleet");
-    security_ = SecurityOf(daemon_name, AccessOf("alice " + role + kTokenLine));
-    Serve();
-  }
-  ServerSecurity SecurityOf(const std::string& daemon_name,
-                            std::shared_ptr<const AccessControl> access) const {
-    const CertificateFiles own = ca_->Issue(daemon_name);
-    const auto tls = TlsContext::Load({own.certificate, own.key, ca_->certificate()});
-    EXPECT_TRUE(tls.has_value()) << tls.error().message();
-    return {*tls, std::move(access)};
-  }
-  BlockingPeer::Tls Anonymous() const { return {ca_->certificate()}; }
-  BlockingPeer::Tls As(const std::string& name, const std::string& unit = "") const {
-    return {ca_->certificate(), ca_->Issue(name, unit)};
-  }
-  static StatusCode Ask(BlockingPeer& peer, const wire::Envelope& request) {
-    EXPECT_TRUE(peer.Send(request));
-    const auto reply = peer.Receive();
-    EXPECT_TRUE(reply.has_value());
-    return CodeOf(reply);
-  }
-  wire::Envelope UploadBy(const std::string& vehicle) {
-    UploadRequest upload = DriveUpload(0);
-    upload.key.session.vehicle = vehicle;
-    return UploadOf(std::move(upload), 3);
-  }
-  static wire::Envelope Retraction() {
-    wire::Envelope envelope;
-    envelope.set_request_id(4);
-    envelope.mutable_change_session()->set_action(wire::ChangeSession::RETRACT);
-    return envelope;
-  }
-  static wire::Envelope Verification() {
-    wire::Envelope envelope;
-    envelope.set_request_id(5);
-    envelope.mutable_verify_request()->set_timeout_ms(10'000);
-    return envelope;
-  }
-
-  std::unique_ptr<TestAuthority> ca_;
-};
-
-TEST_F(TlsTest, KeysMayChangeNowAndThen) {
-  ServeTls();
-  BlockingPeer car(port_, As("car.7"));
-  EXPECT_TRUE(car.ChangeKeys(5));
-  EXPECT_TRUE(car.Greet().has_hello_reply());
-  EXPECT_TRUE(car.ChangeKeys(5));
-  EXPECT_EQ(Ask(car, StatusOf(3)), StatusCode::kOk);
-}
-
-// Each change costs the daemon far more than the peer; and nothing that counts as sent comes of it.
-TEST_F(TlsTest, WhoChangesKeysWithoutEndIsClosedAndHoldsUpNobody) {
-  net_.threads = 1;
-  ServeTls();
-  BlockingPeer good(port_, As("car.7"));
-  ASSERT_TRUE(good.Greet().has_hello_reply());
-  std::future<int> closed = std::async(std::launch::async, [this] {
-    int times = 0;
-    for (int i = 0; i < 10; ++i) {
-      BlockingPeer other(port_, Anonymous());
-      const auto begin = std::chrono::steady_clock::now();
-      while (other.ChangeKeys(1'000) &&
-             std::chrono::steady_clock::now() < begin + std::chrono::seconds(3)) {
-      }
-      times += std::chrono::steady_clock::now() < begin + std::chrono::seconds(3);
-    }
-    return times;
-  });
-  auto longest = std::chrono::steady_clock::duration::zero();
-  while (closed.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
-    const auto begin = std::chrono::steady_clock::now();
-    ASSERT_EQ(Ask(good, StatusOf(3)), StatusCode::kOk);
-    longest = std::max(longest, std::chrono::steady_clock::now() - begin);
-  }
-  EXPECT_EQ(closed.get(), 10);
-  EXPECT_LT(longest, std::chrono::seconds(1));
-}
 
 TEST_F(TlsTest, AVehicleIsWhomItsCertificateNames) {
   ServeTls();
