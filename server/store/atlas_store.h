@@ -66,6 +66,9 @@ class AtlasStore : public TileIndex {
   virtual void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) = 0;
   // Marks tiles to be built again, e.g. one that was found damaged. The value: marks set.
   virtual void MarkDirty(std::vector<TileId> ids, Done<std::uint32_t> done) = 0;
+  // By which rules tiles are fused from now on. Where they were fused by others, every tile is
+  // marked, in the same transaction: it is what its keyframes say by these. The value: marks set.
+  virtual void AdoptFusionRules(std::uint64_t rules, Done<std::uint64_t> done) = 0;
 
   enum class ProbeDepth { kQueue, kDisk };
   // Goes the way of a write and changes nothing: `done` tells that the queue moves and, with kDisk,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "core/fusion/tile_fusion.h"
 #include "server/base/thread_priority.h"
 #include "server/store/await.h"
 
@@ -37,6 +38,9 @@ FusionScheduler::FusionScheduler(AtlasStore& store,
       changed_(std::move(changed)),
       options_(options),
       refresher_(store, options.building, log_) {
+  if (options_.workers > 0) {
+    AdoptRules();  // before anybody can ask what is still to be fused
+  }
   for (unsigned i = 0; i < options_.workers; ++i) {
     threads_.emplace_back([this, owner = StrCat("worker-", i)](const std::stop_token& stop) {
       RunWorker(stop, owner);
@@ -82,12 +86,33 @@ void FusionScheduler::RunWorker(const std::stop_token& stop, const std::string& 
   }
 }
 
+// An atlas that was fused by the rules of another version is fused again by those of this one.
+bool FusionScheduler::AdoptRules() {
+  if (has_rules_) {
+    return true;
+  }
+  const auto marks = Await<std::uint64_t>(
+      [&](auto done) { store_.AdoptFusionRules(kFusionRules, std::move(done)); });
+  if (!marks) {
+    log_(LogLevel::kError, StrCat("fusion: cannot note the rules, nothing is fused until then: ",
+                                  marks.error().message()));
+    return false;
+  }
+  if (*marks > 0) {
+    log_(LogLevel::kWarning,
+         StrCat("fusion: the atlas was fused by other rules than this version's (", kFusionRules,
+                "): all ", *marks, " tiles are fused again"));
+  }
+  has_rules_ = true;
+  return true;
+}
+
 // False when there is nothing to do now. What it throws is not the end of the process: tiles that
 // were claimed are claimed again when their lease runs out.
 bool FusionScheduler::Work(Worker& worker, const std::stop_token& stop) {
   try {
     const std::vector<TileClaim> claims =
-        GiveBack(worker) ? NextClaims(worker.owner) : std::vector<TileClaim>();
+        AdoptRules() && GiveBack(worker) ? NextClaims(worker.owner) : std::vector<TileClaim>();
     if (claims.empty()) {
       return refresher_.StoreIdle();
     }

@@ -74,6 +74,7 @@ class FusionScheduler {
   };
 
   void RunWorker(const std::stop_token& stop, const std::string& owner);
+  bool AdoptRules();
   bool Work(Worker& worker, const std::stop_token& stop);
   std::vector<TileClaim> NextClaims(const std::string& owner);
   bool StartNextWave(std::uint64_t done);
@@ -93,6 +94,7 @@ class FusionScheduler {
   FusionOptions options_;
   TileRefresher refresher_;
   DamageList damage_;
+  std::atomic<bool> has_rules_ = false;  // the store knows by which rules is fused
   std::atomic<std::uint64_t> wave_ = 0;
   std::atomic<std::uint64_t> tiles_built_ = 0;
   std::atomic<std::int64_t> building_ns_ = 0;

@@ -147,6 +147,11 @@ class SqliteStore final : public AtlasStore {
       return Result<std::uint32_t>(MarkDirtyInStore(connection, i));
     });
   }
+  void AdoptFusionRules(std::uint64_t rules, Done<std::uint64_t> done) override {
+    Write<std::uint64_t>(std::move(done), [rules](Connection& connection) {
+      return AdoptFusionRulesInStore(connection, rules);
+    });
+  }
 
   void Probe(ProbeDepth depth, Done<bool> done) override {
     writes_.SubmitProbe(MakeWrite<bool>(std::move(done), [depth](Connection& connection) {

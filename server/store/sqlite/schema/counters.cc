@@ -16,4 +16,14 @@ std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t
   return ReadCounter(connection, counter);
 }
 
+void WriteFusionRules(Connection& connection, std::uint64_t rules) {
+  connection
+      .Prepare(
+          "INSERT INTO counters (id, name, value) VALUES (?1, 'fusion_rules', ?2) "
+          "ON CONFLICT (id) DO UPDATE SET value = ?2")
+      .Bind(static_cast<std::int64_t>(Counter::kFusionRules))
+      .Bind(rules)
+      .Run();
+}
+
 }  // namespace atlas

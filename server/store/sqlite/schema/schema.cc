@@ -125,7 +125,7 @@ INSERT INTO counters (id, name, value) VALUES
   (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),
   (5, 'keyframe_bytes', 0), (6, 'tiles', 0), (7, 'tile_bytes', 0), (8, 'cells', 0),
   (9, 'multilayer_cells', 0), (10, 'sessions', 0),
-  (11, 'history_horizon', 0), (12, 'compactions', 0), (13, 'compacted', 0);
+  (11, 'history_horizon', 0), (12, 'compactions', 0), (13, 'compacted', 0), (14, 'fusion_rules', 0);
 )sql";
 
 std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) {

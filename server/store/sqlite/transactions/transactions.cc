@@ -1,5 +1,6 @@
 #include "server/store/sqlite/transactions/transactions.h"
 
+#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -199,6 +200,27 @@ std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>
   const std::uint64_t revision = NextRevision(connection);
   MarkTiles(connection, ids, revision);
   return static_cast<std::uint32_t>(ids.size());
+}
+
+// Marked is what is stored, and where keyframes are: other rules may have found nothing there.
+Result<std::uint64_t> AdoptFusionRulesInStore(Connection& connection, std::uint64_t rules) {
+  if (ReadCounter(connection, Counter::kFusionRules) == rules) {
+    return 0;
+  }
+  constexpr std::uint32_t kAll = std::numeric_limits<std::uint32_t>::max();
+  const auto footprints = ListFootprintRows(connection, 0, -1, kAll);
+  if (!footprints) {
+    return Error(footprints.error());
+  }
+  std::set<TileId> tiles(footprints->begin(), footprints->end());
+  for (const TileSummary& tile : ListTileRows(connection, -1, kAll)) {
+    tiles.insert(tile.id);
+  }
+  WriteFusionRules(connection, rules);
+  if (!tiles.empty()) {
+    MarkTiles(connection, tiles, NextRevision(connection));
+  }
+  return tiles.size();
 }
 
 }  // namespace atlas

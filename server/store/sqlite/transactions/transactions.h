@@ -14,5 +14,6 @@ Result<FinishResult> FinishTileInStore(Connection& connection,
                                        const FinishedTile& tile,
                                        std::uint8_t levels);
 std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids);
+Result<std::uint64_t> AdoptFusionRulesInStore(Connection& connection, std::uint64_t rules);
 
 }  // namespace atlas
