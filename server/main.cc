@@ -95,7 +95,12 @@ std::string Joined(const std::vector<std::string>& keys) {
 }
 
 void ReloadConfig(LiveConfig& config) {
-  const Result<LiveConfig::Outcome> outcome = config.Reload();
+  Result<LiveConfig::Outcome> outcome = Error(StatusCode::kInternal, "");
+  try {
+    outcome = config.Reload();
+  } catch (const std::exception& error) {  // without memory, say: no reason to end
+    outcome = Error(StatusCode::kInternal, error.what());
+  }
   if (!outcome) {
     spdlog::error("signal 1: the new configuration is refused, the old one stays: {}: {}",
                   StatusCodeName(outcome.error().code()), outcome.error().message());

@@ -9,6 +9,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 
 #include "core/base/str_cat.h"
@@ -77,8 +78,11 @@ class DaemonConnection::Impl {
   // False when nothing came: the read goes on.
   Result<bool> ReadSome(Clock::time_point deadline);
   // Ends a stage and begins the next; false when it has not ended at `latest`.
-  Result<bool> Step(Clock::time_point latest);
-  Result<bool> Resolve(Clock::time_point latest);
+  Result<bool> Step(Clock::time_point latest, Clock::time_point deadline);
+  Result<bool> Resolve(Clock::time_point latest, Clock::time_point deadline);
+  // One address after the other, each with an equal part of the time: of a host with several the
+  // first may be one that never answers.
+  void Connect(Clock::time_point deadline);
   // Connected: encrypts, if it is to be.
   Status BeginTalking();
   std::string Doing() const;
@@ -95,6 +99,7 @@ class DaemonConnection::Impl {
   std::optional<error_code> opened_;  // of the stage
   asio::io_context io_;
   asio::ip::tcp::socket socket_;
+  asio::steady_timer turn_{io_};  // of an address
   asio::ssl::context tls_context_{asio::ssl::context::tlsv13_client};
   std::optional<asio::ssl::stream<asio::ip::tcp::socket&>> tls_;
   FrameDecoder decoder_;
@@ -117,6 +122,7 @@ Status DaemonConnection::Impl::Fail(StatusCode code, const std::string& what) {
 void DaemonConnection::Impl::Close() {
   error_code ignored;  // closing is all that is left to do
   socket_.close(ignored);
+  turn_.cancel();
   io_.restart();
   io_.run();
 }
@@ -141,7 +147,7 @@ Status DaemonConnection::Impl::Finish(const std::optional<error_code>& done,
 Result<bool> DaemonConnection::Impl::Open(Clock::time_point latest, Clock::time_point deadline) {
   if (!failure_.ok()) return Error(failure_);
   while (stage_ != Stage::kOpen) {
-    const Result<bool> is_done = Step(std::min(latest, deadline));
+    const Result<bool> is_done = Step(std::min(latest, deadline), deadline);
     if (!is_done) return is_done;
     if (*is_done) continue;
     if (Clock::now() < deadline) return false;
@@ -150,8 +156,8 @@ Result<bool> DaemonConnection::Impl::Open(Clock::time_point latest, Clock::time_
   return true;
 }
 
-Result<bool> DaemonConnection::Impl::Step(Clock::time_point latest) {
-  if (stage_ == Stage::kResolving) return Resolve(latest);
+Result<bool> DaemonConnection::Impl::Step(Clock::time_point latest, Clock::time_point deadline) {
+  if (stage_ == Stage::kResolving) return Resolve(latest, deadline);
   Run(opened_, latest);
   if (!opened_) return false;
   if (*opened_) {
@@ -173,7 +179,7 @@ const std::string& DaemonConnection::Impl::DaemonName() const {
   return tls_options_->daemon_name.empty() ? endpoint_.host : tls_options_->daemon_name;
 }
 
-Result<bool> DaemonConnection::Impl::Resolve(Clock::time_point latest) {
+Result<bool> DaemonConnection::Impl::Resolve(Clock::time_point latest, Clock::time_point deadline) {
   const auto found = names_->Find(endpoint_.host, latest);
   if (!found)
     return Error(Fail(found.error().code(), StrCat(Doing(), ": ", found.error().message())));
@@ -184,9 +190,27 @@ Result<bool> DaemonConnection::Impl::Resolve(Clock::time_point latest) {
     if (!error) addresses_.emplace_back(address, endpoint_.port);
   }
   stage_ = Stage::kConnecting;
-  asio::async_connect(socket_, addresses_,
-                      [this](const error_code& error, const auto&) { opened_ = error; });
+  Connect(deadline);
   return true;
+}
+
+void DaemonConnection::Impl::Connect(Clock::time_point deadline) {
+  const auto share = (deadline - Clock::now()) / std::max<std::size_t>(1, addresses_.size());
+  const auto begin_turn = [this, share](const error_code&, const asio::ip::tcp::endpoint& next) {
+    turn_.cancel();
+    if (next == addresses_.back()) return true;  // what is left is its own
+    turn_.expires_after(share);
+    turn_.async_wait([this](const error_code& error) {
+      error_code ignored;  // it is connected by now
+      if (!error && !opened_) socket_.cancel(ignored);
+    });
+    return true;
+  };
+  asio::async_connect(socket_, addresses_, begin_turn,
+                      [this](const error_code& error, const asio::ip::tcp::endpoint&) {
+                        opened_ = error;
+                        turn_.cancel();
+                      });
 }
 
 Status DaemonConnection::Impl::BeginTalking() {

@@ -65,7 +65,12 @@ int RenameToNew(const char* from, const char* to) {
   if (renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return -1;
   // A file system that cannot do that in one step: for a moment it has both names.
-  return link(from, to) == 0 ? unlink(from) : -1;
+  if (link(from, to) != 0) return -1;
+  if (unlink(from) == 0) return 0;
+  const int error = errno;
+  unlink(to);
+  errno = error;
+  return -1;
 }
 
 using Rename = int (*)(const char*, const char*);

@@ -15,9 +15,12 @@ constexpr int kMaxFailures = 3;
 // At so many and at no other: the fault is the daemon's.
 constexpr std::size_t kMaxFailed = 8;
 
-// Not the keyframe is refused, but whoever sends it.
-bool IsOfTheClient(StatusCode code) {
-  return code == StatusCode::kPermissionDenied;
+// Not the keyframe is refused, but whoever sends it: but for the keyframe of another vehicle, which
+// comes under the wrong name whenever it comes.
+bool IsOfTheClient(StatusCode code, const KeyframeKey& key, const AtlasIdentity& atlas) {
+  const bool is_of_another = atlas.our_role == "vehicle" && !atlas.our_name.empty() &&
+                             atlas.our_name != key.session.vehicle;
+  return code == StatusCode::kPermissionDenied && !is_of_another;
 }
 
 }  // namespace
@@ -25,7 +28,7 @@ bool IsOfTheClient(StatusCode code) {
 class UploadSpool::Sending {
  public:
   Sending(UploadSpool& spool, AtlasClient& client)
-      : spool_(spool), uploader_(client, OptionsOf(spool.options_)) {}
+      : spool_(spool), atlas_(client.atlas()), uploader_(client, OptionsOf(spool.options_)) {}
 
   Result<SpoolReport> Run() {
     std::vector<Number> numbers;
@@ -101,7 +104,7 @@ class UploadSpool::Sending {
     } else if (answer.code() == StatusCode::kInternal) {
       failed_.emplace_back(number, answer);
       if (failed_.size() >= kMaxFailed && report_.acknowledged == 0) failure_ = answer;
-    } else if (IsTemporary(answer.code()) || IsOfTheClient(answer.code())) {
+    } else if (IsTemporary(answer.code()) || IsOfTheClient(answer.code(), key, atlas_)) {
       if (failure_.ok()) failure_ = answer;
     } else {
       SetAside(number, answer);
@@ -125,6 +128,7 @@ class UploadSpool::Sending {
   }
 
   UploadSpool& spool_;
+  const AtlasIdentity atlas_;  // as it was when the client connected
   std::map<KeyframeKey, Number> in_flight_;
   std::vector<std::pair<Number, Status>> failed_;  // at these the daemon did
   SpoolReport report_;

@@ -15,7 +15,7 @@ namespace atlas {
 
 // Of this fusion and of the pyramid above it: another number whenever the same keyframes give
 // another payload, so that an atlas knows that it is of another version (decision 0308).
-inline constexpr std::uint64_t kFusionRules = 4;
+inline constexpr std::uint64_t kFusionRules = 5;
 
 // The tile `id` (level 0) from the frames whose footprints touch it, in any order: the result does
 // not depend on it. Frames that do not reach the tile are ignored; without an observed cell the

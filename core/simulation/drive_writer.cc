@@ -135,7 +135,8 @@ Status WriteInto(const SimulatedDrive& drive,
     }
   }
   ATLAS_RETURN_IF_ERROR(boxes.Close());
-  return WriteText(drive, folder);
+  ATLAS_RETURN_IF_ERROR(WriteText(drive, folder));
+  return progress ? progress(drive.scans()) : Status();
 }
 
 Status CheckTarget(const fs::path& folder) {
@@ -181,6 +182,31 @@ Status MakePartial(const fs::path& target, fs::path& partial) {
           StrCat(partial.string(), " exists, and all before it: remove what others left")};
 }
 
+// A folder that goes with it, unless it got its name.
+class UnfinishedFolder {
+ public:
+  explicit UnfinishedFolder(const fs::path& folder) : folder_(folder) {}
+  UnfinishedFolder(const UnfinishedFolder&) = delete;
+  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+  ~UnfinishedFolder() {
+    if (!is_named_) {
+      std::error_code ignored;  // the first error is the one to tell
+      fs::remove_all(folder_, ignored);
+    }
+  }
+
+  Status Name(const fs::path& target) {
+    std::error_code error;
+    fs::rename(folder_, target, error);
+    is_named_ = !error;
+    return error ? DiskError("cannot create folder", target, error.value()) : Status();
+  }
+
+ private:
+  const fs::path& folder_;
+  bool is_named_ = false;
+};
+
 }  // namespace
 
 Status WriteDrive(const SimulatedDrive& drive,
@@ -191,16 +217,9 @@ Status WriteDrive(const SimulatedDrive& drive,
   const fs::path target = folder.has_filename() ? folder : folder.parent_path();
   fs::path partial;
   ATLAS_RETURN_IF_ERROR(MakePartial(target, partial));
-  std::error_code error;
-  Status status = WriteInto(drive, partial, progress);
-  if (status.ok()) {
-    fs::rename(partial, target, error);
-    status = error ? DiskError("cannot create folder", target, error.value()) : Status();
-  }
-  if (!status.ok()) {
-    fs::remove_all(partial, error);  // the first error is the one to tell
-  }
-  return status;
+  UnfinishedFolder unfinished(partial);
+  ATLAS_RETURN_IF_ERROR(WriteInto(drive, partial, progress));
+  return unfinished.Name(target);
 }
 
 }  // namespace atlas

@@ -15,9 +15,9 @@ using DriveProgress = std::function<Status(std::size_t scans_written)>;
 
 // Scans are written one at a time into a new folder beside it (`folder`.partial, or .partialN where
 // others have that), which is renamed at the end and removed on failure; `progress` (may be empty)
-// is called after each, and ends it by an error of its own. kConflict when `folder` exists and is
-// not empty; kInvalidData when a scan would be empty; kPermissionDenied, kNotFound or
-// kResourceExhausted (full disk) as the system says.
+// is called after each and before the end, and ends it by an error of its own. kConflict when
+// `folder` exists and is not empty; kInvalidData when a scan would be empty; kPermissionDenied,
+// kNotFound or kResourceExhausted (full disk) as the system says.
 Status WriteDrive(const SimulatedDrive& drive,
                   const std::filesystem::path& folder,
                   const DriveProgress& progress);

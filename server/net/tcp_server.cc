@@ -156,8 +156,8 @@ class TcpServer::Impl {
       tcp::endpoint peer;
       tcp::socket socket = co_await acceptor_.async_accept(
           thread.io(), peer, asio::redirect_error(asio::use_awaitable, error));
-      if (error == asio::error::operation_aborted) {
-        co_return;
+      if (error == asio::error::operation_aborted || !acceptor_.is_open()) {
+        co_return;  // whoever came last goes with its socket: nobody would tell it to drain
       }
       if (error) {
         // Out of descriptors or a peer that left: wait a little, serve the others meanwhile.
@@ -190,11 +190,14 @@ class TcpServer::Impl {
     }
   }
 
-  // One of those with the fewest connections.
+  // Of those that keep up with what they are given, if there are such, one with the fewest
+  // connections.
   NetThread& LeastBusyThread() const {
-    return **std::min_element(threads_.begin(), threads_.end(), [](const auto& a, const auto& b) {
-      return a->connections() < b->connections();
-    });
+    const auto rank = [this](const auto& thread) {
+      return std::pair(thread->arrivals() >= options_.max_arrivals, thread->connections());
+    };
+    return **std::min_element(threads_.begin(), threads_.end(),
+                              [rank](const auto& a, const auto& b) { return rank(a) < rank(b); });
   }
 
   void Admit(tcp::socket socket, const asio::ip::address& peer, NetThread& thread) {

@@ -37,7 +37,7 @@ AtlasService::AtlasService(AtlasStore& store,
           log_,
           [this](const TileId& id, std::uint64_t revision) { watches_.Publish(id, revision); },
           options.fusion),
-      wait_(store, changes_, fusion_.damage()),
+      wait_(store, changes_, fusion_),
       whole_(store, changes_, wait_),
       past_(store, options.past_cache_bytes, options.scratch_directory) {}
 

@@ -1,10 +1,22 @@
 #include "server/service/fusion_wait.h"
 
+#include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "core/base/str_cat.h"
 
 namespace atlas {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Each tile that is built is a change, and to count many marks takes long: then the next look comes
+// when so many times as long has passed.
+constexpr std::uint64_t kMany = 1'000;
+constexpr int kRest = 9;
+
+}  // namespace
 
 Status FusionWait::CheckRunning(const std::stop_token& stop) const {
   if (changes_.is_closed()) {
@@ -26,23 +38,32 @@ Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtySt
                                           const Limit& limit,
                                           DirtyState& state) const {
   while (true) {
+    const auto begin = Clock::now();
     const std::uint64_t seen = changes_.version();
+    const Status start = fusion_.start_problem();
     const auto read = store_.ReadDirtyState();
     if (!read) {
       return Error(read.error());
     }
     state = *read;
-    if (is_done(state)) {
+    if (start.ok() && is_done(state)) {
       return End::kDone;
     }
-    if (IsStuck(state)) {
+    if (start.ok() && IsStuck(state)) {
       return End::kDamaged;
     }
+    const auto end = Clock::now();
     if (!changes_.WaitPast(seen, limit.deadline, limit.stop)) {
       if (Status status = CheckRunning(limit.stop); !status.ok()) {
         return Error(std::move(status));
       }
+      if (!start.ok()) {
+        return Error(start);
+      }
       return End::kTimedOut;
+    }
+    if (state.dirty_tiles > kMany) {
+      std::this_thread::sleep_until(std::min(end + kRest * (end - begin), limit.deadline));
     }
   }
 }

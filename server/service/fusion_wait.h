@@ -1,5 +1,6 @@
 // Waiting until the fusion workers have caught up. Thread-safe. Every wait ends early with
-// kUnavailable when the changes are closed, which is when the daemon ends, or on a stop.
+// kUnavailable when the changes are closed, which is when the daemon ends, or on a stop; and late,
+// with what keeps them from it, when the workers could not begin (FusionScheduler::start_problem).
 #pragma once
 
 #include <chrono>
@@ -10,7 +11,7 @@
 
 #include "core/base/status.h"
 #include "server/service/change_signal.h"
-#include "server/service/fusion/damage_list.h"
+#include "server/service/fusion/fusion_scheduler.h"
 #include "server/store/atlas_store.h"
 
 namespace atlas {
@@ -43,8 +44,8 @@ class FusionWait {
     const std::stop_token stop;
   };
 
-  FusionWait(AtlasStore& store, ChangeSignal& changes, const DamageList& damage)
-      : store_(store), changes_(changes), damage_(damage) {}
+  FusionWait(AtlasStore& store, ChangeSignal& changes, const FusionScheduler& fusion)
+      : store_(store), changes_(changes), fusion_(fusion), damage_(fusion.damage()) {}
 
   // Until nothing is dirty but what damage keeps from being fused.
   Result<WaitOutcome> UntilClean(const Limit& limit) const;
@@ -70,6 +71,7 @@ class FusionWait {
 
   AtlasStore& store_;
   ChangeSignal& changes_;
+  const FusionScheduler& fusion_;
   const DamageList& damage_;
 };
 

@@ -57,10 +57,11 @@ void EvidenceFolder::Fold(std::span<const SegmentView> segments,
                    .column = segment.column};
     drives_.Hear(say);
     Sum& sum = sums_[labels[i]];
-    const bool was_occupied = sum.occupancy > 0;
     sum.occupancy = FoldEvidence(sum.occupancy, say.occupancy, clamp);
     const std::int64_t offset = std::int64_t{sum.span.base} - say.column_base;
-    if (was_occupied && sum.occupancy < 0 && segment.is_strong && can_stand_) {
+    const bool is_foot_gone = sum.has_stood && sum.occupancy < 0 && segment.is_strong && can_stand_;
+    sum.has_stood = sum.occupancy > 0 || (sum.has_stood && !is_foot_gone);
+    if (is_foot_gone) {
       const ColumnSum before = sum.column;
       sum.column.Fold(say.column, segment.column_seen, offset, clamp);
       sum.column.DropWhatStood(before, say.column, offset, ValuesIn(sum.span));
@@ -78,7 +79,7 @@ void EvidenceFolder::Begin(std::span<const CellLayer> layers, const std::int32_t
   drives_.Clear();
   for (std::size_t i = 0; i < layers.size(); ++i) {
     const std::int32_t* above = i + 1 < layers.size() ? &layers[i + 1].altitude_mm : above_mm;
-    sums_.push_back({ColumnSpanOf(layers[i].altitude_mm, above, profile_), 0, {}});
+    sums_.push_back({ColumnSpanOf(layers[i].altitude_mm, above, profile_), 0, false, {}});
   }
 }
 

@@ -36,6 +36,7 @@ class EvidenceFolder {
   struct Sum {
     ColumnSpan span;
     int occupancy = 0;
+    bool has_stood = false;  // occupied once, and not measured free since
     ColumnSum column;
   };
 

@@ -64,9 +64,9 @@ class ColumnSum {
             std::int64_t offset,
             const FoldClamp& clamp);
   // What stood on a place that is free now is gone, too: evidence above 0 `before` this stretch
-  // spoke, without a gap from the lowest value or the next one upwards, becomes 0; but not where
-  // the stretch, whose column is taken from value `offset` on, saw some of it. `values`: that are
-  // published.
+  // spoke, without a gap from the lowest value or the next one upwards, is not above 0 any more;
+  // but not where the stretch, whose column is taken from value `offset` on, says that some of it
+  // is there. `values`: that are published.
   void DropWhatStood(const ColumnSum& before,
                      const ColumnLanes& said,
                      std::int64_t offset,

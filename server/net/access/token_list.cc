@@ -4,7 +4,9 @@
 #include <charconv>
 #include <chrono>
 #include <fstream>
+#include <iterator>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include <openssl/crypto.h>
@@ -54,12 +56,17 @@ TokenHash HashOfToken(std::string_view token) {
 }
 
 Result<TokenList> TokenList::Read(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (!std::filesystem::is_regular_file(file) || !(text << in.rdbuf())) {
+  std::error_code ignored;  // what cannot be looked at cannot be read either
+  if (!std::filesystem::is_regular_file(file, ignored)) {
     return Error(StatusCode::kNotFound, StrCat("there is no file of tokens ", file.string()));
   }
-  return Parse(text.str(), file.string());
+  std::ifstream in(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (!in.is_open() || in.bad()) {
+    return Error(StatusCode::kPermissionDenied,
+                 StrCat("the file of tokens ", file.string(), " cannot be read"));
+  }
+  return Parse(text, file.string());
 }
 
 Result<TokenList> TokenList::Parse(std::string_view text, const std::string& origin) {

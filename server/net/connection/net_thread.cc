@@ -90,16 +90,24 @@ asio::awaitable<void> NetThread::CheckDeadlines() {
   while (true) {
     timer.expires_after(LookEvery(options_));
     co_await timer.async_wait(asio::use_awaitable);
-    const auto now = PeerConnection::Clock::now();
-    handler_.ReturnFreed(now);
-    std::erase_if(connections_, [now](const auto& weak) {
-      const auto connection = weak.lock();
-      if (connection) {
-        connection->CheckDeadlines(now);
-      }
-      return connection == nullptr;
-    });
+    try {
+      CheckDeadlinesOnce();
+    } catch (const std::exception& error) {  // without memory, say: the next time
+      spdlog::error("network thread: deadlines: {}", error.what());
+    }
   }
+}
+
+void NetThread::CheckDeadlinesOnce() {
+  const auto now = PeerConnection::Clock::now();
+  handler_.ReturnFreed(now);
+  std::erase_if(connections_, [now](const auto& weak) {
+    const auto connection = weak.lock();
+    if (connection) {
+      connection->CheckDeadlines(now);
+    }
+    return connection == nullptr;
+  });
 }
 
 void NetThread::Run() {

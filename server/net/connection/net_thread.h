@@ -54,6 +54,7 @@ class NetThread {
   template <typename Action>
   void ForEach(Action action);
   boost::asio::awaitable<void> CheckDeadlines();
+  void CheckDeadlinesOnce();
   void Run();
 
   RequestHandler& handler_;

@@ -21,20 +21,26 @@ class ReadingTurn {
   // After each read, whatever it gave: until another one is worth it, or `stop` is emitted.
   boost::asio::awaitable<void> Next(PeerStream::Moved came, boost::asio::cancellation_slot stop) {
     bytes_ += came.bytes;
+    ++reads_;
     if (came.is_blocked) {
       bytes_ = 0;
+      reads_ = 0;
       co_await stream_.WaitUntilReadable(stop);
-    } else if (bytes_ >= kBytesInTurn) {
+    } else if (bytes_ >= kBytesInTurn || reads_ >= kReadsInTurn) {
       bytes_ = 0;
+      reads_ = 0;
       co_await boost::asio::post(stream_.executor(), boost::asio::use_awaitable);
     }
   }
 
  private:
-  static constexpr std::size_t kBytesInTurn = 256u << 10;  // of one peer that has more
+  // Of one peer that has more. A read may give one byte: a record of TLS that has no others.
+  static constexpr std::size_t kBytesInTurn = 256u << 10;
+  static constexpr int kReadsInTurn = 64;
 
   PeerStream& stream_;
   std::size_t bytes_ = 0;  // in this turn
+  int reads_ = 0;          // likewise
 };
 
 }  // namespace atlas

@@ -23,7 +23,7 @@ class TokenBucket {
   // What was taken is there again: it is as one that is new.
   bool IsFull(Time now) const {
     const std::chrono::duration<double> passed = now - last_;
-    return tokens_ + per_s_ * passed.count() >= per_s_;
+    return per_s_ <= 0.0 || tokens_ + per_s_ * passed.count() >= per_s_;
   }
   // Takes them, whether they are there or not; how long to wait before anything else comes.
   Duration Take(double amount, Time now) {

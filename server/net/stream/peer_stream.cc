@@ -60,11 +60,17 @@ void PeerStream::CountKeyUpdates(int is_written,
                                  int content_type,
                                  const void* message,
                                  std::size_t size,
-                                 ssl_st* /*session*/,
+                                 ssl_st* session,
                                  void* stream) {
   if (is_written == 0 && content_type == SSL3_RT_HANDSHAKE && size > 0 &&
       *static_cast<const std::uint8_t*>(message) == SSL3_MT_KEY_UPDATE) {
-    ++static_cast<PeerStream*>(stream)->key_updates_;
+    PeerStream& self = *static_cast<PeerStream*>(stream);
+    ++self.key_updates_;
+    // While less than the head of a record is left in its buffer OpenSSL fills that up and goes on:
+    // records of the right length would keep it reading for ever.
+    if (self.HasTooManyKeyUpdates()) {
+      SSL_set_read_ahead(session, 0);
+    }
   }
 }
 

@@ -93,9 +93,14 @@ bool FusionScheduler::AdoptRules() {
   }
   const auto marks = Await<std::uint64_t>(
       [&](auto done) { store_.AdoptFusionRules(kFusionRules, std::move(done)); });
+  {
+    const std::lock_guard lock(start_mutex_);
+    start_problem_ =
+        marks ? Status()
+              : marks.error().WithContext("fusion cannot begin, its rules cannot be noted");
+  }
   if (!marks) {
-    log_(LogLevel::kError, StrCat("fusion: cannot note the rules, nothing is fused until then: ",
-                                  marks.error().message()));
+    log_(LogLevel::kError, start_problem().message());
     return false;
   }
   if (*marks > 0) {
@@ -104,7 +109,13 @@ bool FusionScheduler::AdoptRules() {
                 "): all ", *marks, " tiles are fused again"));
   }
   has_rules_ = true;
+  changes_.Notify();
   return true;
+}
+
+Status FusionScheduler::start_problem() const {
+  const std::lock_guard lock(start_mutex_);
+  return start_problem_;
 }
 
 // False when there is nothing to do now. What it throws is not the end of the process: tiles that

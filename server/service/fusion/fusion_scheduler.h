@@ -59,6 +59,9 @@ class FusionScheduler {
   double building_s() const { return 1e-9 * static_cast<double>(building_ns_.load()); }
   std::size_t kept_bytes() const { return refresher_.kept_bytes(); }
   std::size_t kept_disk_bytes() const { return refresher_.kept_disk_bytes(); }
+  // Why nothing is fused although there are workers: the store does not take by which rules. Ok
+  // once it did.
+  Status start_problem() const;
   // Tiles that damage keeps from being fused.
   const DamageList& damage() const { return damage_; }
 
@@ -94,6 +97,8 @@ class FusionScheduler {
   FusionOptions options_;
   TileRefresher refresher_;
   DamageList damage_;
+  mutable std::mutex start_mutex_;
+  Status start_problem_;                 // with it
   std::atomic<bool> has_rules_ = false;  // the store knows by which rules is fused
   std::atomic<std::uint64_t> wave_ = 0;
   std::atomic<std::uint64_t> tiles_built_ = 0;

@@ -67,10 +67,7 @@ Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
 }
 
 Result<BuiltTile> TileBuilder::BuildFromChildren(const TileId& id) {
-  const auto state = store_.ReadDirtyState();
-  if (!state) {
-    return Error(state.error());
-  }
+  const std::uint64_t revision = store_.revision();  // before the children are read
   const std::array<TileId, 4> ids = id.Children();
   std::vector<TileSummary> stored;
   const Status scanned =
@@ -91,7 +88,7 @@ Result<BuiltTile> TileBuilder::BuildFromChildren(const TileId& id) {
     children[static_cast<std::size_t>(place)] = child->get();
   }
   auto parent = std::make_shared<const Tile>(BuildParentTile(id, children, profile_));
-  BuiltTile built{state->revision, ToContent(*parent, profile_)};
+  BuiltTile built{revision, ToContent(*parent, profile_)};
   if (built.content) {
     tiles_.Insert(built.content->payload_hash, std::move(parent));
   }

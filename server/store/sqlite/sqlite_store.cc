@@ -45,16 +45,15 @@ std::uint64_t ReadRevision(Connection& connection) {
   return ReadCounter(connection, Counter::kRevision);
 }
 
-// In its turn; what fails is noted at once, for those behind it in the same group.
+// In its turn; how it ends is noted at once, for those behind it in the same group. Where that does
+// not come to the disk, it fails with all of them, and Noting() takes it back.
 Result<PutKeyframeResult> PutInTurn(Connection& connection, const NewKeyframe& keyframe) {
   if (Status status = keyframe.missing->CheckTurn(keyframe.key); !status.ok()) {
     return Error(std::move(status));
   }
   try {
     auto result = PutKeyframeInStore(connection, keyframe);
-    if (!result) {
-      keyframe.missing->NoteEnd(keyframe.key, result.error());
-    }
+    keyframe.missing->NoteEnd(keyframe.key, result ? Status() : result.error());
     return result;
   } catch (const std::exception& error) {
     keyframe.missing->NoteEnd(keyframe.key, StatusFromException(error));
@@ -148,9 +147,10 @@ class SqliteStore final : public AtlasStore {
     });
   }
   void AdoptFusionRules(std::uint64_t rules, Done<std::uint64_t> done) override {
-    Write<std::uint64_t>(std::move(done), [rules](Connection& connection) {
-      return AdoptFusionRulesInStore(connection, rules);
-    });
+    Write<std::uint64_t>(
+        std::move(done), [rules, levels = identity_.profile.levels](Connection& connection) {
+          return Result<std::uint64_t>(AdoptFusionRulesInStore(connection, rules, levels));
+        });
   }
 
   void Probe(ProbeDepth depth, Done<bool> done) override {

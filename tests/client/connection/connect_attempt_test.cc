@@ -3,8 +3,13 @@
 #include "client/connection/connect_attempt.h"
 
 #include <future>
+#include <vector>
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "proto/wire/convert.h"
 #include "tests/client/support/gated_resolver.h"
@@ -18,6 +23,35 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kDeadline{1'000};
 const milliseconds kLong{20'000};
+
+// An address of this machine whose queue of connections is full.
+class SilentAddress {
+ public:
+  SilentAddress(const char* host, std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    inet_pton(AF_INET, host, &address.sin_addr);
+    const auto* const generic = reinterpret_cast<const sockaddr*>(&address);
+    sockets_.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    EXPECT_EQ(::bind(sockets_[0], generic, sizeof address), 0);
+    EXPECT_EQ(::listen(sockets_[0], 0), 0);
+    for (int i = 0; i < 4; ++i) {
+      sockets_.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+      (void)::connect(sockets_.back(), generic, sizeof address);
+    }
+  }
+  ~SilentAddress() {
+    for (const int socket : sockets_) {
+      ::close(socket);
+    }
+  }
+  SilentAddress(const SilentAddress&) = delete;
+  SilentAddress& operator=(const SilentAddress&) = delete;
+
+ private:
+  std::vector<int> sockets_;
+};
 
 ConnectProgress ToTheEnd(const ConnectionOptions& options) {
   return ConnectAttempt(options).Continue(options.connect_timeout);
@@ -122,6 +156,26 @@ TEST(ConnectAttemptTest, AHostWithAnAddressThatIsDeadIsReachedAtTheNextOne) {
   EXPECT_TRUE(ToTheEnd(options).client);
   resolver.Answer(NameLookup::Addresses{"no address"});
   EXPECT_EQ(ToTheEnd(options).failure.code(), StatusCode::kUnavailable);
+}
+
+// Somebody listens and takes nobody in: the system drops who comes, without a word.
+TEST(ConnectAttemptTest, AHostWithAnAddressThatNeverAnswersIsReachedAtTheNextOne) {
+  GatedResolver resolver;
+  const TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    socket.Drain();
+  });
+  const SilentAddress silent("127.0.0.2", peer.endpoint().port);
+  ConnectionOptions options = peer.options();
+  options.endpoint.host = "daemon";
+  options.names = std::make_shared<NameLookup>(resolver.resolver());
+  resolver.Answer(NameLookup::Addresses{"127.0.0.2", "127.0.0.1"});
+  const Clock::time_point start = Clock::now();
+  const ConnectProgress progress = ToTheEnd(options);
+  EXPECT_TRUE(progress.client) << progress.failure.message();
+  EXPECT_GE(Clock::now() - start, options.connect_timeout / 3);
+  resolver.Answer(NameLookup::Addresses{"127.0.0.2", "127.0.0.2"});
+  EXPECT_EQ(ToTheEnd(options).failure.code(), StatusCode::kTimeout);
 }
 
 TEST(ConnectAttemptTest, WhatTheDaemonRefusesForGoodIsFinal) {

@@ -1,12 +1,14 @@
 #!/usr/bin/python3
-"""What `atlas simulate` writes about cars that move or come and go, and what it refuses of them.
+"""What `atlas simulate` writes about cars that move or come and go, what it refuses of them, and what a signal leaves.
 Usage: simulate_test.py BIN_DIR"""
 
 import json
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
@@ -109,12 +111,32 @@ def convoy_cases(simulation):
         simulation.refused(f"{world} has its own", [world, "--traffic"], "--traffic is for garage and FILE.obj")
 
 
+def interrupted_case(simulation):
+    report = simulation.report
+    for number in (signal.SIGTERM, signal.SIGINT):
+        folder = simulation.work / f"interrupted{number}"
+        partial = folder.with_name(folder.name + ".partial")
+        process = subprocess.Popen([simulation.atlas, "simulate", "city", "-o", folder], stderr=subprocess.DEVNULL)
+        try:
+            deadline = time.monotonic() + 60
+            while not list(partial.glob("velodyne/*.bin")) and process.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.01)
+            report.check(f"signal {number}: it was at work", process.poll() is None and partial.is_dir(), partial)
+            process.send_signal(number)
+            report.equal(f"signal {number}: it ends by it", process.wait(60), -number)
+        finally:
+            process.kill()
+            process.wait()
+        report.check(f"signal {number}: nothing is left", not folder.exists() and not partial.exists(), folder)
+
+
 def main():
     report = Report()
     with tempfile.TemporaryDirectory() as work:
         simulation = Simulation(report, pathlib.Path(sys.argv[1]), pathlib.Path(work))
         parked_cases(simulation)
         convoy_cases(simulation)
+        interrupted_case(simulation)
     print(f"{report.checks} checks, {report.failed} failed")
     return 1 if report.failed else 0
 

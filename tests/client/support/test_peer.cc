@@ -79,7 +79,7 @@ ConnectionOptions TestPeer::options() const {
   return options;
 }
 
-void AnswerHello(PeerSocket& socket, const MapProfile& profile) {
+void AnswerHello(PeerSocket& socket, const MapProfile& profile, const PeerIdentity& client) {
   const auto request = socket.ReadRequest();
   if (!request) return;
   wire::Envelope reply;
@@ -89,6 +89,8 @@ void AnswerHello(PeerSocket& socket, const MapProfile& profile) {
   hello.set_atlas_id(std::string(16, 'a'));
   hello.set_epoch(1);
   hello.set_revision(7);
+  hello.set_name(client.name);
+  hello.set_role(client.role);
   socket.Reply(request->request_id(), std::move(reply));
 }
 

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "client/connection/atlas_client.h"
@@ -49,7 +50,13 @@ class TestPeer {
   std::thread thread_;
 };
 
+// Whom the daemon takes a client for.
+struct PeerIdentity {
+  std::string name;
+  std::string role;
+};
+
 // Reads the Hello and answers as a daemon with this profile.
-void AnswerHello(PeerSocket& socket, const MapProfile& profile);
+void AnswerHello(PeerSocket& socket, const MapProfile& profile, const PeerIdentity& client = {});
 
 }  // namespace atlas

@@ -88,6 +88,33 @@ TEST(SpoolAnswersTest, WhatMayPassLaterIsKept) {
   }
 }
 
+// A vehicle that was given another certificate while keyframes waited.
+TEST(SpoolAnswersTest, WhatIsOfAnotherNameStopsNoOther) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    ASSERT_TRUE(PutOne(spool, i, 100, i < 18 ? "car" : "car.b").ok());
+  }
+  std::map<std::uint32_t, Status> refusals;
+  for (std::uint32_t i = 0; i < 18; ++i) {
+    refusals[i] = {StatusCode::kPermissionDenied, "may not upload for the vehicle car"};
+  }
+  UploadPeer peer(refusals, 1 << 30, {"car.b", "vehicle"});
+  const auto report = peer.Take(spool);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->set_aside, 18U);
+  EXPECT_EQ(peer.came(), (std::vector<std::uint32_t>{18, 19}));
+  EXPECT_EQ(spool.waiting(), 0U);
+  EXPECT_EQ(*spool.RetryRefused(), 18U);
+  // Who may not upload at all keeps them, whatever their names.
+  UploadPeer reader(refusals, 1 << 30, {"car.b", "reader"});
+  EXPECT_EQ(reader.Take(spool).error().code(), StatusCode::kPermissionDenied);
+  EXPECT_EQ(spool.waiting(), 18U);
+  UploadPeer old_name({}, 1 << 30, {"car", "vehicle"});
+  EXPECT_TRUE(old_name.Take(spool));
+  EXPECT_EQ(spool.waiting(), 0U);
+}
+
 TEST(SpoolAnswersTest, AKeyframeThatTheDaemonFailsAtStopsNoOther) {
   const TestFolder folder;
   UploadSpool spool = OpenSpool(folder);

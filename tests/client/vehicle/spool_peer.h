@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -20,9 +21,12 @@ namespace fs = std::filesystem;
 // A daemon that remembers the sequence numbers it took, refuses as told, and leaves after so many.
 class UploadPeer {
  public:
-  explicit UploadPeer(std::map<std::uint32_t, Status> refusals = {}, int answers = 1 << 30)
+  explicit UploadPeer(std::map<std::uint32_t, Status> refusals = {},
+                      int answers = 1 << 30,
+                      PeerIdentity client = {})
       : refusals_(std::move(refusals)),
         answers_(answers),
+        client_(std::move(client)),
         peer_([this](PeerSocket& socket) { Serve(socket); }) {}
 
   Result<SpoolReport> Take(UploadSpool& spool) {
@@ -36,7 +40,7 @@ class UploadPeer {
 
  private:
   void Serve(PeerSocket& socket) {
-    AnswerHello(socket, {});
+    AnswerHello(socket, {}, client_);
     while (const auto request = socket.ReadRequest()) {
       if (answers_-- <= 0) return;
       const std::uint32_t sequence = request->upload_keyframe().key().sequence();
@@ -55,15 +59,19 @@ class UploadPeer {
 
   std::map<std::uint32_t, Status> refusals_;
   int answers_;
+  PeerIdentity client_;
   std::mutex mutex_;
   std::vector<std::uint32_t> came_;
   TestPeer peer_;
 };
 
-inline Status PutOne(UploadSpool& spool, std::uint32_t sequence, std::size_t bytes = 100) {
+inline Status PutOne(UploadSpool& spool,
+                     std::uint32_t sequence,
+                     std::size_t bytes = 100,
+                     const std::string& vehicle = "car") {
   const Bytes blob(bytes, static_cast<std::uint8_t>(sequence));
   KeyframeUpload upload;
-  upload.key = {{"car", "monday"}, sequence};
+  upload.key = {{vehicle, "monday"}, sequence};
   upload.time_ms = 1'000 + sequence;
   upload.blob = blob;
   return spool.Put(upload);

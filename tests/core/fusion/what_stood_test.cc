@@ -13,12 +13,13 @@ using testing::Deck;
 using testing::Middle;
 using testing::See;
 
-// A session that sees the deck twenty times, from this sequence number on: 100 ms each.
+// A session that sees the deck so many times, from this sequence number on: 100 ms each.
 void Visit(const char* session,
            std::uint32_t begin,
            const Deck& deck,
-           std::vector<PlacedKeyframe>& world) {
-  for (std::uint32_t i = 0; i < 20; ++i) {
+           std::vector<PlacedKeyframe>& world,
+           std::uint32_t keyframes = 20) {
+  for (std::uint32_t i = 0; i < keyframes; ++i) {
     world.push_back(See(deck, {"car", session, begin + i}));
   }
 }
@@ -70,6 +71,35 @@ TEST(WhatStoodTest, WhatStoodOnNoObstacleStays) {
 TEST(WhatStoodTest, OnlyMeasuredGroundTells) {
   const Deck guess{.occupancy = Occupancy::kFree, .source = AltitudeSource::kExtrapolated};
   EXPECT_EQ(ColumnAfter(Obstacle(0xCC), guess), 0xFFU);
+}
+
+TEST(WhatStoodTest, AGuessThatCameFirstChangesNothing) {
+  const Deck guess{.occupancy = Occupancy::kFree, .source = AltitudeSource::kExtrapolated};
+  std::vector<PlacedKeyframe> world;
+  Visit("a", 0, Obstacle(0xCC), world);
+  Visit("b", 100, guess, world);
+  ASSERT_TRUE(Middle(world)[0].is_traversable());
+  Visit("c", 200, kEmpty, world);
+  EXPECT_EQ(Middle(world)[0].column, 0x88U);
+}
+
+TEST(WhatStoodTest, VisitsThatComeToNothingChangeNothing) {
+  for (std::uint32_t misses = 1; misses <= 6; ++misses) {
+    std::vector<PlacedKeyframe> world;
+    Visit("a", 0, Obstacle(0xCC), world);
+    Visit("b", 100, kEmpty, world, misses);
+    Visit("c", 200, kEmpty, world);
+    EXPECT_EQ(Middle(world)[0].column, 0x88U) << misses;
+    EXPECT_TRUE(Middle(world)[0].is_traversable()) << misses;
+  }
+}
+
+TEST(WhatStoodTest, ItIsAskedOnceOnly) {
+  std::vector<PlacedKeyframe> world;
+  Visit("a", 0, Obstacle(0xCC), world);
+  Visit("b", 100, {.column = 0xC0}, world);
+  Visit("c", 200, kEmpty, world);
+  EXPECT_EQ(Middle(world)[0].column, 0xFFU);
 }
 
 TEST(WhatStoodTest, ItIsBackWhenItComesBack) {

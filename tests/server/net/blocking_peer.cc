@@ -94,6 +94,26 @@ bool BlockingPeer::ChangeKeys(int times) {
   return is_sent;
 }
 
+bool BlockingPeer::FloodWithKeyChanges(int times, std::size_t padding) {
+  SSL_set_block_padding(session_.get(), 1);  // else there is none
+  SSL_set_record_padding_callback_arg(session_.get(), &padding);
+  SSL_set_record_padding_callback(session_.get(), [](ssl_st*, int, std::size_t, void* bytes) {
+    return *static_cast<std::size_t*>(bytes);
+  });
+  BIO* const kept = BIO_new(BIO_s_mem());
+  SSL_set0_wbio(session_.get(), kept);
+  bool is_made = ChangeKeys(times);
+  char* data = nullptr;
+  const long size = BIO_get_mem_data(kept, &data);
+  for (long sent = 0; is_made && sent < size;) {
+    const ssize_t part =
+        ::send(fd_, data + sent, static_cast<std::size_t>(size - sent), MSG_NOSIGNAL);
+    is_made = part > 0;
+    sent += part;
+  }
+  return is_made;
+}
+
 BlockingPeer::~BlockingPeer() {
   if (fd_ >= 0) {
     ::close(fd_);

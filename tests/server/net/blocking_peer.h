@@ -45,6 +45,8 @@ class BlockingPeer {
 
   // Changes the key of what is sent, so many times. False when the daemon closed.
   bool ChangeKeys(int times);
+  // The same all at once, with so many bytes of padding each: nothing else can be sent after it.
+  bool FloodWithKeyChanges(int times, std::size_t padding);
   // False when the daemon closed.
   bool SendBytes(ByteSpan bytes) const;
   bool Send(const wire::Envelope& envelope) const;

@@ -2,6 +2,13 @@
 #include <algorithm>
 #include <chrono>
 #include <future>
+#include <memory>
+#include <regex>
+#include <sstream>
+#include <string>
+
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include "tests/server/net/tls_fixture.h"
 
@@ -43,6 +50,32 @@ TEST_F(TlsTest, WhoChangesKeysWithoutEndIsClosedAndHoldsUpNobody) {
   }
   EXPECT_EQ(closed.get(), 10);
   EXPECT_LT(longest, std::chrono::seconds(1));
+}
+
+// Of records of some lengths OpenSSL's buffer never ends with a whole one.
+TEST_F(TlsTest, WhoChangesKeysAllAtOnceIsClosedSoonWhateverTheirLength) {
+  constexpr int kMany = 3'000;
+  const auto before = spdlog::default_logger();
+  std::ostringstream log;
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "atlasd", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  net_.threads = 1;
+  ServeTls();
+  for (std::size_t padding = 0; padding < 140; ++padding) {
+    BlockingPeer other(port_, Anonymous());
+    other.FloodWithKeyChanges(kMany, padding);
+    EXPECT_TRUE(other.IsClosed());
+  }
+  StopServer();
+  spdlog::set_default_logger(before);
+  const std::regex line("TLS: ([0-9]+) changes of the key");
+  const std::string text = log.str();
+  int closed = 0;
+  for (std::sregex_iterator found(text.begin(), text.end(), line), end; found != end; ++found) {
+    ++closed;
+    EXPECT_LT(std::stoi((*found)[1]), 700);  // what one buffer holds
+  }
+  EXPECT_GE(closed, 140);
 }
 
 }  // namespace

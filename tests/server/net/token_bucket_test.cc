@@ -47,5 +47,14 @@ TEST(TokenBucketTest, NoneIsNoLimit) {
   EXPECT_EQ(bucket.Take(1e12, TokenBucket::Time{}), seconds(0));
 }
 
+TEST(TokenBucketTest, WhereThereIsNoLimitAnyMoreNothingIsOwed) {
+  TokenBucket bucket(10.0);
+  const TokenBucket::Time start{seconds(1'000)};
+  bucket.Take(1'000.0, start);
+  EXPECT_FALSE(bucket.IsFull(start + seconds(1)));
+  bucket.set_rate(0.0);
+  EXPECT_TRUE(bucket.IsFull(start + seconds(1)));
+}
+
 }  // namespace
 }  // namespace atlas

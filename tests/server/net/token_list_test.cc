@@ -1,9 +1,14 @@
 #include "server/net/access/token_list.h"
 
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -59,6 +64,24 @@ TEST(TokenListTest, AFileThatIsNotThere) {
   const auto list = TokenList::Read("/nowhere/tokens");
   ASSERT_FALSE(list.has_value());
   EXPECT_EQ(list.error().code(), StatusCode::kNotFound);
+}
+
+TEST(TokenListTest, AFolderThatCannotBeLookedIntoIsToldSo) {
+  const auto folder = std::filesystem::temp_directory_path() / StrCat("atlas_tokens_", ::getpid());
+  std::filesystem::create_directory_symlink(folder.filename(), folder);  // leads to itself
+  const auto list = TokenList::Read(folder / "tokens");
+  std::filesystem::remove(folder);
+  ASSERT_FALSE(list.has_value());
+  EXPECT_EQ(list.error().code(), StatusCode::kNotFound);
+}
+
+TEST(TokenListTest, AnEmptyFileHasNoTokens) {
+  const auto file = std::filesystem::temp_directory_path() / StrCat("atlas_tokens_", ::getpid());
+  std::ofstream(file).close();
+  const auto list = TokenList::Read(file);
+  std::filesystem::remove(file);
+  ASSERT_TRUE(list.has_value()) << list.error().message();
+  EXPECT_EQ(list->Find(HashOfToken(""), 0).error().code(), StatusCode::kPermissionDenied);
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ class FullDiskTest : public ServiceTest {
 
 // The clock stands still, so that no lease ever runs out.
 TEST_F(FullDiskTest, AClaimThatCouldNotBeReleasedIsReleasedWhenThereIsRoom) {
+  Open(1);  // notes by which rules is fused
   Open(0);
   UploadDrive(4);
   Fill();

@@ -2,6 +2,7 @@
 // (decision 0308).
 #include <map>
 
+#include <gmock/gmock.h>
 #include <sqlite3.h>
 
 #include "tests/server/service/service_fixture.h"
@@ -37,6 +38,15 @@ class FusionRulesTest : public ServiceTest {
       }
     }
     ASSERT_EQ(store_->ReadDirtyState()->dirty_tiles, 0U);
+  }
+  // Whether the store is open or not.
+  void Execute(const std::string& name, const char* sql) {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open((directory_ / name / "atlas.db").c_str(), &db), SQLITE_OK);
+    sqlite3_busy_timeout(db, 10'000);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(db);
   }
   std::map<TileId, TileContent> ContentOf(const std::string& name) {
     Open(0, name);
@@ -116,16 +126,57 @@ TEST_F(FusionRulesTest, AnAtlasOfAVersionWithoutTheNumberIsTakenForAnother) {
   Reference();
   const std::uint64_t revision = store_->revision();
   Close();
-  sqlite3* db = nullptr;
-  ASSERT_EQ(sqlite3_open((directory_ / "reference" / "atlas.db").c_str(), &db), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(db, "DELETE FROM counters WHERE id = 14", nullptr, nullptr, nullptr),
-            SQLITE_OK);
-  sqlite3_close(db);
+  Execute("reference", "DELETE FROM counters WHERE id = 14");
   Open(0, "reference");
   EXPECT_GT(Adopt(4), 20U);
   EXPECT_EQ(store_->revision(), revision + 1);
   EXPECT_EQ(Adopt(4), 0U);
   EXPECT_EQ(store_->revision(), revision + 1);
+}
+
+TEST_F(FusionRulesTest, AParentThatIsNotThereIsBuilt) {
+  const AtlasDigest expected = Reference();
+  const auto contents = ContentOf("reference");
+  OpenOther(3, [&](const TileId& id) -> std::optional<TileContent> {
+    const auto found = contents.find(id);
+    return found == contents.end() || id.level > 0 ? std::nullopt : std::optional(found->second);
+  });
+  Open(1);
+  EXPECT_EQ(Digest().sha256, expected.sha256);
+}
+
+TEST_F(FusionRulesTest, ADamagedRowOfAFootprintStopsNothing) {
+  OpenOther(1, [](const TileId&) { return std::nullopt; });
+  Close();
+  Execute("data",
+          "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
+          "VALUES (-1, 1, 1, 1), (9223372036854775807, 1, 1, 1)");
+  Open(1);
+  const auto wait = service_->WaitUntilClean(Long());
+  ASSERT_TRUE(wait) << wait.error().message();
+  EXPECT_EQ(wait->dirty_tiles, 0U);
+  EXPECT_GT(store_->ListTiles(-1, 10'000)->size(), 20U);
+}
+
+// A full disk, say: nobody is told that the map of other rules is the map, and it goes on by
+// itself.
+TEST_F(FusionRulesTest, UntilTheStoreTakesTheRulesNothingCountsAsFused) {
+  const AtlasDigest expected = Reference();
+  OpenOther(1, [](const TileId&) { return std::nullopt; });
+  Close();
+  Execute("data",
+          "CREATE TRIGGER full BEFORE UPDATE ON counters WHEN new.id = 14 "
+          "BEGIN SELECT raise(ABORT, 'full'); END");
+  Open(1);
+  const Patience brief{std::chrono::milliseconds(50), {}};
+  const auto wait = service_->WaitUntilClean(brief);
+  ASSERT_FALSE(wait);
+  EXPECT_THAT(wait.error().message(), ::testing::HasSubstr("fusion cannot begin"));
+  EXPECT_FALSE(service_->Digest(brief));
+  EXPECT_FALSE(service_->WaitForRevision(store_->revision(), brief).ok());
+  EXPECT_EQ(service_->ReadStatus()->tiles_built, 0U);
+  Execute("data", "DROP TRIGGER full");
+  EXPECT_EQ(Digest().sha256, expected.sha256);
 }
 
 }  // namespace

@@ -298,6 +298,38 @@ TEST_F(DiskTest, WhatAFullDiskRefusedComesBeforeWhatIsBehindIt) {
   }
 }
 
+// Whole groups fail then, of which the first ones were told that they are there.
+TEST_F(DiskTest, WhatAFullDiskRefusedOfAWindowLeavesNoGap) {
+  constexpr std::uint32_t kCount = 100;
+  Open();
+  const auto missing = std::make_shared<MissingUploads>();
+  std::uint32_t stored = 0;
+  const auto send_the_rest = [&] {
+    std::vector<std::future<Result<PutKeyframeResult>>> answers;
+    for (std::uint32_t i = stored; i < kCount; ++i) {
+      NewKeyframe keyframe = Big(i);
+      keyframe.missing = missing;
+      answers.push_back(Begin<PutKeyframeResult>(
+          [&](auto done) { store_->PutKeyframe(std::move(keyframe), std::move(done)); }));
+    }
+    bool is_refused = false;
+    for (auto& answer : answers) {
+      const bool is_stored = answer.get().has_value();
+      EXPECT_FALSE(is_stored && is_refused) << "behind one that was refused";
+      is_refused = is_refused || !is_stored;
+      stored += is_stored ? 1 : 0;
+    }
+  };
+  send_the_rest();
+  EXPECT_GT(stored, 0u);
+  EXPECT_LT(stored, kCount);
+  send_the_rest();
+  EXPECT_LT(stored, kCount);
+  ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=64m"), 0);
+  send_the_rest();
+  EXPECT_EQ(stored, kCount);
+}
+
 // The log has them: they were acknowledged, and stay.
 TEST_F(DiskTest, WhatFindsNoRoomInTheDatabaseIsTold) {
   ASSERT_EQ(::mount("none", mount_.c_str(), "tmpfs", MS_REMOUNT, "size=10m"), 0);

@@ -92,5 +92,23 @@ TEST_F(InTurnTest, NothingIsMissingBeforeTheLastOne) {
   EXPECT_EQ(last_sequence(), kCount - 1);
 }
 
+// What was refused comes again as it came: one after the other, without waiting for answers.
+TEST_F(InTurnTest, AWindowThatWasRefusedComesInOneRound) {
+  constexpr std::uint32_t kWindow = 64;
+  Open();
+  for (std::uint32_t i = 0; i < kWindow; ++i) {
+    missing_->NoteEnd(KeyOf(i), kBusy);
+  }
+  std::vector<Answer> answers;
+  for (std::uint32_t i = 0; i < kWindow; ++i) {
+    answers.push_back(Send(i));
+  }
+  for (Answer& answer : answers) {
+    const auto result = answer.get();
+    EXPECT_TRUE(result) << result.error().message();
+  }
+  EXPECT_EQ(last_sequence(), kWindow - 1);
+}
+
 }  // namespace
 }  // namespace atlas

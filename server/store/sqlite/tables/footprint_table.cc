@@ -103,6 +103,12 @@ std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t se
   return ReadKeys(row);
 }
 
+std::vector<TileId> ReadAllFootprints(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT DISTINCT tile_key FROM keyframe_tiles WHERE is_current ORDER BY tile_key");
+  return ReadKeys(row);
+}
+
 void TouchSessionFootprint(Connection& connection,
                            std::int64_t session_id,
                            std::uint64_t revision) {

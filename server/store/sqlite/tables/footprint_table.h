@@ -22,6 +22,8 @@ void WriteFootprint(Connection& connection,
 void DeleteFootprint(Connection& connection, std::int64_t keyframe_id);
 // The union of the current footprints of a session's keyframes, in key order.
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id);
+// Of all keyframes, in key order.
+std::vector<TileId> ReadAllFootprints(Connection& connection);
 // The session's keyframes entered or left the map at `revision`.
 void TouchSessionFootprint(Connection& connection, std::int64_t session_id, std::uint64_t revision);
 

@@ -21,6 +21,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::uint32_t kAllRows = std::numeric_limits<std::uint32_t>::max();
+
 // What was uploaded under a key.
 struct StoredUpload {
   std::int64_t time_ms = 0;
@@ -202,18 +204,21 @@ std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>
   return static_cast<std::uint32_t>(ids.size());
 }
 
-// Marked is what is stored, and where keyframes are: other rules may have found nothing there.
-Result<std::uint64_t> AdoptFusionRulesInStore(Connection& connection, std::uint64_t rules) {
+// Marked is what is stored, and what lies over keyframes: other rules may have found nothing there.
+// Rows with keys that no tile has are left out, as everywhere.
+std::uint64_t AdoptFusionRulesInStore(Connection& connection,
+                                      std::uint64_t rules,
+                                      std::uint8_t levels) {
   if (ReadCounter(connection, Counter::kFusionRules) == rules) {
     return 0;
   }
-  constexpr std::uint32_t kAll = std::numeric_limits<std::uint32_t>::max();
-  const auto footprints = ListFootprintRows(connection, 0, -1, kAll);
-  if (!footprints) {
-    return Error(footprints.error());
+  std::set<TileId> tiles;
+  for (TileId tile : ReadAllFootprints(connection)) {
+    while (tiles.insert(tile).second && tile.level + 1 < levels) {
+      tile = tile.Parent();
+    }
   }
-  std::set<TileId> tiles(footprints->begin(), footprints->end());
-  for (const TileSummary& tile : ListTileRows(connection, -1, kAll)) {
+  for (const TileSummary& tile : ListTileRows(connection, -1, kAllRows)) {
     tiles.insert(tile.id);
   }
   WriteFusionRules(connection, rules);

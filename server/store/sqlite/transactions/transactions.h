@@ -14,6 +14,8 @@ Result<FinishResult> FinishTileInStore(Connection& connection,
                                        const FinishedTile& tile,
                                        std::uint8_t levels);
 std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids);
-Result<std::uint64_t> AdoptFusionRulesInStore(Connection& connection, std::uint64_t rules);
+std::uint64_t AdoptFusionRulesInStore(Connection& connection,
+                                      std::uint64_t rules,
+                                      std::uint8_t levels);
 
 }  // namespace atlas

@@ -258,8 +258,9 @@ TileLayer PlainCell::Publish(std::size_t index) const {
   const std::int32_t base = ColumnBaseIndex(static_cast<std::int32_t>(layer.altitude_mm), profile_);
   PlainSum surface(profile_);
   std::vector<PlainSum> column(PublishedSegments(index, base), PlainSum(profile_));
+  bool has_foot = false;
   for (const Segment* segment : in_order) {
-    const bool was_occupied = surface.units() > 0;
+    has_foot |= surface.units() > 0;
     const bool is_wrong_guess =
         profile_.preset != FusionPreset::kPaper && layer.is_measured && !segment->is_strong &&
         std::abs(segment->representative->altitude_mm - layer.altitude_mm) > profile_.same_layer_mm;
@@ -267,7 +268,8 @@ TileLayer PlainCell::Publish(std::size_t index) const {
       surface.Add({segment->last, segment->driven, segment->occupancy});
     }
     const bool is_foot_gone = profile_.preset != FusionPreset::kPaper && segment->is_strong &&
-                              was_occupied && surface.units() < 0;
+                              has_foot && surface.units() < 0;
+    has_foot &= !is_foot_gone;
     AddToColumn(*segment, base, is_foot_gone, column);
   }
   const int occupancy = surface.units();
