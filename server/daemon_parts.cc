@@ -71,6 +71,7 @@ NameLimits NameLimitsFrom(const DaemonConfig& config) {
   limits.held_bytes = static_cast<std::size_t>(config.name_held_mib) << 20;
   limits.requests_per_s = config.name_requests_per_s;
   limits.bytes_per_s = config.name_mib_per_s * double{1u << 20};
+  limits.served_bytes_per_s = config.name_served_mib_per_s * double{1u << 20};
   limits.watched_bytes = std::max(static_cast<std::size_t>(config.watch_mib) << 18,
                                   NetOptions().max_connection_watched_bytes);
   return limits;

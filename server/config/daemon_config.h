@@ -45,6 +45,7 @@ struct DaemonConfig {
   int name_held_mib = 128;  // of requests under way
   int name_requests_per_s = 1'000;
   int name_mib_per_s = 64;
+  int name_served_mib_per_s = 256;
   std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.

@@ -13,8 +13,9 @@ namespace atlas {
 struct NameLimits {
   std::size_t connections = 64;
   std::size_t held_bytes = 128u << 20;
-  double requests_per_s = 1'000;  // 0: no limit, as of the next
-  double bytes_per_s = 64u << 20;
+  double requests_per_s = 1'000;           // 0: no limit, as of the next
+  double bytes_per_s = 64u << 20;          // that it sends
+  double served_bytes_per_s = 256u << 20;  // that it is sent
   // Fixed when the name comes: a quarter of what all may have.
   std::size_t waits = 4;
   std::size_t watches = 256;

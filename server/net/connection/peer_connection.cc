@@ -245,8 +245,10 @@ Status PeerConnection::ComeIn(const wire::Envelope& hello) {
 }
 
 asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
-  const auto pause =
-      access_.allowance()->Charge(std::exchange(unpaid_requests_, 0), bytes, Clock::now());
+  const std::size_t written_bytes = writer_.written_bytes();
+  const std::size_t served_bytes = written_bytes - std::exchange(paid_bytes_, written_bytes);
+  const auto pause = access_.allowance()->Charge(std::exchange(unpaid_requests_, 0), bytes,
+                                                 served_bytes, Clock::now());
   if (pause == Clock::duration::zero() || is_draining_ || writer_.is_closed()) {
     co_return;
   }

@@ -77,6 +77,8 @@ class ReplyWriter {
   void PushError(std::uint64_t request_id, const Status& status);
   // Writes what the peer takes now; the rest leaves as it takes it.
   void Flush();
+  // Of frames, by now: the system took them, or TLS.
+  std::size_t written_bytes() const { return static_cast<std::size_t>(written_bytes_); }
   // The peer takes what there is, as far as is known.
   bool has_room() const { return queued_bytes_ == 0 || queued_bytes_ <= max_bytes(); }
   // As many bytes as the next frames of a reply may have now, and one frame more; 0: it has to

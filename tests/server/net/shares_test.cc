@@ -1,4 +1,5 @@
 // What one peer takes of what all share leaves the others theirs: of a name, of an address.
+#include <chrono>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -85,6 +86,38 @@ TEST_F(SharesTest, WhoeverComesWithoutANameIsLimitedByHisAddress) {
   const wire::Envelope reply = third.Greet();
   EXPECT_THAT(ErrorOf(reply), HasSubstr("of 127.0.0.1 without a name"));
   EXPECT_TRUE(third.IsClosed());
+}
+
+TEST_F(SharesTest, WhatANameIsSentHasARateAndOthersDoNotWaitForIt) {
+  Serve();
+  UploadDrive(6);
+  Digest();
+  StopServer();
+  net_.of_name.served_bytes_per_s = 200e3;
+  net_.of_name.requests_per_s = 0;
+  ServeAliceAndBob(1);
+  const auto alice = ConnectAs("alice");
+  const auto again = ConnectAs("alice");
+  const auto bob = ConnectAs("bob");
+  std::size_t served_bytes = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::uint64_t i = 1; served_bytes < 500'000; ++i) {
+    const auto& peer = i % 2 == 0 ? alice : again;  // both are hers
+    peer->Send(QueryOf(i));
+    for (bool is_end = false; !is_end;) {
+      std::size_t bytes = 0;
+      const auto reply = peer->Receive(&bytes);
+      ASSERT_TRUE(reply && !reply->has_error());
+      served_bytes += bytes;
+      is_end = !reply->has_tile();
+    }
+  }
+  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
+  EXPECT_GT(passed.count(), 1.0);  // 2.5 s' worth, of which a second's comes at once
+  const auto bobs = std::chrono::steady_clock::now();
+  bob->Send(StatusOf(1));
+  EXPECT_TRUE(bob->Receive()->has_status_reply());
+  EXPECT_LT(std::chrono::steady_clock::now() - bobs, std::chrono::milliseconds(300));
 }
 
 TEST_F(SharesTest, OnThisMachineNobodyIsLimitedByHisAddress) {
