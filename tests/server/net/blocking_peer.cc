@@ -103,6 +103,7 @@ bool BlockingPeer::FloodWithKeyChanges(int times, std::size_t padding) {
   BIO* const kept = BIO_new(BIO_s_mem());
   SSL_set0_wbio(session_.get(), kept);
   bool is_made = ChangeKeys(times);
+  SSL_set_record_padding_callback(session_.get(), nullptr);
   char* data = nullptr;
   const long size = BIO_get_mem_data(kept, &data);
   for (long sent = 0; is_made && sent < size;) {
