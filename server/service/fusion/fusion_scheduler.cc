@@ -93,14 +93,18 @@ bool FusionScheduler::AdoptRules() {
   }
   const auto marks = Await<std::uint64_t>(
       [&](auto done) { store_.AdoptFusionRules(kFusionRules, std::move(done)); });
+  const Status problem =
+      marks ? Status()
+            : marks.error().WithContext("fusion cannot begin, its rules cannot be noted");
+  Status before = problem;
   {
     const std::lock_guard lock(start_mutex_);
-    start_problem_ =
-        marks ? Status()
-              : marks.error().WithContext("fusion cannot begin, its rules cannot be noted");
+    std::swap(start_problem_, before);
   }
   if (!marks) {
-    log_(LogLevel::kError, start_problem().message());
+    if (before.message() != problem.message()) {  // tried every second, by every worker
+      log_(LogLevel::kError, problem.message());
+    }
     return false;
   }
   if (*marks > 0) {
