@@ -76,7 +76,9 @@ Status KeyframeUploader::Transmit(InFlight upload) {
 void KeyframeUploader::NoteRefusal(InFlight upload, const Status& refusal) {
   const Status named = Named(refusal, upload.upload.key);
   const bool is_busy = refusal.code() == StatusCode::kUnavailable;
-  if (is_busy && Clock::now() - taken_ < options_.patience) {
+  // The first of a round decides for those behind it, which wait for it: they are refused a moment
+  // later, and it is the one to be named when the patience ends.
+  if (is_busy && (!busy_.empty() || Clock::now() - taken_ < options_.patience)) {
     busy_.push_back(std::move(upload));
   } else if (options_.on_answer) {
     options_.on_answer(upload.upload.key, named);

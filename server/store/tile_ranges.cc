@@ -38,7 +38,7 @@ KeyRange RangeOf(const Square& square, std::uint8_t level) {
   const TileId corner{level, static_cast<std::int32_t>(square.x),
                       static_cast<std::int32_t>(square.y)};
   const auto first = static_cast<std::int64_t>(corner.Key());
-  return {first, first + (std::int64_t{1} << (2 * square.bits)) - 1};
+  return {first, first + ((std::int64_t{1} << (2 * square.bits)) - 1)};  // the last key is 2^63 - 1
 }
 
 std::vector<Square> Overlapping(const std::vector<Square>& squares, const TileRect& rect) {

@@ -1,7 +1,9 @@
 #include "client/connection/keyframe_uploader.h"
 
 #include <atomic>
+#include <chrono>
 #include <deque>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -162,6 +164,37 @@ TEST(KeyframeUploaderTest, PatienceHasAnEnd) {
   EXPECT_NE(status.message().find("car/monday/2"), std::string::npos) << status.message();
   EXPECT_EQ(uploader.totals().acked, 2U);
   EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(300));
+}
+
+// The patience ends between two answers of one round: the keyframe that the others wait for is
+// named, and sent once more.
+TEST(KeyframeUploaderTest, WhoseTurnItIsIsNamedWhenPatienceEndsWithinARound) {
+  std::atomic<int> refusals_of_the_first{0};
+  TestPeer peer([&](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    while (const auto request = socket.ReadRequest()) {
+      const std::uint32_t sequence = request->upload_keyframe().key().sequence();
+      if (sequence == 0) ++refusals_of_the_first;
+      if (sequence == 1 && refusals_of_the_first == 1) {
+        std::this_thread::sleep_for(std::chrono::seconds(3));
+      }
+      wire::Envelope reply;
+      *reply.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "busy"});
+      reply.mutable_error()->set_retry_after_ms(1);
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+  });
+  ConnectionOptions options = peer.options();
+  options.request_timeout = std::chrono::seconds(60);
+  auto client = AtlasClient::Connect(options);
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client, {.patience = std::chrono::seconds(2)});
+  ASSERT_TRUE(uploader.Upload(Upload(0, Bytes(10))).ok());
+  ASSERT_TRUE(uploader.Upload(Upload(1, Bytes(10))).ok());
+  const Status status = uploader.Finish();
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+  EXPECT_NE(status.message().find("car/monday/0"), std::string::npos) << status.message();
+  EXPECT_EQ(refusals_of_the_first, 2);
 }
 
 // As a daemon whose disk is full: what is behind a refused keyframe is refused for now.

@@ -1,4 +1,5 @@
 // Tiles, their revisions, and the dirty marks that lead to them.
+#include <limits>
 #include <set>
 
 #include "server/store/tile_ranges.h"
@@ -194,6 +195,10 @@ TEST(TileRangesTest, CoverHoldsEveryKeyOfTheRectangle) {
     }
   }
   EXPECT_EQ(CoverRect({3}, 4), std::vector<KeyRange>{LevelRange(3)});
+  for (std::uint8_t level = 0; level < 31; ++level) {
+    EXPECT_EQ(LevelRange(level).last + 1, LevelRange(level + 1).first);
+  }
+  EXPECT_EQ(LevelRange(31).last, std::numeric_limits<std::int64_t>::max());
 }
 
 TEST(TileRangesTest, ShardsAreCoarseRegions) {
