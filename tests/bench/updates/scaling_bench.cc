@@ -1,6 +1,8 @@
 // How the cost of a pose update and the memory grow with the map: keyframes one a metre along a
 // winding way that comes back to where it was after 50 m, and batches of ten corrected ones. One
-// JSON line.
+// JSON line. The updates go all over the map, so that a small one has all that they need in memory,
+// and a large one nothing. Therefore the same again where it is so for each size: places that were
+// corrected just before, and the first update of a daemon that was started again.
 // Usage: scaling_bench KEYFRAMES [SURVEY_MIB]: as atlasd's survey_mib, whose default is the default
 // The worlds of the keyframes are drawn (tests/core/support/keyframe_worlds.h), not simulated: what
 // they hold does not matter here, and ten thousand of them would take a while.
@@ -67,6 +69,55 @@ Status Fill(AtlasAtWork& atlas, const MapProfile& profile, std::uint32_t keyfram
   return {};
 }
 
+struct Costs {
+  std::vector<double> cpu_ms;
+  double tiles = 0;
+};
+
+// The same ten keyframes of a place each time, by another shift in each round.
+PoseBatchRequest Correction(std::uint32_t keyframes, std::uint32_t update, double shift_m) {
+  PoseBatchRequest batch;
+  batch.author = "scaling_bench";
+  const std::uint32_t place = keyframes / kPlaceKeyframes * update / kUpdates;  // all over the map
+  const std::uint32_t first =
+      place * kPlaceKeyframes + 37 * update % (kPlaceKeyframes - kCorrected + 1);
+  for (std::uint32_t i = first; i < first + kCorrected; ++i) {
+    batch.updates.push_back({KeyOf(i), PoseOf(i, shift_m)});
+  }
+  return batch;
+}
+
+Status Measure(AtlasAtWork& atlas, PoseBatchRequest batch, Costs& costs) {
+  const auto cost = atlas.UpdatePoses(std::move(batch));
+  if (!cost) return cost.error();
+  costs.cpu_ms.push_back(cost->cpu_ms);
+  costs.tiles += static_cast<double>(cost->tiles);
+  return {};
+}
+
+// In a small map a round's later updates move some keyframes of its former ones a second time.
+double Shift_m(std::uint32_t round, std::uint32_t update) {
+  return 0.05 * (update + 1) + 0.01 * round;
+}
+
+Status MeasureAgain(AtlasAtWork& atlas, std::uint32_t keyframes, Costs& again) {
+  for (std::uint32_t update = 0; update < kUpdates; ++update) {
+    Costs first;
+    ATLAS_RETURN_IF_ERROR(Measure(atlas, Correction(keyframes, update, Shift_m(1, update)), first));
+    ATLAS_RETURN_IF_ERROR(Measure(atlas, Correction(keyframes, update, Shift_m(2, update)), again));
+  }
+  return {};
+}
+
+Status MeasureRestarted(AtlasAtWork& atlas, std::uint32_t keyframes, Costs& restarted) {
+  for (std::uint32_t update = 0; update < kUpdates; ++update) {
+    atlas.Restart();
+    ATLAS_RETURN_IF_ERROR(
+        Measure(atlas, Correction(keyframes, update, Shift_m(3, update)), restarted));
+  }
+  return {};
+}
+
 Status Run(std::uint32_t keyframes, std::size_t survey_mib) {
   const MapProfile profile;
   FusionOptions fusion;
@@ -74,31 +125,24 @@ Status Run(std::uint32_t keyframes, std::size_t survey_mib) {
   AtlasAtWork atlas(profile, fusion);
   ATLAS_RETURN_IF_ERROR(Fill(atlas, profile, keyframes));
   const double filled_mb = PeakMegabytes();
-  std::vector<double> cpu_ms;
-  double tiles = 0;
+  Costs costs;
   for (std::uint32_t update = 0; update < kUpdates; ++update) {
-    PoseBatchRequest batch;
-    batch.author = "scaling_bench";
-    const double shift_m = 0.05 * (update + 1);  // in a small map it is some keyframes' second
-    const std::uint32_t place =
-        keyframes / kPlaceKeyframes * update / kUpdates;  // all over the map
-    const std::uint32_t first =
-        place * kPlaceKeyframes + 37 * update % (kPlaceKeyframes - kCorrected + 1);
-    for (std::uint32_t i = first; i < first + kCorrected; ++i) {
-      batch.updates.push_back({KeyOf(i), PoseOf(i, shift_m)});
-    }
-    const auto cost = atlas.UpdatePoses(std::move(batch));
-    if (!cost) return cost.error();
-    cpu_ms.push_back(cost->cpu_ms);
-    tiles += static_cast<double>(cost->tiles);
+    ATLAS_RETURN_IF_ERROR(Measure(atlas, Correction(keyframes, update, Shift_m(0, update)), costs));
   }
+  const double peak_mb = PeakMegabytes();
+  Costs again;
+  Costs restarted;
+  ATLAS_RETURN_IF_ERROR(MeasureAgain(atlas, keyframes, again));
+  ATLAS_RETURN_IF_ERROR(MeasureRestarted(atlas, keyframes, restarted));
   const auto status = atlas.service().ReadStatus();
   if (!status) return status.error();
   std::cout << "{\"keyframes\": " << keyframes << ", \"tiles\": " << status->counts.tiles
-            << ", \"tiles_per_update\": " << tiles / kUpdates
-            << ", \"cpu_ms_p50\": " << Quantile(cpu_ms, 0.5)
-            << ", \"cpu_ms_max\": " << Quantile(cpu_ms, 1.0)
-            << ", \"peak_mb_filled\": " << filled_mb << ", \"peak_mb\": " << PeakMegabytes()
+            << ", \"tiles_per_update\": " << costs.tiles / kUpdates
+            << ", \"cpu_ms_p50\": " << Quantile(costs.cpu_ms, 0.5)
+            << ", \"cpu_ms_max\": " << Quantile(costs.cpu_ms, 1.0)
+            << ", \"cpu_ms_p50_again\": " << Quantile(again.cpu_ms, 0.5)
+            << ", \"cpu_ms_p50_restarted\": " << Quantile(restarted.cpu_ms, 0.5)
+            << ", \"peak_mb_filled\": " << filled_mb << ", \"peak_mb\": " << peak_mb
             << ", \"store_mb\": " << static_cast<double>(status->counts.store_bytes) / 1048576.0
             << "}" << std::endl;
   return {};
