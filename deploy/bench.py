@@ -168,8 +168,8 @@ def curb_rates(bin_dir, kind, folders, mode, rings, threshold):
         result = json.loads(out)
         curb += result["curb_cells"]
         road += result["road_cells"]
-        missed += result["missed_curb"] * result["curb_cells"]
-        false += result["false_road"] * result["road_cells"]
+        missed += (result["missed_curb"] or 0) * result["curb_cells"]  # null of none
+        false += (result["false_road"] or 0) * result["road_cells"]
     return {"name": f"curbs.{kind}.{mode}.{rings}", "threshold_m": threshold,
             "missed_curb": round(missed / curb, 5), "false_road": round(false / road, 5),
             "curb_cells": curb, "road_cells": road}

@@ -148,7 +148,8 @@ Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection
   const auto reply = channel_->Call(request, Body::kUpdatePosesReply);
   if (!reply) return Error(reply.error());
   const wire::UpdatePosesReply& done = reply->update_poses_reply();
-  return PoseBatchSummary{done.updated(), done.tiles_marked(), done.revision(), done.batch()};
+  return PoseBatchSummary{done.updated(), done.tiles_marked(), done.revision(), done.batch(),
+                          done.compacted()};
 }
 
 Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,

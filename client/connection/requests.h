@@ -48,6 +48,7 @@ struct PoseBatchSummary {
   std::uint32_t tiles_marked = 0;
   std::uint64_t revision = 0;
   std::uint64_t batch = 0;
+  std::uint32_t compacted = 0;  // of keyframes that compactions dropped: nothing to move
 };
 
 // Without a disc: the whole atlas. Tiles come coarse first.

@@ -89,17 +89,20 @@ CellMap CellsOf(std::span<const Eigen::Vector3f> p_level,
   return cells;
 }
 
-double Ratio(std::uint64_t part, std::uint64_t whole) {
-  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+std::optional<double> Ratio(std::uint64_t part, std::uint64_t whole) {
+  if (whole == 0) {
+    return std::nullopt;
+  }
+  return static_cast<double>(part) / static_cast<double>(whole);
 }
 
 }  // namespace
 
-double CurbCounts::missed_curb() const {
+std::optional<double> CurbCounts::missed_curb() const {
   return Ratio(missed_curb_cells, curb_cells);
 }
 
-double CurbCounts::false_road() const {
+std::optional<double> CurbCounts::false_road() const {
   return Ratio(false_road_cells, road_cells);
 }
 

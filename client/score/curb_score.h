@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,8 +18,9 @@ struct CurbCounts {
   std::uint64_t road_cells = 0;
   std::uint64_t false_road_cells = 0;  // called obstacle
 
-  double missed_curb() const;
-  double false_road() const;
+  // Shares; none of no cells.
+  std::optional<double> missed_curb() const;
+  std::optional<double> false_road() const;
 };
 
 // A return that the segmenter judged.

@@ -89,14 +89,6 @@ Result<MapProfile> DaemonConfig::NewProfile() const {
   if (preset) {
     profile.preset = *FusionPresetByName(*preset);  // checked when it was given
   }
-  const bool is_sane =
-      (!cell_size_m || (*cell_size_m > 0.0 && *cell_size_m <= 100.0)) &&
-      (!segments || (*segments > 0 && *segments <= 16)) &&
-      (!segment_height_m || (*segment_height_m > 0.0 && *segment_height_m <= 60.0));
-  if (!is_sane) {
-    return Error(StatusCode::kInvalidArgument,
-                 "map: expected a cell size of 0.02 to 1 m, 2, 4, 8 or 16 segments of 0.1 to 4 m");
-  }
   if (Status status = profile.Validate(); !status.ok()) {
     return Error(std::move(status));
   }

@@ -73,10 +73,26 @@ Status ApplyListen(const std::string& key, const std::string& text, DaemonConfig
   return {};
 }
 
-template <typename T>
-Status ApplyNumber(const std::string& key, const std::string& text, std::optional<T>& value) {
-  value = ParseNumber<T>(text);
-  return value ? Status() : BadValue(key, text, "a number");
+// In thousandths, so that a template can say the range.
+template <std::optional<double> DaemonConfig::*kMember, int kLowMilli, int kHighMilli>
+Status ApplyMetres(const std::string& key, const std::string& text, DaemonConfig& config) {
+  constexpr double kLow = kLowMilli / 1e3;
+  constexpr double kHigh = kHighMilli / 1e3;
+  const auto number = ParseNumber<double>(text);
+  if (!number || !(*number >= kLow && *number <= kHigh)) {  // NaN is in no range
+    return BadValue(key, text, StrCat("metres from ", kLow, " to ", kHigh).c_str());
+  }
+  config.*kMember = *number;
+  return {};
+}
+
+Status ApplySegments(const std::string& key, const std::string& text, DaemonConfig& config) {
+  const auto number = ParseNumber<int>(text);
+  if (!number || (*number != 2 && *number != 4 && *number != 8 && *number != 16)) {
+    return BadValue(key, text, "2, 4, 8 or 16");
+  }
+  config.segments = *number;
+  return {};
 }
 
 Status ApplyCount(const std::string& key, const std::string& text, int low, int high, int& value) {
@@ -135,11 +151,6 @@ Status ApplyPreset(const std::string& /*key*/, const std::string& text, DaemonCo
 template <int DaemonConfig::*kMember, int kLow, int kHigh>
 Status ApplyCountTo(const std::string& key, const std::string& text, DaemonConfig& config) {
   return ApplyCount(key, text, kLow, kHigh, config.*kMember);
-}
-
-template <typename T, std::optional<T> DaemonConfig::*kMember>
-Status ApplyNumberTo(const std::string& key, const std::string& text, DaemonConfig& config) {
-  return ApplyNumber(key, text, config.*kMember);
 }
 
 constexpr Setting kSettings[] = {
@@ -211,13 +222,12 @@ constexpr Setting kSettings[] = {
      "listen beyond loopback without TLS", SettingType::kTruth,
      &ApplyTruth<&DaemonConfig::allow_plaintext>},
     {"map.cell_size", "--cell-size", "ATLASD_CELL_SIZE", "M", "new atlas: side of a cell",
-     SettingType::kNumber, &ApplyNumberTo<double, &DaemonConfig::cell_size_m>},
+     SettingType::kNumber, &ApplyMetres<&DaemonConfig::cell_size_m, 20, 1'000>},
     {"map.segments", "--segments", "ATLASD_SEGMENTS", "N",
-     "new atlas: segments a column: 2, 4, 8 or 16", SettingType::kNumber,
-     &ApplyNumberTo<int, &DaemonConfig::segments>},
+     "new atlas: segments a column: 2, 4, 8 or 16", SettingType::kNumber, &ApplySegments},
     {"map.segment_height", "--segment-height", "ATLASD_SEGMENT_HEIGHT", "M",
      "new atlas: height of a segment", SettingType::kNumber,
-     &ApplyNumberTo<double, &DaemonConfig::segment_height_m>},
+     &ApplyMetres<&DaemonConfig::segment_height_m, 100, 4'000>},
     {"map.preset", "--preset", "ATLASD_PRESET", "NAME",
      "new atlas: fusion preset: strict, bounded or paper", SettingType::kText, &ApplyPreset},
 };

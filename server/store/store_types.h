@@ -81,6 +81,7 @@ struct PoseBatch {
 
 struct PoseBatchResult {
   std::uint32_t updated = 0;
+  std::uint32_t compacted = 0;  // of keyframes that compactions dropped: nothing to move
   std::uint32_t tiles_marked = 0;
   std::uint64_t revision = 0;
   std::uint64_t batch = 0;

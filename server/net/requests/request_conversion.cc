@@ -128,6 +128,7 @@ void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
   out.set_tiles_marked(result.tiles_marked);
   out.set_revision(result.revision);
   out.set_batch(result.batch);
+  out.set_compacted(result.compacted);
 }
 
 void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out) {

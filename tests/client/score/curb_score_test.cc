@@ -47,8 +47,8 @@ TEST(CurbScoreTest, ParkingIsRoadAndRatesAreShares) {
   row.Add(2, kParking, false);
   row.Add(2, kParking, false);
   const CurbCounts counts = row.Count();
-  EXPECT_DOUBLE_EQ(counts.missed_curb(), 0.0);  // 2: one of three, 3: none
-  EXPECT_DOUBLE_EQ(counts.false_road(), 0.5);   // 0 of {0, 1}
+  EXPECT_EQ(counts.missed_curb(), 0.0);  // 2: one of three, 3: none
+  EXPECT_EQ(counts.false_road(), 0.5);   // 0 of {0, 1}
 }
 
 TEST(CurbScoreTest, AHalfIsNotMost) {
@@ -78,9 +78,9 @@ TEST(CurbScoreTest, KerbsAreFoundFromAllReturnsButJudgedByThoseUsed) {
   EXPECT_EQ(counts.road_cells, 0U);
 }
 
-TEST(CurbScoreTest, NothingSeenIsNothingMissed) {
-  EXPECT_EQ(Row().Count().missed_curb(), 0.0);
-  EXPECT_EQ(Row().Count().false_road(), 0.0);
+TEST(CurbScoreTest, OfNoCellsThereIsNoShare) {
+  EXPECT_EQ(Row().Count().missed_curb(), std::nullopt);
+  EXPECT_EQ(Row().Count().false_road(), std::nullopt);
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ wire::Envelope HelloReply() {
   wire::Envelope envelope = Of(1);
   wire::HelloReply& reply = *envelope.mutable_hello_reply();
   reply.set_protocol_major(kProtocolMajor);
-  reply.set_protocol_minor(6);
+  reply.set_protocol_minor(7);
   reply.set_profile("\x01\x02\x03");
   for (char i = 0; i < 16; ++i) {
     reply.mutable_atlas_id()->push_back(i);

@@ -2,7 +2,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -284,19 +286,31 @@ TEST_F(DaemonConfigTest, RefusesValuesThatMakeNoSense) {
   }
 }
 
-TEST_F(DaemonConfigTest, AMapThatCannotBeIsRefused) {
-  const std::vector<std::vector<std::string>> mistakes = {
-      {"--cell-size", "-0.1"},  {"--cell-size", "nan"},    {"--cell-size", "1e300"},
-      {"--cell-size", "0.001"}, {"--segments", "3"},       {"--segments", "300"},
-      {"--segments", "-8"},     {"--segment-height", "0"}, {"--segment-height", "inf"}};
-  for (std::vector<std::string> arguments : mistakes) {
-    const std::string what = arguments[0] + " " + arguments[1];
-    arguments.insert(arguments.begin(), {"--data", "/x"});
-    const auto command = Parse(arguments);
-    ASSERT_TRUE(command.has_value()) << what;
-    const auto profile = command->config.NewProfile();
-    ASSERT_FALSE(profile.has_value()) << what;
-    EXPECT_EQ(profile.error().code(), StatusCode::kInvalidArgument) << what;
+TEST_F(DaemonConfigTest, AMapThatCannotBeIsRefusedByNameAndRange) {
+  const std::map<std::string, std::pair<std::vector<std::string>, std::string>> mistakes = {
+      {"--cell-size",
+       {{"-0.1", "0", "nan", "1e300", "inf", "0.0199", "1.01"}, "metres from 0.02 to 1"}},
+      {"--segments", {{"0", "1", "3", "300", "-8", "99999999999"}, "2, 4, 8 or 16"}},
+      {"--segment-height", {{"0", "0.09", "4.1", "-1", "nan", "inf"}, "metres from 0.1 to 4"}}};
+  for (const auto& [flag, mistake] : mistakes) {
+    for (const std::string& value : mistake.first) {
+      EXPECT_THAT(Refusal({"--data", "/x", flag, value}),
+                  AllOf(HasSubstr(flag + ": map."), HasSubstr(" is '" + value + "'"),
+                        HasSubstr("expected " + mistake.second)));
+    }
+  }
+  const std::string file = File("[map]\npreset = 'paper'\nsegments = 0\n");
+  EXPECT_THAT(Refusal({"--data", "/x", "--config", file}),
+              AllOf(HasSubstr(file + ": line 3"), HasSubstr("map.segments is '0'")));
+}
+
+TEST_F(DaemonConfigTest, AMapAtTheEndsOfItsRangesIsTaken) {
+  const std::vector<std::vector<std::string>> ends = {{"0.02", "2", "0.1"}, {"1", "16", "4"}};
+  for (const auto& end : ends) {
+    const auto command = Parse(
+        {"--data", "/x", "--cell-size", end[0], "--segments", end[1], "--segment-height", end[2]});
+    ASSERT_TRUE(command.has_value()) << command.error().message();
+    EXPECT_TRUE(command->config.NewProfile().has_value()) << end[0];
   }
 }
 

@@ -150,11 +150,13 @@ TEST_F(CompactionTest, APoseOfADroppedKeyframeIsTakenAndChangesNothing) {
   const auto alone = Update({Moved(1, 7, {kB})});
   ASSERT_TRUE(alone.has_value());
   EXPECT_EQ(alone->updated, 0u);
+  EXPECT_EQ(alone->compacted, 1u);
   EXPECT_EQ(alone->batch, 0u);
   EXPECT_EQ(Dirty().revision, before.revision);
   const auto both = Update({Moved(1, 7, {kB}), Moved(2, 7, {kA})});
   ASSERT_TRUE(both.has_value());
   EXPECT_EQ(both->updated, 1u);
+  EXPECT_EQ(both->compacted, 1u);
   EXPECT_EQ(both->tiles_marked, 1u);
   EXPECT_EQ(Update({Moved(1, 7, {kB}), Moved(9, 7, {kA})}).error().code(), StatusCode::kNotFound);
   EXPECT_EQ(Update({Moved(1, 7, {}), Moved(1, 7, {})}).error().code(), StatusCode::kInvalidData);

@@ -37,11 +37,15 @@ class PosesApplyCommand : public Command {
       context.PrintJson({{"updated", done.updated},
                          {"tiles_marked", done.tiles_marked},
                          {"revision", done.revision},
-                         {"batch", done.batch}});
+                         {"batch", done.batch},
+                         {"compacted", done.compacted}});
     } else {
       context.out << done.updated << " poses moved, " << done.tiles_marked
                   << " tiles to be fused again, revision " << done.revision << ", batch "
                   << done.batch << '\n';
+      if (done.compacted > 0) {
+        context.out << done.compacted << " of them were dropped by compactions: nothing to move\n";
+      }
     }
   }
 

@@ -10,6 +10,15 @@
 namespace atlas {
 namespace {
 
+// Null of no cells.
+boost::json::value ShareJson(const std::optional<double>& share) {
+  return share ? boost::json::value(Rounded(*share, 5)) : boost::json::value(nullptr);
+}
+
+std::string ShareText(const std::optional<double>& share, std::uint64_t cells) {
+  return share ? StrCat(FixedText(*share, 4), " of ", cells, " cells") : "no such cells";
+}
+
 boost::json::object ReportJson(const DriveSegmentationReport& report, bool with_curbs) {
   boost::json::object json;
   if (report.score.scans() > 0) {
@@ -18,8 +27,8 @@ boost::json::object ReportJson(const DriveSegmentationReport& report, bool with_
     json["f1"] = Rounded(report.score.f1(), 5);
   }
   if (with_curbs) {
-    json["missed_curb"] = Rounded(report.curbs.missed_curb(), 5);
-    json["false_road"] = Rounded(report.curbs.false_road(), 5);
+    json["missed_curb"] = ShareJson(report.curbs.missed_curb());
+    json["false_road"] = ShareJson(report.curbs.false_road());
     json["curb_cells"] = report.curbs.curb_cells;
     json["road_cells"] = report.curbs.road_cells;
   }
@@ -39,10 +48,8 @@ void PrintReport(const DriveSegmentationReport& report, bool with_curbs, std::os
     facts.Add("F1", FixedText(report.score.f1(), 4));
   }
   if (with_curbs) {
-    facts.Add("missed curb", StrCat(FixedText(report.curbs.missed_curb(), 4), " of ",
-                                    report.curbs.curb_cells, " cells"));
-    facts.Add("false road", StrCat(FixedText(report.curbs.false_road(), 4), " of ",
-                                   report.curbs.road_cells, " cells"));
+    facts.Add("missed curb", ShareText(report.curbs.missed_curb(), report.curbs.curb_cells));
+    facts.Add("false road", ShareText(report.curbs.false_road(), report.curbs.road_cells));
   }
   facts.Add("returns", StrCat(report.ground, " ground, ", report.obstacle, " obstacle"));
   facts.Add("scans", StrCat(report.scans, ", of them ", report.score.scans(), " with labels"));

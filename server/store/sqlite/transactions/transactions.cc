@@ -89,7 +89,8 @@ PutKeyframeResult AddKeyframe(Connection& connection,
 // What one pose of a batch comes to.
 struct PoseMove {
   bool is_changed = false;
-  std::vector<TileId> tiles;  // to be marked
+  bool is_compacted = false;
+  std::vector<TileId> tiles = {};  // to be marked
 };
 
 Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const PoseChange& change) {
@@ -97,7 +98,10 @@ Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const P
   if (!stored) {
     return Error(stored.error());
   }
-  if (!*stored || (*stored)->pose == update.pose) {
+  if (!*stored) {
+    return PoseMove{.is_compacted = true};
+  }
+  if ((*stored)->pose == update.pose) {
     return PoseMove{};
   }
   const KeyframeRecord& keyframe = **stored;
@@ -105,7 +109,7 @@ Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const P
   numbered.keyframe_id = keyframe.id;
   numbered.pose = update.pose;
   WritePose(connection, numbered);
-  PoseMove move{true, {}};
+  PoseMove move{.is_changed = true};
   if (IsInMap(keyframe.session_state)) {
     move.tiles = ReadFootprint(connection, keyframe.id);
     move.tiles.insert(move.tiles.end(), update.footprint.begin(), update.footprint.end());
@@ -165,6 +169,7 @@ Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBat
       return Error(move.error());
     }
     result.updated += move->is_changed ? 1u : 0u;
+    result.compacted += move->is_compacted ? 1u : 0u;
     marked.insert(move->tiles.begin(), move->tiles.end());
   }
   if (result.updated == 0) {
