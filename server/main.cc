@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <google/protobuf/stubs/logging.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -201,8 +202,17 @@ int Serve(LiveConfig& live) {
   return 0;
 }
 
+// What the library says of a message that it cannot read, the refusal of the message says too.
+void LogProtobuf(google::protobuf::LogLevel /*level*/,
+                 const char* /*file*/,
+                 int /*line*/,
+                 const std::string& message) {
+  spdlog::debug("protobuf: {}", message);
+}
+
 int Main(int argc, const char* const* argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("atlasd"));
+  google::protobuf::SetLogHandler(&LogProtobuf);
   std::signal(SIGHUP, SIG_IGN);  // until there is something that takes new settings
   const LiveConfig::Read read = [argc, argv] {
     return ParseDaemonCommand(argc, argv);

@@ -67,6 +67,7 @@ Result<std::shared_ptr<const Tile>> AtlasView::Decode(const TileId& id) {
   const Decoded* known = decoded_.Use(id.Key());
   if (known != nullptr && known->payload_hash == facts->payload_hash &&
       known->sections == facts->sections) {
+    store_.Use(id);
     return known->tile;
   }
   Decoded fresh{facts->payload_hash, facts->sections, nullptr};
@@ -139,6 +140,22 @@ void AtlasView::NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) 
   map.transfer.is_complete = synced->is_complete;
 }
 
+void AtlasView::NoteDropped(const DiscArea& disc, std::uint8_t finest, MapAround& map) {
+  const std::vector<TileId> dropped = store_.TakeDropped();
+  const auto is_missing = [&](const TileId& id) {
+    return id.level >= finest && Touches(disc, id, store_.atlas().profile) &&
+           store_.Find(id) == nullptr;
+  };
+  const auto missing = std::count_if(dropped.begin(), dropped.end(), is_missing);
+  if (missing == 0) return;
+  map.is_current = false;
+  if (map.sync.ok()) {
+    map.sync = Status(StatusCode::kResourceExhausted,
+                      StrCat("tile store: no room for ", missing, " tiles of the map around: ",
+                             "max_disk_bytes or max_memory_bytes is too small"));
+  }
+}
+
 Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
                                     double radius_m,
                                     const AroundOptions& options) {
@@ -149,7 +166,9 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
   using Clock = std::chrono::steady_clock;
   const Clock::time_point end = Clock::now() + options.deadline;
   MapAround map;
+  store_.TakeDropped();
   NoteSync(feed_->Sync(store_, disc, options), map);
+  NoteDropped(disc, options.finest_level, map);
   // Each tile that was damaged on disk is gone after the pass that met it.
   bool is_damaged = false;
   while (!Collect(disc, options, map)) {
@@ -168,6 +187,7 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
     if (rest.budget_bytes == 0) return map;
   }
   NoteSync(feed_->Sync(store_, disc, rest), map);
+  NoteDropped(disc, options.finest_level, map);
   while (!Collect(disc, options, map)) {
     map.is_current = false;
   }

@@ -28,7 +28,9 @@ struct MapAround {
   std::uint64_t coarse_places = 0;  // tiles that the atlas has below the coarse ones: not held
   bool is_current = false;          // its source said in this call that this is all there is
   std::uint64_t revision = 0;       // of the atlas then
-  Status sync;  // why it is not current; ok where budget or time ended, or see the next
+  // Why it is not current; ok where budget or time ended, or see the next. kResourceExhausted: the
+  // store has no room for the tiles of the disc.
+  Status sync;
   Status disk;  // why it lacks tiles that are held: their files cannot be read now
   StoreSyncReport transfer;
 
@@ -65,6 +67,8 @@ class AtlasView {
   // As TileStore::Read. What does not decode is not held any more.
   Result<std::shared_ptr<const Tile>> Decode(const TileId& id);
   void NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) const;
+  // Of what came, or was held, and does not fit into the store.
+  void NoteDropped(const DiscArea& disc, std::uint8_t finest, MapAround& map);
   // Decodes; false when a held tile turned out to be damaged, and is not held any more. Where one
   // cannot be read now, it is missing in the map.
   bool Collect(const DiscArea& disc, const AroundOptions& options, MapAround& map);

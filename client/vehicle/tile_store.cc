@@ -15,6 +15,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::size_t kMaxDropped = 65'536;
+
 // Every byte of the blob is looked at here, once, so that nothing damaged is ever kept.
 Status CheckBlob(ByteSpan blob,
                  const TileBlob& tile,
@@ -102,8 +104,7 @@ Result<std::shared_ptr<const Bytes>> TileStore::Read(const TileId& id) {
   const auto found = tiles_.find(id.Key());
   if (found == tiles_.end()) return Error(StatusCode::kNotFound, StrCat("tile ", id, ": not held"));
   Entry& entry = found->second;
-  memory_.Use(id);
-  disk_.Use(id);
+  Use(id);
   if (entry.blob != nullptr) return entry.blob;
   Result<Bytes> blob = files_->Read(entry.facts);
   if (!blob) {
@@ -181,7 +182,7 @@ void TileStore::Trim() {
   while (const auto id = memory_.TakeAbove(options_.max_memory_bytes)) {
     const auto entry = tiles_.find(id->Key());
     entry->second.blob = nullptr;
-    if (!entry->second.is_on_disk) tiles_.erase(entry);
+    if (!entry->second.is_on_disk) Drop(entry);
   }
   if (disk_bytes() > options_.max_disk_bytes) {
     others_.Remove(disk_bytes() - options_.max_disk_bytes);
@@ -190,8 +191,19 @@ void TileStore::Trim() {
     const auto entry = tiles_.find(id->Key());
     files_->Remove(entry->second.facts);
     entry->second.is_on_disk = false;
-    if (entry->second.blob == nullptr) tiles_.erase(entry);
+    if (entry->second.blob == nullptr) Drop(entry);
   }
+}
+
+void TileStore::Use(const TileId& id) {
+  memory_.Use(id);
+  disk_.Use(id);
+}
+
+// It is in neither order any more.
+void TileStore::Drop(Entries::iterator entry) {
+  if (dropped_.size() < kMaxDropped) dropped_.push_back(entry->second.facts.id);
+  tiles_.erase(entry);
 }
 
 void TileStore::Erase(Entries::iterator entry) {

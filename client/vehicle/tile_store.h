@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "client/connection/requests.h"
@@ -64,6 +65,8 @@ class TileStore {
   // is gone, and it is not held any more. Any other: what the disk said; the tile is held still and
   // may be read later.
   Result<std::shared_ptr<const Bytes>> Read(const TileId& id);
+  // It is of use, as when it is read: others go first when there is no room.
+  void Use(const TileId& id);
   // A tile that came with the sections `asked` of it, or as a delta to what is held. Sections that
   // are held of the same content are kept. kInvalidData, and that tile not held, when the blob is
   // not what the hash says, or the delta's base is not held any more. Errors of Read where what it
@@ -73,6 +76,8 @@ class TileStore {
   // it, or the disk failed at its file. Not told to a daemon; a Read that succeeds ends it.
   bool ComesWhole(const TileId& id) const;
   void Remove(const TileId& id);
+  // Tiles for which there was no room any more since the last call, 65,536 of them at most.
+  std::vector<TileId> TakeDropped() { return std::exchange(dropped_, {}); }
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
   void Apply(const SyncSummary& summary);
 
@@ -100,6 +105,7 @@ class TileStore {
   Result<std::shared_ptr<const Bytes>> BaseOf(const TileBlob& tile, SectionBits& sections);
   void Keep(const TileFacts& facts, Bytes blob);
   void Trim();
+  void Drop(Entries::iterator entry);
   void Erase(Entries::iterator entry);
 
   AtlasKey atlas_;
@@ -111,6 +117,7 @@ class TileStore {
   EvictionOrder memory_;
   EvictionOrder disk_;
   std::set<std::uint64_t> differing_;  // blocks to be told tile by tile
+  std::vector<TileId> dropped_;
   std::uint64_t disk_failures_ = 0;
   Status disk_problem_;
 };

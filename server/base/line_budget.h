@@ -5,6 +5,9 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <string>
+
+#include "core/base/str_cat.h"
 
 namespace atlas {
 
@@ -28,6 +31,10 @@ class LineBudget {
     const std::uint64_t left_out = left_out_;
     left_out_ = 0;
     return left_out;
+  }
+  // To end the line with that comes after those that were left out.
+  static std::string LeftOutText(std::uint64_t left_out) {
+    return left_out == 0 ? "" : StrCat("; ", left_out, " more such lines were left out");
   }
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,12 +16,21 @@
 
 namespace atlas {
 
+// What the log takes of the peers of one thread.
+struct PeerLines {
+  explicit PeerLines(std::uint64_t max_lines_per_s)
+      : requests(max_lines_per_s), warnings(max_lines_per_s) {}
+
+  LineBudget requests;
+  LineBudget warnings;  // about connections
+};
+
 struct PeerRecord {
   std::string address;    // "ADDRESS:PORT"
   std::string client;     // what it calls itself; empty until it is greeted
   std::string name;       // of its certificate or token; empty: it has none
   NetCounters& counters;  // of its thread, as is the next
-  LineBudget& lines;      // about requests
+  PeerLines& lines;
   std::chrono::milliseconds slow_request;
   // Of its name or address; null: it may have all there is.
   std::shared_ptr<PeerShare> share = nullptr;
@@ -36,6 +46,8 @@ struct PeerRecord {
     }
     return line;
   }
+  // A line about its connection, unless there were too many.
+  void Warn(const std::string& message) const;
 };
 
 }  // namespace atlas

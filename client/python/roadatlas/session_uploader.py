@@ -17,7 +17,8 @@ _LONGEST_PAUSE_S = 30.0
 
 @dataclasses.dataclass
 class UploadReport:
-    """Sequence numbers: acknowledged in this call, there already as the daemon says, refused for good and why."""
+    """Sequence numbers: acknowledged in this call; there already, as the daemon says; refused for good and why. One that
+    was refused for good just when the connection broke counts as there already."""
 
     acknowledged: list[int] = dataclasses.field(default_factory=list)
     there_already: list[int] = dataclasses.field(default_factory=list)
@@ -27,19 +28,22 @@ class UploadReport:
 class SessionUploader:
     """Connects for itself, and again after a failure that may pass."""
 
-    def __init__(self, connect: Callable[..., AtlasClient], vehicle: str, session: str, *, attempts: int = 8,
-                 first_pause_s: float = 0.5) -> None:
-        """`connect` makes a client and takes `resume`: functools.partial(AtlasClient, host, port). Gives up when so
-        many `attempts` in a row brought nothing forward; the pause between these doubles."""
+    def __init__(self, connect: Callable[..., AtlasClient], vehicle: str, session: str, *, rising: bool = False,
+                 attempts: int = 8, first_pause_s: float = 0.5) -> None:
+        """`connect` makes a client and takes `resume`: functools.partial(AtlasClient, host, port). `rising`: whoever
+        uploads this session never goes back in it, so that what is not above the daemon's last sequence number was
+        dealt with and is not sent again; it counts as there already. Gives up when so many `attempts` in a row brought
+        nothing forward; the pause between these doubles."""
         self._connect = connect
         self._vehicle = vehicle
         self._session = session
+        self._rising = rising
         self._attempts = attempts
         self._first_pause_s = first_pause_s
 
     def upload(self, uploads: Iterable[atlas_pb2.UploadKeyframe]) -> UploadReport:
         """All of them, by sequence number. Raises why it gave up; what is on disk is not sent by the next call."""
-        work = _Work(uploads, self._vehicle, self._session)
+        work = _Work(uploads, self._vehicle, self._session, self._rising)
         failures = 0
         while work.waiting:
             before = len(work.waiting)
@@ -74,9 +78,13 @@ class SessionUploader:
 
 class _Work:
     """What is left, by rising sequence number: the daemon takes nothing behind what it refused for now (`postponed`), so
-    that its last sequence number tells of all before it."""
+    that its last sequence number tells of all that this work sent before it, and, if whoever uploads the session always
+    rises, of all there are. Of others it says nothing: they are sent, and the daemon says which it has."""
 
-    def __init__(self, uploads: Iterable[atlas_pb2.UploadKeyframe], vehicle: str, session: str) -> None:
+    def __init__(self, uploads: Iterable[atlas_pb2.UploadKeyframe], vehicle: str, session: str, rising: bool) -> None:
+        self._told_from: int | None = -1 if rising else None  # the last number tells of those above this; None: of none
+        self._sent: set[int] = set()
+        self._rising = rising
         self.waiting: dict[int, atlas_pb2.UploadKeyframe] = {}
         self.postponed: dict[int, RequestRefused] = {}
         self.report = UploadReport()
@@ -87,7 +95,11 @@ class _Work:
             self.waiting[upload.key.sequence] = upload
 
     def skip(self, last_sequence: int | None) -> None:
-        there = [] if last_sequence is None else [sequence for sequence in self.waiting if sequence <= last_sequence]
+        last = -1 if last_sequence is None else last_sequence
+        if self._told_from is None:
+            self._told_from = last  # before this work began
+        there = [sequence for sequence in self.waiting
+                 if self._told_from < sequence <= last and (self._rising or sequence in self._sent)]
         for sequence in there:
             del self.waiting[sequence]
         self.report.there_already += there
@@ -96,6 +108,7 @@ class _Work:
         on_their_way: deque[tuple[int, int]] = deque()
         try:
             for sequence, upload in list(self.waiting.items()):
+                self._sent.add(sequence)
                 on_their_way.append((sequence, client.submit(upload)))
                 if len(on_their_way) >= ON_THEIR_WAY:
                     self._take_reply(client, *on_their_way.popleft())

@@ -34,7 +34,7 @@ NetThread::NetThread(RequestHandler& handler, SharedLimits& limits, const NetOpt
       limits_(limits),
       options_(options),
       buffer_(kReadBytes),
-      request_lines_(options.max_log_lines_per_s),
+      lines_(options.max_log_lines_per_s),
       connection_places_(options.max_connections),
       work_(asio::make_work_guard(io_)),
       thread_([this] { Run(); }) {}
@@ -46,8 +46,8 @@ void NetThread::Serve(PeerConnection::Arrival arrival) {
   auto begin = [this, arrival = std::move(arrival)]() mutable {
     --arrivals_;
     const auto connection = std::make_shared<PeerConnection>(
-        std::move(arrival), PeerConnection::Surroundings{handler_, limits_, buffer_, options_,
-                                                         counters_, request_lines_});
+        std::move(arrival),
+        PeerConnection::Surroundings{handler_, limits_, buffer_, options_, counters_, lines_});
     connections_.push_back(connection);
     connection->Start();
   };

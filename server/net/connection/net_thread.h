@@ -62,7 +62,7 @@ class NetThread {
   const NetOptions& options_;
   std::vector<std::uint8_t> buffer_;
   NetCounters counters_;
-  LineBudget request_lines_;  // of the log
+  PeerLines lines_;
   Places connection_places_;
   std::atomic<std::size_t> arrivals_ = 0;
   boost::asio::io_context io_{1};

@@ -7,7 +7,6 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <spdlog/spdlog.h>
 
 #include "core/base/str_cat.h"
 #include "server/net/access/access_check.h"
@@ -84,7 +83,7 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
       if (!stream_.failure().empty()) {
-        spdlog::warn("{}", peer_.Line(StrCat("TLS: ", stream_.failure())).text());
+        peer_.Warn(StrCat("TLS: ", stream_.failure()));
       }
       co_return Status();
     }
@@ -162,7 +161,7 @@ void PeerConnection::MakeRoom() {
 }
 
 void PeerConnection::Refuse(const Status& why) {
-  spdlog::warn("{}", peer_.Line(why.message()).text());
+  peer_.Warn(why.message());
   is_refused_ = true;
   writer_.PushError(0, why);
   writer_.Flush();
@@ -282,7 +281,7 @@ void PeerConnection::ChangeSecurity(const ServerSecurity& security) {
 void PeerConnection::CheckIdentity() {
   if (const Status now = access_.IdentifyAgain(handler_.NowMs()); !now.ok()) {
     const std::string what = StrCat(access_.identity().name, ", no longer: ", now.message());
-    spdlog::warn("{}", peer_.Line(what).text());
+    peer_.Warn(what);
     CloseNow();
   }
 }
@@ -351,7 +350,7 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
     return;
   }
   if (const char* const late = WhatIsLate(now); late != nullptr) {
-    spdlog::warn("{}", peer_.Line(late).text());
+    peer_.Warn(late);
     CloseNow();
   }
 }

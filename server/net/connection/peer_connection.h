@@ -44,7 +44,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
     std::span<std::uint8_t> buffer;
     const NetOptions& options;
     NetCounters& counters;  // of its thread, as is the next
-    LineBudget& lines;
+    PeerLines& lines;
   };
 
   // A socket that was accepted, and what it may do.

@@ -110,7 +110,7 @@ void RequestRecord::Count(StatusCode code, Clock::time_point now) {
 
 void RequestRecord::Log(const Status& status, Clock::time_point now) const {
   const auto left_out =
-      spdlog::should_log(spdlog::level::info) ? peer_->lines.Take(now) : std::nullopt;
+      spdlog::should_log(spdlog::level::info) ? peer_->lines.requests.Take(now) : std::nullopt;
   if (!left_out) {
     return;
   }
@@ -119,9 +119,7 @@ void RequestRecord::Log(const Status& status, Clock::time_point now) const {
   message += status.ok()
                  ? StrCat("took ", ms, " ms")
                  : StrCat("failed: ", StatusCodeName(status.code()), ": ", status.message());
-  if (*left_out > 0) {
-    message += StrCat("; ", *left_out, " more such lines were left out");
-  }
+  message += LineBudget::LeftOutText(*left_out);
   LogLine line = peer_->Line(message);
   line.Add("request_id", id_).Add("kind", RequestKindName(kind_));
   line.Add("code", StatusCodeName(status.code()));

@@ -78,9 +78,15 @@ Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
     if (!request) {
       return Error(request.error());
     }
+    const std::uint64_t now = service_.revision();
+    if (request->after && request->after->revision > now) {
+      return Error(StatusCode::kInvalidArgument,
+                   StrCat("sync: the cursor is of revision ", request->after->revision,
+                          " and the atlas at ", now, ", an earlier copy: ask without it"));
+    }
     request_ = *std::move(request);
-    last_ = request_->after.value_or(SyncCursor{
-        service_.revision(), std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
+    last_ = request_->after.value_or(
+        SyncCursor{now, std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
   }
   Result<Step> planned = Plan(may_block);
   if (!planned || *planned == Step::kBlocked) {
@@ -120,7 +126,8 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, std::size_t max_bytes, B
   wire::SyncManifest& manifest = *batch.manifest.mutable_sync_manifest();
   std::uint64_t bytes = sent_bytes_ + kManifestBytes + manifest.ByteSizeLong();
   const std::size_t max_tiles = sent_bytes_ == 0 ? kFirstTiles : kTilesPerBatch;
-  while (batch.tiles.size() < max_tiles && batch.tile_bytes < max_bytes) {
+  // One tile in any case: a reply that makes no step would be asked for the next one for ever.
+  while (batch.tiles.empty() || (batch.tiles.size() < max_tiles && batch.tile_bytes < max_bytes)) {
     if (next_ == plan_.items.size() && plan_.is_cut) {
       request_->after = last_;
       Result<Step> planned = Plan(may_block);

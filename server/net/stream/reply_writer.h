@@ -91,7 +91,8 @@ class ReplyWriter {
   boost::asio::awaitable<bool> SendWithOthers(wire::Envelope envelope);
   boost::asio::awaitable<bool> SendError(std::uint64_t request_id, Status status);
   boost::asio::awaitable<bool> WaitForRoom();
-  // Waits for room and sets it aside, up to `wanted_bytes`, of which there may be less. Made
+  // Waits for room and sets it aside, up to `wanted_bytes`, of which there may be less; none where
+  // all have taken everything: then whoever has nothing queued makes one frame at a time. Made
   // before they have room, frames would be bounded by nothing.
   boost::asio::awaitable<Room> TakeRoom(std::size_t wanted_bytes);
 

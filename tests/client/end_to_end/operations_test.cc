@@ -64,6 +64,17 @@ TEST_F(OperationsEndToEndTest, AFailedRequestIsALineWithItsIds) {
   EXPECT_FALSE(line.at("client").as_string().empty());
 }
 
+TEST_F(OperationsEndToEndTest, TheLogIsJsonWhateverAPeerSends) {
+  DaemonProcess daemon(NewData(), {"--log-format", "json"}, DaemonProcess::Log::kKept);
+  daemon.ReadLogUntil("atlas in");
+  const BlockingPeer peer(daemon.port());
+  const Bytes hello = {0x08, 1, 0x12, 5, 0x08, 1, 0x1a, 1, 0xff};  // client_name is not UTF-8
+  Bytes frame = EncodeFrameHeader(hello);
+  frame.insert(frame.end(), hello.begin(), hello.end());
+  ASSERT_TRUE(peer.SendBytes(frame));
+  EXPECT_NE(Message(daemon.ReadLogUntil("")).find("envelope: "), std::string::npos);
+}
+
 TEST_F(OperationsEndToEndTest, ADaemonThatDrainsTells) {
   DaemonProcess daemon(NewData(), {"--cell-size", "0.2", "--http", "127.0.0.1:0"});
   ASSERT_EQ(Ingest(daemon).exit_code, 0);

@@ -101,6 +101,26 @@ class ResumeTest(AtlasCase):
         again = self.uploader().upload(self.uploads)
         self.assertEqual((again.there_already, again.acknowledged), (list(range(COUNT)), []))
 
+    def test_who_only_rises_sends_nothing_twice(self):
+        self.client.upload_keyframes(self.uploads[:10])
+        with Cutting((self.host, self.port), None) as between:
+            report = self.uploader(between.port, rising=True).upload(self.uploads)
+        self.assertEqual((report.there_already, report.acknowledged), (list(range(10)), list(range(10, COUNT))))
+        self.assertEqual(between.passed, [list(range(10, COUNT))])
+
+    def test_what_lies_before_is_sent(self):
+        """Another call, or program, had higher numbers: that says nothing of these, whenever the connection breaks."""
+        self.assertEqual(self.uploader().upload(self.uploads[10:15]).acknowledged, list(range(10, 15)))
+        cut = 2 * self.uploads[0].ByteSize() + 100
+        with Cutting((self.host, self.port), cut, None, before_connection=self.settle_after(5)) as between:
+            report = self.uploader(between.port).upload(self.uploads[:5] + self.uploads[20:])
+        self.assertEqual(sorted(report.acknowledged + report.there_already), [*range(5), *range(20, COUNT)])
+        self.assertTrue(set(range(2, 5)) <= set(report.acknowledged))
+        self.assertEqual(self.client.status().keyframes, 10 + COUNT - 20)
+
+    def settle_after(self, stored):
+        return lambda passed: self.settle(stored + passed)
+
     def test_nothing_is_sent_twice_after_the_connection_dropped(self):
         """Cut within the 16th keyframe: the daemon has fifteen, of which the client may know of fewer."""
         frame_bytes = self.uploads[20].ByteSize()

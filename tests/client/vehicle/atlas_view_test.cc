@@ -162,6 +162,48 @@ TEST(AtlasViewTest, ADamagedFileIsFetchedAgainInTheSameCall) {
   }
 }
 
+TEST(AtlasViewTest, AStoreWithoutRoomForTheDiscSaysSo) {
+  const TinyWorld world = SquareWorld(8);
+  SyncPeer peer(world);
+  AtlasLink link = LinkTo(peer);
+  TileStore large = *TileStore::Open(TinyAtlas(), {});
+  ASSERT_TRUE(AtlasView(large, &link).Around(kMiddle, 5.0)->is_current);
+  TileStore store = *TileStore::Open(TinyAtlas(), {.max_memory_bytes = large.memory_bytes() / 2});
+  AtlasView view(store, &link);
+  for (int call = 0; call < 2; ++call) {
+    const auto map = view.Around(kMiddle, 5.0);
+    ASSERT_TRUE(map);
+    EXPECT_FALSE(map->is_current);
+    EXPECT_EQ(map->sync.code(), StatusCode::kResourceExhausted) << map->sync.message();
+    EXPECT_GT(map->coarse_places, 0U);
+    EXPECT_FALSE(map->tiles.empty());
+  }
+  // What goes is elsewhere.
+  const auto near = view.Around(kMiddle, 0.5);
+  ASSERT_TRUE(near);
+  EXPECT_TRUE(near->is_current) << near->sync.message();
+  EXPECT_TRUE(near->is_finest_everywhere());
+}
+
+// Although its tiles are decoded already, and not read from the store again.
+TEST(AtlasViewTest, WhatIsLookedAtAllTheTimeStays) {
+  const TinyWorld world = SquareWorld(8);
+  SyncPeer peer(world);
+  AtlasLink link = LinkTo(peer);
+  TileStore large = *TileStore::Open(TinyAtlas(), {});
+  ASSERT_TRUE(AtlasView(large, &link).Around(kMiddle, 20.0)->is_current);
+  TileStore store = *TileStore::Open(TinyAtlas(), {.max_memory_bytes = large.memory_bytes() / 2});
+  AtlasView view(store, &link);
+  const Eigen::Vector2d corner(0.8, 0.8);
+  ASSERT_TRUE(view.Around(corner, 0.5)->is_current);
+  for (int x = 1; x < 8; ++x) {
+    for (int y = 1; y < 8; ++y) {
+      ASSERT_TRUE(view.Around({kSide_m * x + 0.8, kSide_m * y + 0.8}, 0.5)->is_current);
+      EXPECT_EQ(view.Around(corner, 0.5)->transfer.tiles, 0U) << x << ' ' << y;
+    }
+  }
+}
+
 TEST(AtlasViewTest, WhatMakesNoSenseIsRefused) {
   TileStore store = *TileStore::Open(TinyAtlas(), {});
   AtlasView view(store, nullptr);

@@ -42,7 +42,7 @@ class RequestRecordTest : public testing::Test {
   std::string log() const { return log_.str(); }
 
   NetCounters counters_;
-  LineBudget lines_{2};
+  PeerLines lines_{2};
   PeerRecord peer_{"1.2.3.4:5", "", "", counters_, lines_, std::chrono::hours(1)};
 
  private:
@@ -94,6 +94,16 @@ TEST_F(RequestRecordTest, ManyFailuresDoNotFillTheDisk) {
   EXPECT_EQ(Counted(RequestKind::kStatus, StatusCode::kNotFound), 100u);
   EXPECT_THAT(log(), HasSubstr("request 1 "));
   EXPECT_LT(log().size(), 100u * 50u);
+}
+
+TEST_F(RequestRecordTest, NeitherDoConnectionsThatBreak) {
+  for (int i = 0; i < 100; ++i) {
+    peer_.Warn("frame: wrong magic");
+  }
+  EXPECT_THAT(log(), HasSubstr(R"("level":"warning","message":"frame: wrong magic","peer":)"));
+  EXPECT_LT(log().size(), 100u * 50u);
+  RequestRecord(peer_, StatusOf(1)).End(Status(StatusCode::kNotFound, "gone"));
+  EXPECT_THAT(log(), HasSubstr("request 1 ")) << "these have lines of their own";
 }
 
 TEST_F(RequestRecordTest, OneLeftByAnExceptionIsAMistakeOfTheDaemon) {

@@ -98,6 +98,26 @@ TEST_F(SlowReadersTest, AllTogetherQueueNoMoreThanTheyMay) {
   EXPECT_EQ(server_->ReadFigures().queued_bytes, 0u);
 }
 
+// As when so many others read nothing that nothing is left to be shared.
+TEST_F(SlowReadersTest, WhereAllIsTakenAReaderIsServedFrameByFrame) {
+  net_.max_all_queued_bytes = 7;  // of which a share is nothing
+  ServeTiles();
+  for (const bool is_again : {false, true}) {  // read from disk, and ready
+    const auto peer = Connect();
+    std::uint64_t tiles = 0;
+    for (const wire::Envelope& request : {QueryOf(1), SyncOf(2)}) {
+      peer->Send(request);
+      std::optional<wire::Envelope> reply;
+      do {
+        reply = peer->Receive();
+        ASSERT_TRUE(reply.has_value()) << is_again;
+        tiles += reply->has_tile() ? 1u : 0u;
+      } while (!reply->has_query_end() && !reply->has_sync_end());
+    }
+    EXPECT_GT(tiles, 20u) << is_again;
+  }
+}
+
 TEST_F(SlowReadersTest, RepliesOfOneConnectionAreMadeOneAfterTheOther) {
   net_.max_queued_bytes = 4'096;  // each is made in many steps
   ServeTiles();

@@ -316,6 +316,11 @@ TEST_F(SyncTest, BadRequestsAreRefusedAndTheConnectionGoesOn) {
   request.mutable_sync_request()->set_budget_bytes(5'000);
   const SyncReply part = Ask(*peer, request);
   ASSERT_FALSE(part.end.cursor().empty());
+  // One of a revision to come.
+  std::string later = part.end.cursor();
+  later[6] = 1;
+  request.mutable_sync_request()->set_cursor(later);
+  EXPECT_EQ(Ask(*peer, request).refusal, kWrong);
   request.mutable_sync_request()->set_finest_level(1);
   request.mutable_sync_request()->set_cursor(part.end.cursor());
   EXPECT_EQ(Ask(*peer, request).refusal, kWrong);
