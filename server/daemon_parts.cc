@@ -33,7 +33,8 @@ unsigned WorkersFrom(const DaemonConfig& config) {
 
 }  // namespace
 
-Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
+Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
+                                              std::function<void(const Status&)> on_failed_sync) {
   const Result<MapProfile> profile = config.NewProfile();
   if (!profile) {
     return Error(profile.error());
@@ -42,6 +43,7 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config) {
   options.directory = config.data;
   options.new_profile = *profile;
   options.new_atlas_id = RandomId();
+  options.on_failed_sync = std::move(on_failed_sync);
   Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
   if (store) {
     if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {

@@ -1,6 +1,7 @@
 // What the parts of the daemon are told of its configuration.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "core/base/status.h"
@@ -13,8 +14,9 @@
 namespace atlas {
 
 // The atlas in the configured directory, made if there is none. kInvalidData: its map is another
-// than the one that was asked for; and the errors of OpenSqliteStore.
-Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config);
+// than the one that was asked for; and the errors of OpenSqliteStore. `on_failed_sync` as there.
+Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
+                                              std::function<void(const Status&)> on_failed_sync);
 
 ServiceOptions ServiceFrom(const DaemonConfig& config);
 NameLimits NameLimitsFrom(const DaemonConfig& config);

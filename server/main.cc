@@ -1,5 +1,6 @@
 // atlasd: opens the store, starts fusion, serves until it is told to stop.
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -13,6 +14,7 @@
 #include <google/protobuf/stubs/logging.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "core/base/str_cat.h"
 #include "server/base/log_format.h"
@@ -178,7 +180,13 @@ int Serve(LiveConfig& live) {
   if (!http_socket) {
     return Fail(http_socket.error().WithContext("http"));
   }
-  Result<std::unique_ptr<AtlasStore>> store = OpenStore(config);
+  std::atomic<bool> has_failed = false;
+  const auto stop = [&has_failed](const Status& why) {
+    has_failed = true;
+    spdlog::critical("{}; stopping", why.message());
+    ::kill(::getpid(), SIGTERM);
+  };
+  Result<std::unique_ptr<AtlasStore>> store = OpenStore(config, stop);
   if (!store) {
     return Fail(store.error());
   }
@@ -199,7 +207,7 @@ int Serve(LiveConfig& live) {
   server.Run();
   service.Stop();
   spdlog::info("stopped");
-  return 0;
+  return has_failed ? 1 : 0;
 }
 
 // What the library says of a message that it cannot read, the refusal of the message says too.

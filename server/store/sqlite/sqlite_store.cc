@@ -7,6 +7,7 @@
 #include "server/store/sqlite/connection/log_copier.h"
 #include "server/store/sqlite/connection/reader_pool.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
@@ -80,8 +81,11 @@ class SqliteStore final : public AtlasStore {
       : directory_(std::move(directory)),
         identity_(identity),
         tiles_(options.tile_directory_bytes),
-        log_(CopierOptions(directory_.database_file()), {}, *writer),
-        writes_(std::move(writer), {options.max_queued_writes, options.max_group, &ReadRevision}),
+        guard_(options.on_failed_sync),
+        log_(CopierOptions(directory_.database_file()), {}, *writer, guard_),
+        writes_(std::move(writer),
+                {options.max_queued_writes, options.max_group, &ReadRevision},
+                guard_),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
   const StoreIdentity& identity() const override { return identity_; }
@@ -306,6 +310,7 @@ class SqliteStore final : public AtlasStore {
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   StoreIdentity identity_;
   TileDirectory tiles_;  // outlives the writes, which report to it
+  SyncGuard guard_;      // outlives all that writes
   LogCopier log_;        // outlives the writer: whoever is closed last empties the write-ahead log
   WriteQueue writes_;
   ReaderPool readers_;

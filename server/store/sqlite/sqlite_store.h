@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -23,6 +24,9 @@ struct SqliteStoreOptions {
   std::size_t max_readers = 16;              // connections; more threads wait for one
   std::size_t max_queued_writes = 4'096;
   std::size_t max_group = 64;  // operations a commit
+  // The disk failed to sync: every write is refused from then on (kUnavailable), the daemon had
+  // better stop. Told once, by a thread that must not be held up.
+  std::function<void(const Status&)> on_failed_sync = {};
 };
 
 // Opens the atlas in the directory, or makes one if it is missing or empty and a profile is given.

@@ -1,6 +1,7 @@
 #include "tests/bench/serving/map_age.h"
 
 #include <chrono>
+#include <cstddef>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -13,6 +14,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::minutes kLongest{1};
 constexpr std::chrono::milliseconds kPause{100};
+constexpr double kPause_s = 0.1;
 
 // A cell of the coarsest level, somewhere: what is waited for are the tiles of the whole atlas.
 SyncQuery NearlyNothing(std::uint64_t revision) {
@@ -47,7 +49,8 @@ struct MapAge::Waiting {
     while (!stop.stop_requested() && status.ok()) {
       const auto waited_s = WaitOnce(client);
       if (waited_s) {
-        all_s.push_back(*waited_s);
+        const auto moments = 1 + static_cast<std::size_t>(*waited_s / kPause_s);
+        all_s.insert(all_s.end(), moments, *waited_s);
         std::this_thread::sleep_for(kPause);
       } else {
         status = waited_s.error();

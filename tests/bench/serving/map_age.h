@@ -15,7 +15,8 @@ class MapAge {
   // Connects, and begins.
   static Result<MapAge> Start(std::uint16_t port);
 
-  // Seconds, one of each wait; the last one is waited for, a minute at most.
+  // Seconds, of each tenth of a second that of the wait then under way; the last one is waited for,
+  // a minute at most.
   Result<std::vector<double>> Stop();
 
  private:

@@ -75,6 +75,34 @@ TEST_F(OperationsEndToEndTest, TheLogIsJsonWhateverAPeerSends) {
   EXPECT_NE(Message(daemon.ReadLogUntil("")).find("envelope: "), std::string::npos);
 }
 
+#ifdef FAILING_SYNC_PATH
+TEST_F(OperationsEndToEndTest, AFailedSyncEndsTheDaemonAndNothingAcknowledgedIsLost) {
+  const fs::path data = NewData();
+  const fs::path switched_on = NewFile();
+  setenv("LD_PRELOAD", FAILING_SYNC_PATH, 1);
+  setenv("FAILING_SYNC", switched_on.c_str(), 1);
+  DaemonProcess daemon(data, {"--cell-size", "0.2"}, DaemonProcess::Log::kKept);
+  unsetenv("LD_PRELOAD");
+  unsetenv("FAILING_SYNC");
+  ASSERT_EQ(Ingest(daemon, {"--session", "first"}).exit_code, 0);
+  ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+  Write(switched_on, "");
+  EXPECT_NE(Ingest(daemon, {"--session", "second"}).exit_code, 0);
+  const std::string line = daemon.ReadLogUntil("[critical]");
+  EXPECT_NE(line.find("the disk failed to sync"), std::string::npos) << line;
+  EXPECT_NE(daemon.ReadLogUntil("stopped"), "");
+  EXPECT_EQ(daemon.Stop(0), 1);
+
+  DaemonProcess again(data, {});
+  EXPECT_EQ(RunAtlas(again.address(), {"wait"}).exit_code, 0);
+  const CommandRun sessions = RunAtlas(again.address(), {"sessions"});
+  EXPECT_NE(sessions.out.find("first"), std::string::npos) << sessions.out;
+  const CommandRun verified = RunAtlas(again.address(), {"verify", "--rebuild"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  EXPECT_EQ(Ingest(again, {"--session", "second"}).exit_code, 0);
+}
+#endif
+
 TEST_F(OperationsEndToEndTest, ADaemonThatDrainsTells) {
   DaemonProcess daemon(NewData(), {"--cell-size", "0.2", "--http", "127.0.0.1:0"});
   ASSERT_EQ(Ingest(daemon).exit_code, 0);

@@ -24,8 +24,8 @@ class LogCopierTest : public StoreTest {
     writer_->Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = WAL");
     writer_->Execute("CREATE TABLE rows (id INTEGER PRIMARY KEY, blob BLOB)");
     copier_ = std::make_unique<LogCopier>(
-        DatabaseOptions{Database(), DatabaseOptions::Mode::kReadWrite, 64, 5'000}, limits,
-        *writer_);
+        DatabaseOptions{Database(), DatabaseOptions::Mode::kReadWrite, 64, 5'000}, limits, *writer_,
+        guard_);
   }
   void Close() {
     writer_.reset();
@@ -44,6 +44,7 @@ class LogCopierTest : public StoreTest {
   std::int64_t RowsOf(Connection& reader) { return reader.Ask("SELECT count(*) FROM rows"); }
   Connection Reader() const { return Connection({Database(), DatabaseOptions::Mode::kReadOnly}); }
 
+  SyncGuard guard_{nullptr};
   std::unique_ptr<Connection> writer_;
   std::unique_ptr<LogCopier> copier_;
 };

@@ -7,8 +7,11 @@
 
 namespace atlas {
 
-LogCopier::LogCopier(const DatabaseOptions& options, const Limits& limits, Connection& writer)
-    : limits_(limits), connection_(options), thread_([this] { Loop(); }) {
+LogCopier::LogCopier(const DatabaseOptions& options,
+                     const Limits& limits,
+                     Connection& writer,
+                     SyncGuard& guard)
+    : limits_(limits), guard_(guard), connection_(options), thread_([this] { Loop(); }) {
   writer.LeaveLogTo([this](int pages) { NoteCommit(pages); });
 }
 
@@ -58,12 +61,16 @@ void LogCopier::Loop() {
 // What is not copied now is after the next commit: until then it is in the log.
 void LogCopier::Copy() {
   const std::lock_guard only_one(copying_);
+  if (!guard_.status().ok()) {
+    return;
+  }
   try {
     if (const auto copied = connection_.CopyLog()) {
       const std::lock_guard lock(mutex_);
       copied_ = *copied;
     }
   } catch (const std::exception& error) {
+    guard_.Note(error);
     const std::lock_guard lock(mutex_);
     last_failure_ = {StatusFromException(error), std::chrono::steady_clock::now()};
   }

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/write_figures.h"
 
 namespace atlas {
@@ -20,9 +21,12 @@ class LogCopier {
     int max_pages = 8'000;  // of the log, 64 MiB: then the writer waits
   };
 
-  // From now on what the writer commits is copied; it must not outlive the copier. Throws as
-  // Connection does.
-  LogCopier(const DatabaseOptions& options, const Limits& limits, Connection& writer);
+  // From now on what the writer commits is copied; it must not outlive the copier, which `guard`
+  // outlives. Throws as Connection does.
+  LogCopier(const DatabaseOptions& options,
+            const Limits& limits,
+            Connection& writer,
+            SyncGuard& guard);
   LogCopier(const LogCopier&) = delete;
   LogCopier& operator=(const LogCopier&) = delete;
   ~LogCopier();
@@ -36,6 +40,7 @@ class LogCopier {
   void Copy();
 
   const Limits limits_;
+  SyncGuard& guard_;
   std::mutex copying_;
   Connection connection_;     // of whoever is copying
   mutable std::mutex mutex_;  // of what follows

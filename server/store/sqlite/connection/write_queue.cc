@@ -11,9 +11,12 @@
 
 namespace atlas {
 
-WriteQueue::WriteQueue(std::unique_ptr<Connection> connection, const Options& options)
+WriteQueue::WriteQueue(std::unique_ptr<Connection> connection,
+                       const Options& options,
+                       SyncGuard& guard)
     : connection_(std::move(connection)),
       options_(options),
+      guard_(guard),
       revision_(options_.read_revision(*connection_)),
       thread_([this] { Loop(); }) {}
 
@@ -87,7 +90,10 @@ std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
 
 void WriteQueue::RunGroup(std::vector<Operation>& group) {
   std::vector<Status> results(group.size());
-  Status transaction = RunInTransaction(group, results);
+  Status transaction = guard_.status();
+  if (transaction.ok()) {
+    transaction = RunInTransaction(group, results);
+  }
   if (!transaction.ok()) {
     NoteRefusal(transaction);
     Settle(group);  // whether a commit that failed wrote something is not known
@@ -140,6 +146,9 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
         return results[i];  // SQLite gave the whole transaction up
       }
     }
+    if (Status status = guard_.status(); !status.ok()) {
+      return RollBack(std::move(status));
+    }
     const std::uint64_t revision = options_.read_revision(*connection_);
     connection_->Execute("COMMIT");
     if (connection_->total_changes() != changes_before) {
@@ -149,6 +158,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     revision_.store(revision);
     return {};
   } catch (const std::exception& error) {
+    guard_.Note(error);
     return RollBack(StatusFromException(error));
   }
 }
@@ -172,6 +182,7 @@ Status WriteQueue::RunOne(Operation& operation) {
     status = operation.run(*connection_);
   } catch (const std::exception& error) {
     status = StatusFromException(error);
+    guard_.Note(error);
     NoteRefusal(status);
   }
   if (!status.ok() && connection_->is_in_transaction()) {

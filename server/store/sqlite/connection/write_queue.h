@@ -18,6 +18,7 @@
 #include "core/base/status.h"
 #include "server/base/duration_histogram.h"
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/write_figures.h"
 
 namespace atlas {
@@ -40,7 +41,8 @@ class WriteQueue {
     std::function<void()> settle = {};
   };
 
-  WriteQueue(std::unique_ptr<Connection> connection, const Options& options);
+  // `guard` outlives this: once it says so, everything is refused.
+  WriteQueue(std::unique_ptr<Connection> connection, const Options& options, SyncGuard& guard);
   WriteQueue(const WriteQueue&) = delete;
   WriteQueue& operator=(const WriteQueue&) = delete;
   ~WriteQueue();  // finishes what is queued
@@ -70,6 +72,7 @@ class WriteQueue {
 
   std::unique_ptr<Connection> connection_;
   Options options_;
+  SyncGuard& guard_;
   std::atomic<std::uint64_t> revision_;
   DurationHistogram commits_;
   mutable std::mutex mutex_;

@@ -1,0 +1,263 @@
+#include "tests/server/store/faulty_vfs.h"
+
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <mutex>
+#include <new>
+#include <stdexcept>
+
+#include <sqlite3.h>
+
+namespace atlas {
+namespace {
+
+using Calls = FaultyVfs::Calls;
+
+struct Plan {
+  std::mutex mutex;
+  std::uint64_t fail_at = 0;  // 0: never
+  Calls calls = Calls::kAll;
+  bool is_once = true;
+  bool is_full = false;
+  std::uint64_t counted = 0;
+  std::string first;
+};
+
+Plan& ThePlan() {
+  static Plan plan;
+  return plan;
+}
+
+// Whether this call is to fail.
+bool Fails(Calls kind, const char* what, const std::string& name) {
+  Plan& plan = ThePlan();
+  const std::lock_guard lock(plan.mutex);
+  if (plan.calls != Calls::kAll && plan.calls != kind) {
+    return false;
+  }
+  ++plan.counted;
+  const bool is_due = plan.fail_at != 0 &&
+                      (plan.is_once ? plan.counted == plan.fail_at : plan.counted >= plan.fail_at);
+  if (is_due && plan.first.empty()) {
+    plan.first = std::string(what) + " " + name;
+  }
+  return is_due;
+}
+
+bool IsFull() {
+  const std::lock_guard lock(ThePlan().mutex);
+  return ThePlan().is_full;
+}
+
+// SQLite's own file lies right behind it.
+struct File {
+  sqlite3_file base;
+  std::string* name;
+};
+
+sqlite3_file* Real(sqlite3_file* file) {
+  return reinterpret_cast<sqlite3_file*>(reinterpret_cast<File*>(file) + 1);
+}
+const std::string& NameOf(sqlite3_file* file) {
+  return *reinterpret_cast<File*>(file)->name;
+}
+sqlite3_vfs* RealVfs(sqlite3_vfs* vfs) {
+  return static_cast<sqlite3_vfs*>(vfs->pAppData);
+}
+
+int Close(sqlite3_file* file) {
+  const int code = Real(file)->pMethods->xClose(Real(file));
+  delete reinterpret_cast<File*>(file)->name;
+  return code;
+}
+int Read(sqlite3_file* file, void* to, int bytes, sqlite3_int64 offset) {
+  return Real(file)->pMethods->xRead(Real(file), to, bytes, offset);
+}
+int Write(sqlite3_file* file, const void* from, int bytes, sqlite3_int64 offset) {
+  if (Fails(Calls::kWrite, "write", NameOf(file))) {
+    // A disk that fails has written a part of it, maybe.
+    Real(file)->pMethods->xWrite(Real(file), from, bytes / 2, offset);
+    return IsFull() ? SQLITE_FULL : SQLITE_IOERR_WRITE;
+  }
+  return Real(file)->pMethods->xWrite(Real(file), from, bytes, offset);
+}
+int Truncate(sqlite3_file* file, sqlite3_int64 size) {
+  return Fails(Calls::kWrite, "truncate", NameOf(file))
+             ? SQLITE_IOERR_TRUNCATE
+             : Real(file)->pMethods->xTruncate(Real(file), size);
+}
+// No power fails here: what was written is there without.
+int Sync(sqlite3_file* file, int /*flags*/) {
+  return Fails(Calls::kSync, "sync", NameOf(file)) ? SQLITE_IOERR_FSYNC : SQLITE_OK;
+}
+int FileSize(sqlite3_file* file, sqlite3_int64* size) {
+  return Fails(Calls::kAll, "size", NameOf(file))
+             ? SQLITE_IOERR_FSTAT
+             : Real(file)->pMethods->xFileSize(Real(file), size);
+}
+int Lock(sqlite3_file* file, int level) {
+  return Fails(Calls::kAll, "lock", NameOf(file)) ? SQLITE_IOERR_LOCK
+                                                  : Real(file)->pMethods->xLock(Real(file), level);
+}
+int Unlock(sqlite3_file* file, int level) {
+  return Real(file)->pMethods->xUnlock(Real(file), level);
+}
+int CheckReservedLock(sqlite3_file* file, int* is_reserved) {
+  return Real(file)->pMethods->xCheckReservedLock(Real(file), is_reserved);
+}
+int FileControl(sqlite3_file* file, int operation, void* argument) {
+  return Real(file)->pMethods->xFileControl(Real(file), operation, argument);
+}
+int SectorSize(sqlite3_file* file) {
+  return Real(file)->pMethods->xSectorSize(Real(file));
+}
+int DeviceCharacteristics(sqlite3_file* file) {
+  return Real(file)->pMethods->xDeviceCharacteristics(Real(file));
+}
+int ShmMap(sqlite3_file* file, int page, int bytes, int may_extend, void volatile** memory) {
+  return Fails(Calls::kAll, "map", NameOf(file))
+             ? SQLITE_IOERR_SHMMAP
+             : Real(file)->pMethods->xShmMap(Real(file), page, bytes, may_extend, memory);
+}
+int ShmLock(sqlite3_file* file, int offset, int count, int flags) {
+  return Real(file)->pMethods->xShmLock(Real(file), offset, count, flags);
+}
+void ShmBarrier(sqlite3_file* file) {
+  Real(file)->pMethods->xShmBarrier(Real(file));
+}
+int ShmUnmap(sqlite3_file* file, int is_deleted) {
+  return Real(file)->pMethods->xShmUnmap(Real(file), is_deleted);
+}
+
+// Version 2: with a shared log index, without mapped files.
+constexpr sqlite3_io_methods kMethods = {2,
+                                         &Close,
+                                         &Read,
+                                         &Write,
+                                         &Truncate,
+                                         &Sync,
+                                         &FileSize,
+                                         &Lock,
+                                         &Unlock,
+                                         &CheckReservedLock,
+                                         &FileControl,
+                                         &SectorSize,
+                                         &DeviceCharacteristics,
+                                         &ShmMap,
+                                         &ShmLock,
+                                         &ShmBarrier,
+                                         &ShmUnmap,
+                                         nullptr,
+                                         nullptr};
+
+int Open(sqlite3_vfs* vfs, const char* path, sqlite3_file* file, int flags, int* out_flags) {
+  file->pMethods = nullptr;
+  std::string name = path == nullptr ? "" : std::filesystem::path(path).filename().string();
+  if (Fails(Calls::kAll, "open", name)) {
+    return SQLITE_CANTOPEN;
+  }
+  const int code = RealVfs(vfs)->xOpen(RealVfs(vfs), path, Real(file), flags, out_flags);
+  if (Real(file)->pMethods == nullptr) {
+    return code;
+  }
+  reinterpret_cast<File*>(file)->name = new std::string(std::move(name));
+  file->pMethods = &kMethods;
+  return code;
+}
+int Delete(sqlite3_vfs* vfs, const char* path, int /*is_synced*/) {
+  return Fails(Calls::kAll, "delete", std::filesystem::path(path).filename().string())
+             ? SQLITE_IOERR_DELETE
+             : RealVfs(vfs)->xDelete(RealVfs(vfs), path, 0);
+}
+int Access(sqlite3_vfs* vfs, const char* path, int flags, int* result) {
+  return Fails(Calls::kAll, "access", std::filesystem::path(path).filename().string())
+             ? SQLITE_IOERR_ACCESS
+             : RealVfs(vfs)->xAccess(RealVfs(vfs), path, flags, result);
+}
+int FullPathname(sqlite3_vfs* vfs, const char* path, int bytes, char* full) {
+  return RealVfs(vfs)->xFullPathname(RealVfs(vfs), path, bytes, full);
+}
+int Randomness(sqlite3_vfs* vfs, int bytes, char* out) {
+  return RealVfs(vfs)->xRandomness(RealVfs(vfs), bytes, out);
+}
+int Sleep(sqlite3_vfs* vfs, int microseconds) {
+  return RealVfs(vfs)->xSleep(RealVfs(vfs), microseconds);
+}
+int CurrentTime(sqlite3_vfs* vfs, double* days) {
+  return RealVfs(vfs)->xCurrentTime(RealVfs(vfs), days);
+}
+int GetLastError(sqlite3_vfs* vfs, int bytes, char* text) {
+  return RealVfs(vfs)->xGetLastError(RealVfs(vfs), bytes, text);
+}
+int CurrentTimeInt64(sqlite3_vfs* vfs, sqlite3_int64* ms) {
+  return RealVfs(vfs)->xCurrentTimeInt64(RealVfs(vfs), ms);
+}
+
+// Once made it stays: SQLite keeps its address.
+sqlite3_vfs& TheVfs() {
+  static sqlite3_vfs vfs = [] {
+    sqlite3_vfs* real = sqlite3_vfs_find(nullptr);
+    if (real == nullptr) {
+      throw std::runtime_error("SQLite has no layer to the system");
+    }
+    sqlite3_vfs made{};
+    made.iVersion = 2;
+    made.szOsFile = static_cast<int>(sizeof(File)) + real->szOsFile;
+    made.mxPathname = real->mxPathname;
+    made.zName = "faulty";
+    made.pAppData = real;
+    made.xOpen = &Open;
+    made.xDelete = &Delete;
+    made.xAccess = &Access;
+    made.xFullPathname = &FullPathname;
+    made.xRandomness = &Randomness;
+    made.xSleep = &Sleep;
+    made.xCurrentTime = &CurrentTime;
+    made.xGetLastError = &GetLastError;
+    made.xCurrentTimeInt64 = &CurrentTimeInt64;
+    return made;
+  }();
+  return vfs;
+}
+
+}  // namespace
+
+FaultyVfs::FaultyVfs() {
+  sqlite3_vfs_register(&TheVfs(), 1);
+}
+
+FaultyVfs::~FaultyVfs() {
+  Heal();
+  sqlite3_vfs_unregister(&TheVfs());
+}
+
+void FaultyVfs::FailAt(std::uint64_t number, Calls calls, Until until, bool is_full) {
+  Plan& plan = ThePlan();
+  const std::lock_guard lock(plan.mutex);
+  plan.fail_at = number;
+  plan.calls = calls;
+  plan.is_once = until == Until::kOnce;
+  plan.is_full = is_full;
+  plan.counted = 0;
+  plan.first.clear();
+}
+
+bool FaultyVfs::Heal() {
+  Plan& plan = ThePlan();
+  const std::lock_guard lock(plan.mutex);
+  plan.fail_at = 0;
+  return !plan.first.empty();
+}
+
+std::string FaultyVfs::first() const {
+  const std::lock_guard lock(ThePlan().mutex);
+  return ThePlan().first;
+}
+
+std::uint64_t FaultyVfs::calls() const {
+  const std::lock_guard lock(ThePlan().mutex);
+  return ThePlan().counted;
+}
+
+}  // namespace atlas

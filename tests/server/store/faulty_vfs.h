@@ -1,0 +1,39 @@
+// SQLite's layer to the system (sqlite.org/vfs.html), with calls that fail: the n-th, or it and all
+// behind it. For stores that are opened while it is installed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace atlas {
+
+// From its construction on SQLite's default; one at a time, and no store may outlive it.
+class FaultyVfs {
+ public:
+  enum class Calls {
+    kAll,    // that follow, until Heal()
+    kWrite,  // of files: what they write, how long they are
+    kSync,
+  };
+  enum class Until {
+    kOnce,    // and the next call succeeds
+    kHealed,  // and so do all others of these calls
+  };
+
+  FaultyVfs();
+  FaultyVfs(const FaultyVfs&) = delete;
+  FaultyVfs& operator=(const FaultyVfs&) = delete;
+  ~FaultyVfs();
+
+  // The `number`-th of these calls from now on fails, 1 the next, with SQLite's code for what it
+  // does (writes: `is_full` says that there is no room). Reading never fails.
+  void FailAt(std::uint64_t number, Calls calls, Until until, bool is_full = false);
+  // Nothing fails from now on. Whether something did.
+  bool Heal();
+  // What failed first: "write atlas.db-wal". Empty: nothing did.
+  std::string first() const;
+  // Calls since the last FailAt, of those it asked for.
+  std::uint64_t calls() const;
+};
+
+}  // namespace atlas
