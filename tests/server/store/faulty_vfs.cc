@@ -1,10 +1,7 @@
 #include "tests/server/store/faulty_vfs.h"
 
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <mutex>
-#include <new>
 #include <stdexcept>
 
 #include <sqlite3.h>
@@ -12,10 +9,12 @@
 namespace atlas {
 namespace {
 
+namespace fs = std::filesystem;
 using Calls = FaultyVfs::Calls;
 
 struct Plan {
   std::mutex mutex;
+  VolatileFiles files;
   std::uint64_t fail_at = 0;  // 0: never
   Calls calls = Calls::kAll;
   bool is_once = true;
@@ -30,7 +29,7 @@ Plan& ThePlan() {
 }
 
 // Whether this call is to fail.
-bool Fails(Calls kind, const char* what, const std::string& name) {
+bool Fails(Calls kind, const char* what, const fs::path& path) {
   Plan& plan = ThePlan();
   const std::lock_guard lock(plan.mutex);
   if (plan.calls != Calls::kAll && plan.calls != kind) {
@@ -40,7 +39,7 @@ bool Fails(Calls kind, const char* what, const std::string& name) {
   const bool is_due = plan.fail_at != 0 &&
                       (plan.is_once ? plan.counted == plan.fail_at : plan.counted >= plan.fail_at);
   if (is_due && plan.first.empty()) {
-    plan.first = std::string(what) + " " + name;
+    plan.first = std::string(what) + " " + path.filename().string();
   }
   return is_due;
 }
@@ -53,14 +52,14 @@ bool IsFull() {
 // SQLite's own file lies right behind it.
 struct File {
   sqlite3_file base;
-  std::string* name;
+  fs::path* path;
 };
 
 sqlite3_file* Real(sqlite3_file* file) {
   return reinterpret_cast<sqlite3_file*>(reinterpret_cast<File*>(file) + 1);
 }
-const std::string& NameOf(sqlite3_file* file) {
-  return *reinterpret_cast<File*>(file)->name;
+const fs::path& PathOf(sqlite3_file* file) {
+  return *reinterpret_cast<File*>(file)->path;
 }
 sqlite3_vfs* RealVfs(sqlite3_vfs* vfs) {
   return static_cast<sqlite3_vfs*>(vfs->pAppData);
@@ -68,36 +67,49 @@ sqlite3_vfs* RealVfs(sqlite3_vfs* vfs) {
 
 int Close(sqlite3_file* file) {
   const int code = Real(file)->pMethods->xClose(Real(file));
-  delete reinterpret_cast<File*>(file)->name;
+  delete reinterpret_cast<File*>(file)->path;
   return code;
 }
 int Read(sqlite3_file* file, void* to, int bytes, sqlite3_int64 offset) {
   return Real(file)->pMethods->xRead(Real(file), to, bytes, offset);
 }
 int Write(sqlite3_file* file, const void* from, int bytes, sqlite3_int64 offset) {
-  if (Fails(Calls::kWrite, "write", NameOf(file))) {
-    // A disk that fails has written a part of it, maybe.
-    Real(file)->pMethods->xWrite(Real(file), from, bytes / 2, offset);
+  const bool fails = Fails(Calls::kWrite, "write", PathOf(file));
+  const int taken =
+      fails ? bytes / 2 : bytes;  // of what a failing disk took a part is there, maybe
+  const int code = Real(file)->pMethods->xWrite(Real(file), from, taken, offset);
+  if (code == SQLITE_OK) {
+    ThePlan().files.NoteWrite(
+        PathOf(file), static_cast<std::uint64_t>(offset),
+        {static_cast<const std::uint8_t*>(from), static_cast<std::size_t>(taken)});
+  }
+  if (fails) {
     return IsFull() ? SQLITE_FULL : SQLITE_IOERR_WRITE;
   }
-  return Real(file)->pMethods->xWrite(Real(file), from, bytes, offset);
+  return code;
 }
 int Truncate(sqlite3_file* file, sqlite3_int64 size) {
-  return Fails(Calls::kWrite, "truncate", NameOf(file))
-             ? SQLITE_IOERR_TRUNCATE
-             : Real(file)->pMethods->xTruncate(Real(file), size);
+  if (Fails(Calls::kWrite, "truncate", PathOf(file))) {
+    return SQLITE_IOERR_TRUNCATE;
+  }
+  ThePlan().files.NoteTruncate(PathOf(file), static_cast<std::uint64_t>(size));
+  return Real(file)->pMethods->xTruncate(Real(file), size);
 }
-// No power fails here: what was written is there without.
+// Noted, not done: what survives a power cut is the notes' to say.
 int Sync(sqlite3_file* file, int /*flags*/) {
-  return Fails(Calls::kSync, "sync", NameOf(file)) ? SQLITE_IOERR_FSYNC : SQLITE_OK;
+  if (Fails(Calls::kSync, "sync", PathOf(file))) {
+    return SQLITE_IOERR_FSYNC;
+  }
+  ThePlan().files.NoteSync(PathOf(file));
+  return SQLITE_OK;
 }
 int FileSize(sqlite3_file* file, sqlite3_int64* size) {
-  return Fails(Calls::kAll, "size", NameOf(file))
+  return Fails(Calls::kAll, "size", PathOf(file))
              ? SQLITE_IOERR_FSTAT
              : Real(file)->pMethods->xFileSize(Real(file), size);
 }
 int Lock(sqlite3_file* file, int level) {
-  return Fails(Calls::kAll, "lock", NameOf(file)) ? SQLITE_IOERR_LOCK
+  return Fails(Calls::kAll, "lock", PathOf(file)) ? SQLITE_IOERR_LOCK
                                                   : Real(file)->pMethods->xLock(Real(file), level);
 }
 int Unlock(sqlite3_file* file, int level) {
@@ -116,7 +128,7 @@ int DeviceCharacteristics(sqlite3_file* file) {
   return Real(file)->pMethods->xDeviceCharacteristics(Real(file));
 }
 int ShmMap(sqlite3_file* file, int page, int bytes, int may_extend, void volatile** memory) {
-  return Fails(Calls::kAll, "map", NameOf(file))
+  return Fails(Calls::kAll, "map", PathOf(file))
              ? SQLITE_IOERR_SHMMAP
              : Real(file)->pMethods->xShmMap(Real(file), page, bytes, may_extend, memory);
 }
@@ -153,25 +165,28 @@ constexpr sqlite3_io_methods kMethods = {2,
 
 int Open(sqlite3_vfs* vfs, const char* path, sqlite3_file* file, int flags, int* out_flags) {
   file->pMethods = nullptr;
-  std::string name = path == nullptr ? "" : std::filesystem::path(path).filename().string();
-  if (Fails(Calls::kAll, "open", name)) {
+  fs::path kept = path == nullptr ? "" : path;
+  if (Fails(Calls::kAll, "open", kept)) {
     return SQLITE_CANTOPEN;
   }
   const int code = RealVfs(vfs)->xOpen(RealVfs(vfs), path, Real(file), flags, out_flags);
   if (Real(file)->pMethods == nullptr) {
     return code;
   }
-  reinterpret_cast<File*>(file)->name = new std::string(std::move(name));
+  ThePlan().files.NoteOpen(kept);
+  reinterpret_cast<File*>(file)->path = new fs::path(std::move(kept));
   file->pMethods = &kMethods;
   return code;
 }
 int Delete(sqlite3_vfs* vfs, const char* path, int /*is_synced*/) {
-  return Fails(Calls::kAll, "delete", std::filesystem::path(path).filename().string())
-             ? SQLITE_IOERR_DELETE
-             : RealVfs(vfs)->xDelete(RealVfs(vfs), path, 0);
+  if (Fails(Calls::kAll, "delete", path)) {
+    return SQLITE_IOERR_DELETE;
+  }
+  ThePlan().files.NoteDelete(path);
+  return RealVfs(vfs)->xDelete(RealVfs(vfs), path, 0);
 }
 int Access(sqlite3_vfs* vfs, const char* path, int flags, int* result) {
-  return Fails(Calls::kAll, "access", std::filesystem::path(path).filename().string())
+  return Fails(Calls::kAll, "access", path)
              ? SQLITE_IOERR_ACCESS
              : RealVfs(vfs)->xAccess(RealVfs(vfs), path, flags, result);
 }
@@ -241,6 +256,11 @@ void FaultyVfs::FailAt(std::uint64_t number, Calls calls, Until until, bool is_f
   plan.is_full = is_full;
   plan.counted = 0;
   plan.first.clear();
+  plan.files.Forget();
+}
+
+void FaultyVfs::LosePower(VolatileFiles::Loss loss, std::uint32_t seed) {
+  ThePlan().files.LosePower(loss, seed);
 }
 
 bool FaultyVfs::Heal() {

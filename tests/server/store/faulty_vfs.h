@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string>
 
+#include "tests/server/store/volatile_files.h"
+
 namespace atlas {
 
 // From its construction on SQLite's default; one at a time, and no store may outlive it.
@@ -26,8 +28,11 @@ class FaultyVfs {
   ~FaultyVfs();
 
   // The `number`-th of these calls from now on fails, 1 the next, with SQLite's code for what it
-  // does (writes: `is_full` says that there is no room). Reading never fails.
+  // does (writes: `is_full` says that there is no room). Reading never fails. What is there by now
+  // survives a power cut.
   void FailAt(std::uint64_t number, Calls calls, Until until, bool is_full = false);
+  // As if the power had been cut, with no store open: of what was not synced some is lost.
+  void LosePower(VolatileFiles::Loss loss, std::uint32_t seed);
   // Nothing fails from now on. Whether something did.
   bool Heal();
   // What failed first: "write atlas.db-wal". Empty: nothing did.

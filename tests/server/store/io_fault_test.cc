@@ -171,6 +171,16 @@ class IoFaultTest : public StoreTest {
 
   // Each call in its turn, until none is left to fail. How many there were.
   std::uint64_t FailEach(Calls calls, Until until, bool is_full = false) {
+    return FailEach(calls, until, is_full, [](std::uint64_t) {});
+  }
+  // From each call on nothing reaches the disk, and of what did not have to be there some is not.
+  std::uint64_t CutPowerAtEach(VolatileFiles::Loss loss) {
+    return FailEach(Calls::kAll, Until::kHealed, false, [this, loss](std::uint64_t number) {
+      vfs_.LosePower(loss, static_cast<std::uint32_t>(number));
+    });
+  }
+  template <typename Then>
+  std::uint64_t FailEach(Calls calls, Until until, bool is_full, const Then& then) {
     for (std::uint64_t number = 1;; ++number) {
       store_.reset();
       std::filesystem::remove_all(options_.directory);
@@ -180,9 +190,11 @@ class IoFaultTest : public StoreTest {
       Live();
       store_.reset();
       const bool has_failed = vfs_.Heal();
+      then(number);
       SCOPED_TRACE("call " + std::to_string(number) + ", " + vfs_.first());
       ExpectAllThere();
       if (!has_failed || HasFailure()) {
+        RecordProperty("calls", static_cast<int>(number - 1));
         return number - 1;
       }
     }
@@ -194,12 +206,26 @@ class IoFaultTest : public StoreTest {
   std::optional<TileId> fused_;
 };
 
+using Loss = VolatileFiles::Loss;
+
+TEST_F(IoFaultTest, ThePowerIsCutAtAnyCallAndNothingUnsyncedIsThere) {
+  EXPECT_GT(CutPowerAtEach(Loss::kAll), 300U);
+}
+
+TEST_F(IoFaultTest, ThePowerIsCutAtAnyCallAndSomeOfTheUnsyncedIsThere) {
+  EXPECT_GT(CutPowerAtEach(Loss::kSome), 300U);
+}
+
+TEST_F(IoFaultTest, ThePowerIsCutAtAnyCallAndWritesAreTorn) {
+  EXPECT_GT(CutPowerAtEach(Loss::kSectors), 300U);
+}
+
 TEST_F(IoFaultTest, AnyCallFailsOnce) {
-  EXPECT_GT(FailEach(Calls::kAll, Until::kOnce), 100U);
+  EXPECT_GT(FailEach(Calls::kAll, Until::kOnce), 300U);
 }
 
 TEST_F(IoFaultTest, AnyCallAndAllBehindItFail) {
-  EXPECT_GT(FailEach(Calls::kAll, Until::kHealed), 100U);
+  EXPECT_GT(FailEach(Calls::kAll, Until::kHealed), 300U);
 }
 
 TEST_F(IoFaultTest, AnySyncFailsOnce) {
@@ -245,7 +271,7 @@ TEST_F(IoFaultTest, NobodyIsToldOfAStateThatTheNextStartMayNotHave) {
 }
 
 TEST_F(IoFaultTest, TheDiskIsFullFromAnyWriteOn) {
-  EXPECT_GT(FailEach(Calls::kWrite, Until::kHealed, true), 50U);
+  EXPECT_GT(FailEach(Calls::kWrite, Until::kHealed, true), 200U);
 }
 
 }  // namespace

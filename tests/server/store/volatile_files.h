@@ -1,0 +1,56 @@
+// What of a few files would survive a power cut: what was synced, and of what was written since
+// whatever the disk got round to, in any order, sectors of a write by themselves (SQLite's
+// "powersafe overwrite" is not assumed of what was never synced).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "core/base/bytes.h"
+
+namespace atlas {
+
+class VolatileFiles {
+ public:
+  enum class Loss {
+    kAll,      // that was not synced
+    kSome,     // writes, as a coin falls
+    kSectors,  // of writes, as a coin falls
+  };
+
+  // What is done to a file, in the order in which it is done. A file that is not known is durable
+  // as it is found.
+  void NoteOpen(const std::filesystem::path& file);
+  void NoteWrite(const std::filesystem::path& file, std::uint64_t offset, ByteSpan bytes);
+  void NoteTruncate(const std::filesystem::path& file, std::uint64_t size);
+  void NoteSync(const std::filesystem::path& file);
+  void NoteDelete(const std::filesystem::path& file);
+  // From now on all files are durable as they are found.
+  void Forget();
+  // Makes the files what they are after a power cut now, and forgets them.
+  void LosePower(Loss loss, std::uint32_t seed);
+
+ private:
+  struct Change {
+    std::uint64_t offset = 0;
+    Bytes bytes;
+    std::optional<std::uint64_t> size;  // a truncation to it
+  };
+  struct State {
+    std::optional<Bytes> durable;  // none: nobody would find it
+    std::vector<Change> changes;   // since
+    bool is_deleted = false;
+  };
+
+  static void Apply(const Change& change, Loss loss, std::mt19937& random, Bytes& content);
+
+  std::mutex mutex_;
+  std::map<std::filesystem::path, State> files_;
+};
+
+}  // namespace atlas
