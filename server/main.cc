@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -165,7 +166,8 @@ void AllowConnections(const NetOptions& options) {
   }
 }
 
-int Serve(LiveConfig& live) {
+// `has_failed`: the disk did, even if it is found out last of all.
+int Serve(LiveConfig& live, std::atomic<bool>& has_failed) {
   const DaemonConfig config = live.config();
   AllowConnections(NetFrom(config));
   Result<ServerSecurity> security = SecurityFrom(config);
@@ -180,10 +182,13 @@ int Serve(LiveConfig& live) {
   if (!http_socket) {
     return Fail(http_socket.error().WithContext("http"));
   }
-  std::atomic<bool> has_failed = false;
-  const auto stop = [&has_failed](const Status& why) {
+  std::atomic<bool> is_serving = false;
+  const auto stop = [&has_failed, &is_serving](const Status& why) {
     has_failed = true;
     spdlog::critical("{}; stopping", why.message());
+    if (!is_serving) {
+      std::_Exit(1);  // before, or behind: there is nobody to drain
+    }
     ::kill(::getpid(), SIGTERM);
   };
   Result<std::unique_ptr<AtlasStore>> store = OpenStore(config, stop);
@@ -193,6 +198,7 @@ int Serve(LiveConfig& live) {
   AtlasService service(**store, &NowMs, &Log, ServiceFrom(config));
   const std::string address = socket->address();
   TcpServer server(service, NetFrom(config), *std::move(socket), *std::move(security));
+  is_serving = true;  // from now on signals are the server's
   std::printf("listening %s\n", address.c_str());
   std::optional<OperationsPort> operations;
   if (*http_socket) {
@@ -205,9 +211,10 @@ int Serve(LiveConfig& live) {
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());
   server.Run();
+  is_serving = false;
   service.Stop();
   spdlog::info("stopped");
-  return has_failed ? 1 : 0;
+  return 0;
 }
 
 // What the library says of a message that it cannot read, the refusal of the message says too.
@@ -236,7 +243,9 @@ int Main(int argc, const char* const* argv) {
   SetLog(command->config);
   LiveConfig config(*command, read);
   config.AddPart(&PrepareLog);
-  return Serve(config);
+  std::atomic<bool> has_failed = false;
+  const int code = Serve(config, has_failed);
+  return has_failed ? 1 : code;
 }
 
 }  // namespace

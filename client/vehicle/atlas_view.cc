@@ -168,12 +168,12 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
   MapAround map;
   store_.TakeDropped();
   NoteSync(feed_->Sync(store_, disc, options), map);
-  NoteDropped(disc, options.finest_level, map);
   // Each tile that was damaged on disk is gone after the pass that met it.
   bool is_damaged = false;
   while (!Collect(disc, options, map)) {
     is_damaged = true;
   }
+  NoteDropped(disc, options.finest_level, map);
   if (!is_damaged || !map.sync.ok()) return map;
   AroundOptions rest = options;
   rest.deadline = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
@@ -187,10 +187,10 @@ Result<MapAround> AtlasView::Around(const Eigen::Vector2d& position_m,
     if (rest.budget_bytes == 0) return map;
   }
   NoteSync(feed_->Sync(store_, disc, rest), map);
-  NoteDropped(disc, options.finest_level, map);
   while (!Collect(disc, options, map)) {
     map.is_current = false;
   }
+  NoteDropped(disc, options.finest_level, map);
   return map;
 }
 

@@ -222,6 +222,7 @@ void TileStore::Remove(const TileId& id) {
 void TileStore::Apply(const SyncSummary& summary) {
   for (const TileId& id : summary.removed) {
     Remove(id);
+    std::erase(dropped_, id);  // it would have gone anyway
   }
   const bool is_whole = summary.cursor.empty() && summary.differing_blocks.empty();
   if (is_whole) differing_.clear();

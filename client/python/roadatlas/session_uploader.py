@@ -17,8 +17,7 @@ _LONGEST_PAUSE_S = 30.0
 
 @dataclasses.dataclass
 class UploadReport:
-    """Sequence numbers: acknowledged in this call; there already, as the daemon says; refused for good and why. One that
-    was refused for good just when the connection broke counts as there already."""
+    """Sequence numbers: acknowledged in this call, there already as the daemon says, refused for good and why."""
 
     acknowledged: list[int] = dataclasses.field(default_factory=list)
     there_already: list[int] = dataclasses.field(default_factory=list)
@@ -32,7 +31,7 @@ class SessionUploader:
                  attempts: int = 8, first_pause_s: float = 0.5) -> None:
         """`connect` makes a client and takes `resume`: functools.partial(AtlasClient, host, port). `rising`: whoever
         uploads this session never goes back in it, so that what is not above the daemon's last sequence number was
-        dealt with and is not sent again; it counts as there already. Gives up when so many `attempts` in a row brought
+        dealt with (stored, or refused for good) and is not sent again; it counts as there already. Gives up when so many `attempts` in a row brought
         nothing forward; the pause between these doubles."""
         self._connect = connect
         self._vehicle = vehicle
@@ -78,12 +77,10 @@ class SessionUploader:
 
 class _Work:
     """What is left, by rising sequence number: the daemon takes nothing behind what it refused for now (`postponed`), so
-    that its last sequence number tells of all that this work sent before it, and, if whoever uploads the session always
-    rises, of all there are. Of others it says nothing: they are sent, and the daemon says which it has."""
+    that its last sequence number tells of all before it, if whoever uploads the session always rises. Else it says
+    nothing: all are sent, and the daemon says which it has."""
 
     def __init__(self, uploads: Iterable[atlas_pb2.UploadKeyframe], vehicle: str, session: str, rising: bool) -> None:
-        self._told_from: int | None = -1 if rising else None  # the last number tells of those above this; None: of none
-        self._sent: set[int] = set()
         self._rising = rising
         self.waiting: dict[int, atlas_pb2.UploadKeyframe] = {}
         self.postponed: dict[int, RequestRefused] = {}
@@ -95,11 +92,9 @@ class _Work:
             self.waiting[upload.key.sequence] = upload
 
     def skip(self, last_sequence: int | None) -> None:
-        last = -1 if last_sequence is None else last_sequence
-        if self._told_from is None:
-            self._told_from = last  # before this work began
-        there = [sequence for sequence in self.waiting
-                 if self._told_from < sequence <= last and (self._rising or sequence in self._sent)]
+        if last_sequence is None or not self._rising:
+            return
+        there = [sequence for sequence in self.waiting if sequence <= last_sequence]
         for sequence in there:
             del self.waiting[sequence]
         self.report.there_already += there
@@ -108,7 +103,6 @@ class _Work:
         on_their_way: deque[tuple[int, int]] = deque()
         try:
             for sequence, upload in list(self.waiting.items()):
-                self._sent.add(sequence)
                 on_their_way.append((sequence, client.submit(upload)))
                 if len(on_their_way) >= ON_THEIR_WAY:
                     self._take_reply(client, *on_their_way.popleft())

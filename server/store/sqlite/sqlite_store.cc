@@ -10,6 +10,7 @@
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
+#include "server/store/sqlite/log_renewal.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/tables/compaction_table.h"
@@ -359,6 +360,9 @@ Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& opt
 
 Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
                                               const SqliteStoreOptions& options) {
+  if (Status status = RenewLog(directory.database_file()); !status.ok()) {
+    return Error(status.WithContext(directory.database_file().string()));
+  }
   try {
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     auto identity = ReadIdentity(*writer);

@@ -126,7 +126,7 @@ class ResumeTest(AtlasCase):
         frame_bytes = self.uploads[20].ByteSize()
         cut = 15 * frame_bytes + frame_bytes // 2
         with Cutting((self.host, self.port), cut, None, before_connection=self.settle) as between:
-            report = self.uploader(between.port).upload(self.uploads)
+            report = self.uploader(between.port, rising=True).upload(self.uploads)
         self.assertEqual(report.refused, {})
         self.assertEqual(sorted(report.acknowledged + report.there_already), list(range(COUNT)))
         there = len(between.passed[0])
@@ -145,7 +145,7 @@ class ResumeTest(AtlasCase):
         size = self.uploads[20].ByteSize()
         limits = [12 * size + 7 * i for i in range(3)]
         with Cutting((self.host, self.port), *limits, None, before_connection=self.settle) as between:
-            report = self.uploader(between.port).upload(self.uploads)
+            report = self.uploader(between.port, rising=True).upload(self.uploads)
         self.assertEqual(sorted(report.acknowledged + report.there_already), list(range(COUNT)))
         self.assertEqual(sum(between.passed, []), list(range(COUNT)))
         self.assertEqual((self.client.status().keyframes, len(between.passed)), (COUNT, 4))

@@ -98,6 +98,7 @@ int Truncate(sqlite3_file* file, sqlite3_int64 size) {
 // Noted, not done: what survives a power cut is the notes' to say.
 int Sync(sqlite3_file* file, int /*flags*/) {
   if (Fails(Calls::kSync, "sync", PathOf(file))) {
+    ThePlan().files.NoteFailedSync(PathOf(file));
     return SQLITE_IOERR_FSYNC;
   }
   ThePlan().files.NoteSync(PathOf(file));
@@ -239,6 +240,7 @@ sqlite3_vfs& TheVfs() {
 }  // namespace
 
 FaultyVfs::FaultyVfs() {
+  BeginAnew();
   sqlite3_vfs_register(&TheVfs(), 1);
 }
 
@@ -256,7 +258,10 @@ void FaultyVfs::FailAt(std::uint64_t number, Calls calls, Until until, bool is_f
   plan.is_full = is_full;
   plan.counted = 0;
   plan.first.clear();
-  plan.files.Forget();
+}
+
+void FaultyVfs::BeginAnew() {
+  ThePlan().files.Forget();
 }
 
 void FaultyVfs::LosePower(VolatileFiles::Loss loss, std::uint32_t seed) {

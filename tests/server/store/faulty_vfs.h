@@ -28,9 +28,10 @@ class FaultyVfs {
   ~FaultyVfs();
 
   // The `number`-th of these calls from now on fails, 1 the next, with SQLite's code for what it
-  // does (writes: `is_full` says that there is no room). Reading never fails. What is there by now
-  // survives a power cut.
+  // does (writes: `is_full` says that there is no room). Reading never fails.
   void FailAt(std::uint64_t number, Calls calls, Until until, bool is_full = false);
+  // All that there is survives a power cut.
+  void BeginAnew();
   // As if the power had been cut, with no store open: of what was not synced some is lost.
   void LosePower(VolatileFiles::Loss loss, std::uint32_t seed);
   // Nothing fails from now on. Whether something did.

@@ -18,7 +18,7 @@
 
 namespace atlas {
 
-class StoreTest : public testing::Test {
+class StoreTest : public ::testing::Test {
  protected:
   StoreTest() {
     std::string name = (std::filesystem::temp_directory_path() / "atlas_store_XXXXXX").string();

@@ -82,6 +82,11 @@ void VolatileFiles::NoteSync(const fs::path& file) {
   }
 }
 
+void VolatileFiles::NoteFailedSync(const fs::path& file) {
+  const std::lock_guard lock(mutex_);
+  files_[file].changes.clear();
+}
+
 void VolatileFiles::NoteDelete(const fs::path& file) {
   const std::lock_guard lock(mutex_);
   files_[file].is_deleted = true;

@@ -29,6 +29,8 @@ class VolatileFiles {
   void NoteWrite(const std::filesystem::path& file, std::uint64_t offset, ByteSpan bytes);
   void NoteTruncate(const std::filesystem::path& file, std::uint64_t size);
   void NoteSync(const std::filesystem::path& file);
+  // What was written since the last sync is read, and never comes to the disk.
+  void NoteFailedSync(const std::filesystem::path& file);
   void NoteDelete(const std::filesystem::path& file);
   // From now on all files are durable as they are found.
   void Forget();

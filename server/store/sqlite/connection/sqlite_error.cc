@@ -41,6 +41,11 @@ Status StatusFromSqlite(const SQLite::Exception& error) {
                 StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")"));
 }
 
+Status StatusFromSqliteCode(int code, const char* what) {
+  return Status(CodeOf(code & 0xFF),
+                StrCat("store: ", what, ": ", sqlite3_errstr(code), " (SQLite ", code, ")"));
+}
+
 Status StatusFromException(const std::exception& error) {
   if (const auto* sqlite = dynamic_cast<const SQLite::Exception*>(&error)) {
     return StatusFromSqlite(*sqlite);

@@ -15,6 +15,9 @@ namespace atlas {
 // Failing or busy disk: kUnavailable. Everything else is a mistake of this program: kInternal.
 Status StatusFromSqlite(const SQLite::Exception& error);
 
+// Of a call that answers with a code of its own, extended or not, but SQLITE_OK.
+Status StatusFromSqliteCode(int code, const char* what);
+
 // For the one place where work runs on a connection: SQLite's exceptions and bad_alloc.
 Status StatusFromException(const std::exception& error);
 

@@ -1,7 +1,8 @@
 // Whether the disk ever failed to sync. The system may drop what it could not write, and the next
 // sync succeeds all the same (Rebello et al., Can Applications Recover from fsync Failures?, USENIX
 // ATC 2020); and whether a commit is there that failed so is known only when the log is read again.
-// So nothing is written from then on, until the store is opened anew. Thread-safe.
+// So no change is taken from then on, until the store is opened anew (log_renewal.h); closing it
+// copies what was committed before. Thread-safe.
 #pragma once
 
 #include <exception>
