@@ -5,12 +5,12 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/log_copier.h"
+#include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/reader_pool.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
-#include "server/store/sqlite/log_renewal.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/tables/compaction_table.h"

@@ -1,4 +1,4 @@
-#include "server/store/sqlite/log_renewal.h"
+#include "server/store/sqlite/connection/log_renewal.h"
 
 #include <algorithm>
 #include <cstddef>
