@@ -31,8 +31,8 @@ class SessionUploader:
                  attempts: int = 8, first_pause_s: float = 0.5) -> None:
         """`connect` makes a client and takes `resume`: functools.partial(AtlasClient, host, port). `rising`: whoever
         uploads this session never goes back in it, so that what is not above the daemon's last sequence number was
-        dealt with (stored, or refused for good) and is not sent again; it counts as there already. Gives up when so many `attempts` in a row brought
-        nothing forward; the pause between these doubles."""
+        dealt with (stored, or refused for good) and is not sent again; it counts as there already. Gives up when so
+        many `attempts` in a row brought nothing forward; the pause between these doubles."""
         self._connect = connect
         self._vehicle = vehicle
         self._session = session

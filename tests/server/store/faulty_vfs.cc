@@ -280,9 +280,4 @@ std::string FaultyVfs::first() const {
   return ThePlan().first;
 }
 
-std::uint64_t FaultyVfs::calls() const {
-  const std::lock_guard lock(ThePlan().mutex);
-  return ThePlan().counted;
-}
-
 }  // namespace atlas

@@ -13,7 +13,7 @@ namespace atlas {
 class FaultyVfs {
  public:
   enum class Calls {
-    kAll,    // that follow, until Heal()
+    kAll,    // but reads
     kWrite,  // of files: what they write, how long they are
     kSync,
   };
@@ -38,8 +38,6 @@ class FaultyVfs {
   bool Heal();
   // What failed first: "write atlas.db-wal". Empty: nothing did.
   std::string first() const;
-  // Calls since the last FailAt, of those it asked for.
-  std::uint64_t calls() const;
 };
 
 }  // namespace atlas

@@ -27,7 +27,6 @@ struct Ledger {
   std::set<std::uint32_t> tried;                         // those that may be
   std::set<SessionState> states = {SessionState::kLive};
   std::set<TileId> to_be_fused;  // tiles that must be marked
-  bool has_tile = false;
   std::uint64_t revision = 0;
 };
 
