@@ -14,6 +14,7 @@
 
 #include "core/base/status.h"
 #include "server/store/compaction_types.h"
+#include "server/store/event_types.h"
 #include "server/store/store_types.h"
 #include "server/store/tile_index.h"
 #include "server/store/write_figures.h"
@@ -123,8 +124,11 @@ class AtlasStore : public TileIndex {
   // Verifies every compaction's checksum, and that it left as many tombstones as it dropped
   // keyframes.
   virtual Status CheckCompactions() = 0;
-  // Counts all rows and compares, in one snapshot.
+  // Counts all rows, adds up their checksums and compares, in one snapshot. kInvalidData where rows
+  // vanished.
   virtual Status CheckCounters() = 0;
+  // What happened beside uploads: above `after_id` in order, up to `limit`.
+  virtual Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) = 0;
 };
 
 }  // namespace atlas

@@ -12,9 +12,12 @@
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/session_table.h"
@@ -121,8 +124,9 @@ class SqliteStore final : public AtlasStore {
     });
   }
   void ClaimDirty(ClaimRequest request, Done<ClaimResult> done) override {
-    Write<ClaimResult>(std::move(done), [r = std::move(request)](Connection& connection) {
-      return Result<ClaimResult>(ClaimTiles(connection, r));
+    const std::uint8_t levels = identity_.profile.levels;
+    Write<ClaimResult>(std::move(done), [levels, r = std::move(request)](Connection& connection) {
+      return ClaimDirtyInStore(connection, r, levels);
     });
   }
   void FinishTile(FinishedTile tile, Done<FinishResult> done) override {
@@ -270,6 +274,10 @@ class SqliteStore final : public AtlasStore {
   Status CheckCompactions() override {
     return ReadStatus([](Connection& connection) { return CheckCompactionRows(connection); });
   }
+  Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) override {
+    return readers_.Run<std::vector<Event>>(
+        [=](Connection& connection) { return ReadEvents(connection, after_id, limit); });
+  }
   Status CheckCounters() override {
     return ReadStatus([](Connection& connection) { return atlas::CheckCounters(connection); });
   }
@@ -358,6 +366,15 @@ Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& opt
   return directory.Publish();
 }
 
+// A lost mark is a tile that is wrong for ever: what is not sure is marked again.
+void RestoreMarks(Connection& writer, std::uint8_t levels) {
+  if (const Status status = CheckMarks(writer); !status.ok()) {
+    writer.Execute("BEGIN IMMEDIATE");
+    MarkAllInStore(writer, status.message(), levels);
+    writer.Execute("COMMIT");
+  }
+}
+
 Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
                                               const SqliteStoreOptions& options) {
   if (Status status = RenewLog(directory.database_file()); !status.ok()) {
@@ -370,7 +387,10 @@ Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
       return Error(identity.error().WithContext(directory.database_file().string()));
     }
     writer->Execute("PRAGMA journal_mode = WAL");
+    AddRowHash(*writer);
+    KeepTableSums(*writer);
     DropAllLeases(*writer);
+    RestoreMarks(*writer, identity->profile.levels);
     return std::make_unique<SqliteStore>(options, std::move(directory), *identity,
                                          std::move(writer));
   } catch (const std::exception& error) {

@@ -236,12 +236,14 @@ TEST_F(HistoryTest, RevisionsToComeAndForgottenOnesAreRefused) {
   EXPECT_EQ(store_->CheckRevision(2).code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(store_->CheckRevision(UINT64_MAX).code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(store_->GatherTileAt(kA, 2).error().code(), StatusCode::kInvalidArgument);
-  TamperAndOpen("UPDATE counters SET value = 1 WHERE name = 'history_horizon'");
-  EXPECT_TRUE(store_->CheckRevision(1).ok());
-  const Status forgotten = store_->CheckRevision(0);
+  ASSERT_TRUE(Await<CompactionResult>([&](auto done) {
+                store_->Compact({1, 0, {1}, "tests"}, std::move(done));
+              }).has_value());
+  EXPECT_TRUE(store_->CheckRevision(2).ok());
+  const Status forgotten = store_->CheckRevision(1);
   EXPECT_EQ(forgotten.code(), StatusCode::kNotFound);
-  EXPECT_NE(forgotten.message().find("no longer kept, the oldest is 1"), std::string::npos);
-  EXPECT_EQ(store_->GatherTileAt(kA, 0).error(), forgotten);
+  EXPECT_NE(forgotten.message().find("no longer kept, the oldest is 2"), std::string::npos);
+  EXPECT_EQ(store_->GatherTileAt(kA, 1).error(), forgotten);
 }
 
 TEST_F(HistoryTest, FootprintsCoverWhatWasEverTouchedOnEveryLevel) {

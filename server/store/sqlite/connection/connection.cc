@@ -26,6 +26,19 @@ int OpenFlags(DatabaseOptions::Mode mode) {
   return SQLite::OPEN_NOMUTEX | SQLite::OPEN_READONLY;
 }
 
+constexpr int kMaxIntegers = 16;
+
+void CallIntegerFunction(sqlite3_context* context, int count, sqlite3_value** values) {
+  if (count > kMaxIntegers) {
+    sqlite3_result_error(context, "more integers than it takes", -1);
+    return;
+  }
+  std::array<std::int64_t, kMaxIntegers> integers{};
+  std::transform(values, values + count, integers.begin(), sqlite3_value_int64);
+  const auto function = reinterpret_cast<Connection::IntegerFunction>(sqlite3_user_data(context));
+  sqlite3_result_int64(context, function({integers.data(), static_cast<std::size_t>(count)}));
+}
+
 // The file as a URI that says that nobody changes it.
 std::string UntouchedUri(const std::string& file) {
   constexpr std::string_view kHex = "0123456789ABCDEF";
@@ -93,6 +106,7 @@ Connection::Connection(const DatabaseOptions& options)
       StrCat("PRAGMA cache_size = -", options.cache_kib,
              "; PRAGMA mmap_size = 0; PRAGMA synchronous = FULL; PRAGMA secure_delete = OFF;"
              "PRAGMA temp_store = MEMORY; PRAGMA foreign_keys = OFF; PRAGMA trusted_schema = OFF;"
+             "PRAGMA recursive_triggers = ON; PRAGMA cell_size_check = ON;"
              "PRAGMA journal_size_limit = 67108864;")
           .c_str());
 }
@@ -112,6 +126,11 @@ std::int64_t Connection::Ask(const char* sql) {
 
 bool Connection::is_in_transaction() const {
   return sqlite3_get_autocommit(database_.getHandle()) == 0;
+}
+
+void Connection::AddFunction(const char* name, IntegerFunction function) {
+  database_.createFunction(name, -1, true, reinterpret_cast<void*>(function), CallIntegerFunction,
+                           nullptr, nullptr, nullptr);
 }
 
 void Connection::LeaveLogTo(std::function<void(int)> on_commit) {

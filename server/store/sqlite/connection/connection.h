@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -88,6 +89,10 @@ class Connection {
   int total_changes() const { return database_.getTotalChanges(); }
   // False after SQLite rolled the transaction back by itself (full disk, I/O error).
   bool is_in_transaction() const;
+
+  // A function of integers that its statements may call by that name, with any number of them.
+  using IntegerFunction = std::int64_t (*)(std::span<const std::int64_t>);
+  void AddFunction(const char* name, IntegerFunction function);
 
   // From now on this connection does not copy the log into the database by itself; `on_commit` is
   // told after each commit how many pages the log has. It must not throw.

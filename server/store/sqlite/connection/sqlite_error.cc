@@ -46,6 +46,10 @@ Status StatusFromSqliteCode(int code, const char* what) {
                 StrCat("store: ", what, ": ", sqlite3_errstr(code), " (SQLite ", code, ")"));
 }
 
+void ThrowDamaged(const std::string& what) {
+  throw SQLite::Exception(what, SQLITE_CORRUPT);
+}
+
 Status StatusFromException(const std::exception& error) {
   if (const auto* sqlite = dynamic_cast<const SQLite::Exception*>(&error)) {
     return StatusFromSqlite(*sqlite);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <exception>
+#include <string>
 
 #include "core/base/status.h"
 
@@ -20,5 +21,8 @@ Status StatusFromSqliteCode(int code, const char* what);
 
 // For the one place where work runs on a connection: SQLite's exceptions and bad_alloc.
 Status StatusFromException(const std::exception& error);
+
+// What is read is not what was written: kInvalidData where the exception becomes a Status.
+[[noreturn]] void ThrowDamaged(const std::string& what);
 
 }  // namespace atlas

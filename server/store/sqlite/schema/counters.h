@@ -22,13 +22,15 @@ enum class Counter : std::uint8_t {
   kHistoryHorizon = 11,  // the oldest revision that can still be read
   kCompactions = 12,
   kCompacted = 13,    // keyframes that they dropped
-  kFusionRules = 14,  // by which the tiles are fused; 0, or no row: nobody said
+  kFusionRules = 14,  // by which the tiles are fused; 0: nobody said
+  kEvents = 15,
 };
 
+// All of them throw what becomes kInvalidData when the counter is damaged or missing.
 std::uint64_t ReadCounter(Connection& connection, Counter counter);
 // The value after adding `delta`.
 std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t delta);
-// Also where older versions made no row for it.
-void WriteFusionRules(Connection& connection, std::uint64_t rules);
+// Whatever it was before.
+void SetCounter(Connection& connection, Counter counter, std::uint64_t value);
 
 }  // namespace atlas

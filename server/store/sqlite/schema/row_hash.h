@@ -6,6 +6,7 @@
 
 #include "core/base/bytes.h"
 #include "core/base/hash.h"
+#include "server/store/sqlite/connection/connection.h"
 
 namespace atlas {
 
@@ -22,6 +23,11 @@ enum class RowKind : std::uint8_t {
   kCompaction = 9,
   kTombstone = 10,
   kStart = 11,
+  kCounter = 12,
+  kFootprint = 13,
+  kDirtyTile = 14,
+  kEvent = 15,
+  kDamagedKeyframe = 16,
 };
 
 // Integers as 8 bytes little-endian, text and bytes with their length before them.
@@ -51,5 +57,8 @@ class RowHash {
  private:
   ByteWriter out_;
 };
+
+// Statements of the connection may call row_hash(kind, value...) then: the hash of integers.
+void AddRowHash(Connection& connection);
 
 }  // namespace atlas

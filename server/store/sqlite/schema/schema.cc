@@ -4,12 +4,12 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/table_sums.h"
 
 namespace atlas {
 namespace {
 
-// Blobs stand last in their rows: the other columns are read without touching overflow pages. The
-// checksums of counters, keyframe_tiles and dirty_tiles are reserved and null.
+// Blobs stand last in their rows: the other columns are read without touching overflow pages.
 constexpr const char* kTables = R"sql(
 CREATE TABLE meta (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -17,7 +17,8 @@ CREATE TABLE meta (
   checksum INTEGER NOT NULL);
 
 CREATE TABLE counters (
-  id INTEGER PRIMARY KEY, name TEXT NOT NULL, value INTEGER NOT NULL, checksum INTEGER);
+  id INTEGER PRIMARY KEY, name TEXT NOT NULL, value INTEGER NOT NULL,
+  checksum INTEGER NOT NULL);
 
 CREATE TABLE sessions (
   id INTEGER PRIMARY KEY,
@@ -79,10 +80,11 @@ CREATE INDEX tile_summaries ON tiles (key, revision, payload_hash, blob_bytes);
 CREATE TABLE keyframe_tiles (
   tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,
   revision INTEGER NOT NULL, is_current INTEGER NOT NULL,
-  checksum INTEGER,
+  checksum INTEGER NOT NULL,
   PRIMARY KEY (tile_key, keyframe_id)) WITHOUT ROWID;
 CREATE INDEX tiles_of_keyframe ON keyframe_tiles (keyframe_id);
-CREATE INDEX changes_of_tile ON keyframe_tiles (tile_key, revision, keyframe_id, is_current);
+CREATE INDEX changes_of_tile ON keyframe_tiles
+  (tile_key, revision, keyframe_id, is_current, checksum);
 
 CREATE TABLE dirty_tiles (
   key INTEGER PRIMARY KEY,
@@ -90,7 +92,7 @@ CREATE TABLE dirty_tiles (
   generation INTEGER NOT NULL, since INTEGER NOT NULL,
   lease_owner TEXT, lease_until_ms INTEGER NOT NULL DEFAULT 0,
   attempts INTEGER NOT NULL DEFAULT 0, retry_at_ms INTEGER NOT NULL DEFAULT 0,
-  checksum INTEGER);
+  checksum INTEGER NOT NULL);
 CREATE INDEX dirty_since ON dirty_tiles (since);
 
 CREATE TABLE session_states (
@@ -121,11 +123,28 @@ CREATE TABLE starts (
   id BLOB NOT NULL, revision INTEGER NOT NULL,
   checksum INTEGER NOT NULL);
 
-INSERT INTO counters (id, name, value) VALUES
-  (1, 'revision', 0), (2, 'batch', 0), (3, 'last_keyframe_id', 0), (4, 'keyframes', 0),
-  (5, 'keyframe_bytes', 0), (6, 'tiles', 0), (7, 'tile_bytes', 0), (8, 'cells', 0),
-  (9, 'multilayer_cells', 0), (10, 'sessions', 0),
-  (11, 'history_horizon', 0), (12, 'compactions', 0), (13, 'compacted', 0), (14, 'fusion_rules', 0);
+CREATE TABLE damaged_keyframes (
+  keyframe_id INTEGER PRIMARY KEY,
+  revision INTEGER NOT NULL, time_ms INTEGER NOT NULL, reason TEXT NOT NULL,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE events (
+  id INTEGER PRIMARY KEY,
+  revision INTEGER NOT NULL, time_ms INTEGER NOT NULL,
+  kind INTEGER NOT NULL, author TEXT NOT NULL, subject TEXT NOT NULL, detail TEXT NOT NULL,
+  checksum INTEGER NOT NULL);
+
+CREATE TABLE table_sums (
+  id INTEGER PRIMARY KEY, name TEXT NOT NULL,
+  row_count INTEGER NOT NULL, checksums INTEGER NOT NULL);
+
+INSERT INTO counters (id, name, value, checksum)
+  WITH names (id, name) AS (VALUES
+    (1, 'revision'), (2, 'batch'), (3, 'last_keyframe_id'), (4, 'keyframes'),
+    (5, 'keyframe_bytes'), (6, 'tiles'), (7, 'tile_bytes'), (8, 'cells'),
+    (9, 'multilayer_cells'), (10, 'sessions'), (11, 'history_horizon'), (12, 'compactions'),
+    (13, 'compacted'), (14, 'fusion_rules'), (15, 'events'))
+  SELECT id, name, 0, row_hash(12, id, 0) FROM names;
 )sql";
 
 std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) {
@@ -151,7 +170,9 @@ Status CheckVersions(Connection& connection) {
 
 void CreateSchema(Connection& connection, const StoreIdentity& identity) {
   connection.Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = DELETE; BEGIN IMMEDIATE;");
+  AddRowHash(connection);
   connection.Execute(kTables);
+  WriteTableSums(connection);
   const Bytes profile = identity.profile.Encode();
   connection.Prepare("INSERT INTO meta (id, profile, atlas_id, epoch, checksum) VALUES (1,?,?,?,?)")
       .Bind(ByteSpan(profile))

@@ -4,11 +4,23 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/tile_ranges.h"
 
 namespace atlas {
 namespace {
+
+// Leases and attempts are of this start alone, and are not part of it.
+std::int64_t HashOf(const TileClaim& claim) {
+  return RowHash(RowKind::kDirtyTile)
+      .Unsigned(claim.id.Key())
+      .Unsigned(claim.generation)
+      .Unsigned(claim.since)
+      .value();
+}
 
 // The lowest level with a mark of the wave, leased or not: keys begin with the level.
 std::optional<std::uint8_t> LowestLevel(Connection& connection, const ClaimRequest& request) {
@@ -21,12 +33,12 @@ std::optional<std::uint8_t> LowestLevel(Connection& connection, const ClaimReque
   return static_cast<std::uint8_t>(row.Int());
 }
 
-std::vector<TileClaim> FreeMarks(Connection& connection,
-                                 const ClaimRequest& request,
-                                 std::uint8_t level) {
+Result<std::vector<TileClaim>> FreeMarks(Connection& connection,
+                                         const ClaimRequest& request,
+                                         std::uint8_t level) {
   Query row = connection.Prepare(
-      "SELECT key, generation, since, attempts FROM dirty_tiles WHERE key BETWEEN ? AND ? AND "
-      "since <= ? "
+      "SELECT key, generation, since, attempts, checksum FROM dirty_tiles "
+      "WHERE key BETWEEN ? AND ? AND since <= ? "
       "AND retry_at_ms <= ? AND lease_until_ms <= ? ORDER BY key LIMIT ?");
   const KeyRange keys = LevelRange(level);
   row.Bind(keys.first).Bind(keys.last).Bind(request.wave);
@@ -34,13 +46,17 @@ std::vector<TileClaim> FreeMarks(Connection& connection,
   std::vector<TileClaim> claims;
   while (row.Step()) {
     row.Rewind();
-    if (const auto id = TileId::FromKey(row.Unsigned())) {
-      TileClaim claim{*id, request.owner};
-      claim.generation = row.Unsigned();
-      claim.since = row.Unsigned();
-      claim.attempts = row.Unsigned32();
-      claims.push_back(std::move(claim));
+    const std::uint64_t key = row.Unsigned();
+    const auto id = TileId::FromKey(key);
+    TileClaim claim{id.value_or(TileId{}), request.owner};
+    claim.generation = row.Unsigned();
+    claim.since = row.Unsigned();
+    claim.attempts = row.Unsigned32();
+    if (!id || row.Int() != HashOf(claim)) {
+      return Error(StatusCode::kInvalidData, StrCat("store: the mark on the tile with the key ",
+                                                    key, " is damaged: wrong checksum"));
     }
+    claims.push_back(std::move(claim));
   }
   return claims;
 }
@@ -53,9 +69,11 @@ void MarkTile(Connection& connection,
               std::uint64_t since) {
   connection
       .Prepare(
-          "INSERT INTO dirty_tiles (key, shard, level, generation, since) VALUES (?,?,?,?,?) "
+          "INSERT INTO dirty_tiles (key, shard, level, generation, since, checksum) "
+          "VALUES (?1,?2,?3,?4,?5, row_hash(14, ?1, ?4, ?5)) "
           "ON CONFLICT (key) DO UPDATE SET generation = excluded.generation, "
-          "since = min(since, excluded.since), attempts = 0, retry_at_ms = 0")
+          "since = min(since, excluded.since), attempts = 0, retry_at_ms = 0, "
+          "checksum = row_hash(14, key, excluded.generation, min(since, excluded.since))")
       .Bind(id.Key())
       .Bind(ShardOf(id))
       .Bind(std::int64_t{id.level})
@@ -64,12 +82,16 @@ void MarkTile(Connection& connection,
       .Run();
 }
 
-ClaimResult ClaimTiles(Connection& connection, const ClaimRequest& request) {
+Result<ClaimResult> ClaimTiles(Connection& connection, const ClaimRequest& request) {
   const auto level = LowestLevel(connection, request);
   if (!level) {
-    return {{}, true};
+    return ClaimResult{{}, true};
   }
-  ClaimResult result{FreeMarks(connection, request, *level), false};
+  auto marks = FreeMarks(connection, request, *level);
+  if (!marks) {
+    return Error(marks.error());
+  }
+  ClaimResult result{std::move(*marks), false};
   for (const TileClaim& claim : result.claims) {
     connection
         .Prepare(
@@ -107,8 +129,8 @@ void SettleClaim(Connection& connection, const TileClaim& claim) {
   }
   connection
       .Prepare(
-          "UPDATE dirty_tiles SET since = ?, lease_owner = NULL, lease_until_ms = 0 "
-          "WHERE key = ? AND shard = ?")
+          "UPDATE dirty_tiles SET since = ?1, lease_owner = NULL, lease_until_ms = 0, "
+          "checksum = row_hash(14, key, generation, ?1) WHERE key = ?2 AND shard = ?3")
       .Bind(claim.generation + 1)
       .Bind(claim.id.Key())
       .Bind(ShardOf(claim.id))
@@ -134,6 +156,21 @@ void DropAllLeases(Connection& connection) {
   connection.Execute(
       "UPDATE dirty_tiles SET lease_owner = NULL, lease_until_ms = 0, attempts = 0, "
       "retry_at_ms = 0 WHERE lease_until_ms <> 0 OR retry_at_ms <> 0");
+}
+
+Status CheckMarks(Connection& connection) {
+  ATLAS_RETURN_IF_ERROR(CheckTableSum(connection, RowKind::kDirtyTile));
+  Query row = connection.Prepare(
+      "SELECT count(*) FROM dirty_tiles WHERE checksum <> row_hash(14, key, generation, since)");
+  const std::uint64_t damaged = row.Step() ? row.Unsigned() : 0;
+  return damaged == 0 ? Status()
+                      : Status(StatusCode::kInvalidData,
+                               StrCat("store: marks on ", damaged, " tiles are damaged"));
+}
+
+void ForgetMarks(Connection& connection) {
+  connection.Execute("DELETE FROM dirty_tiles");
+  WriteTableSum(connection, RowKind::kDirtyTile);
 }
 
 DirtyState ReadDirty(Connection& connection) {

@@ -14,7 +14,8 @@ void MarkTile(Connection& connection,
               std::uint64_t generation,
               std::uint64_t since);
 
-ClaimResult ClaimTiles(Connection& connection, const ClaimRequest& request);
+// kInvalidData when a mark that would be claimed is damaged.
+Result<ClaimResult> ClaimTiles(Connection& connection, const ClaimRequest& request);
 // kConflict when the claim is no longer held.
 Status CheckClaim(Connection& connection, const TileClaim& claim);
 // Clears the mark if nothing marked the tile since it was claimed; else gives the lease back.
@@ -23,6 +24,11 @@ void SettleClaim(Connection& connection, const TileClaim& claim);
 void PostponeClaim(Connection& connection, const TileClaim& claim, std::int64_t retry_at_ms);
 // Leases of a process that is gone.
 void DropAllLeases(Connection& connection);
+
+// Reads all of them. kInvalidData when one is damaged or lost.
+Status CheckMarks(Connection& connection);
+// All, damaged ones too.
+void ForgetMarks(Connection& connection);
 
 DirtyState ReadDirty(Connection& connection);
 

@@ -1,8 +1,11 @@
 #include "server/store/sqlite/tables/footprint_table.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/tile_ranges.h"
 
 namespace atlas {
@@ -13,23 +16,65 @@ constexpr std::size_t kMaxRanges = 64;
 // A statement a row is a fifth slower than one for eight.
 constexpr std::size_t kRowsAtOnce = 8;
 constexpr const char* kAddOne =
-    "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
-    "VALUES (?,?,?,1) "
-    "ON CONFLICT DO UPDATE SET revision = excluded.revision, is_current = 1";
+    "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current, checksum) "
+    "VALUES (?,?,?,1,?) "
+    "ON CONFLICT DO UPDATE SET revision = excluded.revision, is_current = 1, "
+    "checksum = excluded.checksum";
 constexpr const char* kAddEight =
-    "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
-    "VALUES (?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1),(?,?,?,1) "
-    "ON CONFLICT DO UPDATE SET revision = excluded.revision, is_current = 1";
+    "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current, checksum) "
+    "VALUES (?,?,?,1,?),(?,?,?,1,?),(?,?,?,1,?),(?,?,?,1,?),"
+    "(?,?,?,1,?),(?,?,?,1,?),(?,?,?,1,?),(?,?,?,1,?) "
+    "ON CONFLICT DO UPDATE SET revision = excluded.revision, is_current = 1, "
+    "checksum = excluded.checksum";
 
-// Keys that no tile has are left out: nothing is fused for them.
-std::vector<TileId> ReadKeys(Query& row) {
-  std::vector<TileId> tiles;
-  while (row.Step()) {
-    row.Rewind();
-    if (const auto id = TileId::FromKey(row.Unsigned())) {
-      tiles.push_back(*id);
-    }
+struct Row {
+  std::uint64_t tile_key = 0;
+  std::int64_t keyframe_id = 0;
+  std::uint64_t revision = 0;
+  bool is_current = true;
+
+  std::int64_t Checksum() const {
+    return RowHash(RowKind::kFootprint)
+        .Unsigned(tile_key)
+        .Int(keyframe_id)
+        .Unsigned(revision)
+        .Int(is_current ? 1 : 0)
+        .value();
   }
+};
+
+// Columns: tile_key, keyframe_id, revision, is_current, checksum. Throws where they are damaged.
+Row ReadRow(Query& query) {
+  query.Rewind();
+  Row row;
+  row.tile_key = query.Unsigned();
+  row.keyframe_id = query.Int();
+  row.revision = query.Unsigned();
+  row.is_current = query.Int() != 0;
+  if (query.Int() != row.Checksum()) {
+    ThrowDamaged(StrCat("the footprint of keyframe ", row.keyframe_id, " in the tile with the key ",
+                        row.tile_key, " is damaged: wrong checksum"));
+  }
+  return row;
+}
+
+TileId TileOf(const Row& row) {
+  const auto id = TileId::FromKey(row.tile_key);
+  if (!id || id->level != 0) {
+    ThrowDamaged(StrCat("the footprint of keyframe ", row.keyframe_id, " names no tile"));
+  }
+  return *id;
+}
+
+// In key order, each once.
+std::vector<TileId> ReadTiles(Query& query) {
+  std::vector<TileId> tiles;
+  while (query.Step()) {
+    tiles.push_back(TileOf(ReadRow(query)));
+  }
+  std::sort(tiles.begin(), tiles.end(),
+            [](const TileId& a, const TileId& b) { return a.Key() < b.Key(); });
+  tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
   return tiles;
 }
 
@@ -57,6 +102,7 @@ void AddRows(Connection& connection,
   Query insert = connection.Prepare(sql);
   for (const TileId& tile : tiles) {
     insert.Bind(tile.Key()).Bind(keyframe_id).Bind(revision);
+    insert.Bind(Row{tile.Key(), keyframe_id, revision}.Checksum());
   }
   insert.Run();
 }
@@ -65,10 +111,10 @@ void AddRows(Connection& connection,
 
 std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id) {
   Query row = connection.Prepare(
-      "SELECT tile_key FROM keyframe_tiles WHERE keyframe_id = ? AND is_current "
-      "ORDER BY tile_key");
+      "SELECT tile_key, keyframe_id, revision, is_current, checksum FROM keyframe_tiles "
+      "WHERE keyframe_id = ? AND is_current");
   row.Bind(keyframe_id);
-  return ReadKeys(row);
+  return ReadTiles(row);
 }
 
 void WriteFootprint(Connection& connection,
@@ -77,8 +123,9 @@ void WriteFootprint(Connection& connection,
                     std::uint64_t revision) {
   connection
       .Prepare(
-          "UPDATE keyframe_tiles SET is_current = 0, revision = ? "
-          "WHERE keyframe_id = ? AND is_current")
+          "UPDATE keyframe_tiles SET is_current = 0, revision = ?1, "
+          "checksum = row_hash(13, tile_key, keyframe_id, ?1, 0) "
+          "WHERE keyframe_id = ?2 AND is_current")
       .Bind(revision)
       .Bind(keyframe_id)
       .Run();
@@ -97,16 +144,23 @@ void DeleteFootprint(Connection& connection, std::int64_t keyframe_id) {
 
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id) {
   Query row = connection.Prepare(
-      "SELECT DISTINCT t.tile_key FROM keyframes k JOIN keyframe_tiles t ON t.keyframe_id = k.id "
-      "WHERE k.session_id = ? AND t.is_current ORDER BY t.tile_key");
+      "SELECT t.tile_key, t.keyframe_id, t.revision, t.is_current, t.checksum FROM keyframes k "
+      "JOIN keyframe_tiles t ON t.keyframe_id = k.id WHERE k.session_id = ? AND t.is_current");
   row.Bind(session_id);
-  return ReadKeys(row);
+  return ReadTiles(row);
 }
 
 std::vector<TileId> ReadAllFootprints(Connection& connection) {
   Query row = connection.Prepare(
       "SELECT DISTINCT tile_key FROM keyframe_tiles WHERE is_current ORDER BY tile_key");
-  return ReadKeys(row);
+  std::vector<TileId> tiles;
+  while (row.Step()) {
+    row.Rewind();
+    if (const auto id = TileId::FromKey(row.Unsigned())) {
+      tiles.push_back(*id);
+    }
+  }
+  return tiles;
 }
 
 void TouchSessionFootprint(Connection& connection,
@@ -114,39 +168,41 @@ void TouchSessionFootprint(Connection& connection,
                            std::uint64_t revision) {
   connection
       .Prepare(
-          "UPDATE keyframe_tiles SET revision = ? WHERE is_current AND keyframe_id IN "
-          "(SELECT id FROM keyframes WHERE session_id = ?)")
+          "UPDATE keyframe_tiles SET revision = ?1, "
+          "checksum = row_hash(13, tile_key, keyframe_id, ?1, 1) WHERE is_current "
+          "AND keyframe_id IN (SELECT id FROM keyframes WHERE session_id = ?2)")
       .Bind(revision)
       .Bind(session_id)
       .Run();
 }
 
 Status CheckFootprint(Connection& connection, std::int64_t keyframe_id, std::uint64_t revision) {
-  Query row = connection.Prepare(
-      "SELECT tile_key, revision FROM keyframe_tiles WHERE keyframe_id = ? AND "
-      "(revision > ? OR revision < (CASE WHEN is_current THEN ? ELSE 1 END))");
-  row.Bind(keyframe_id).Bind(revision).Bind(revision);
-  if (!row.Step()) {
-    return {};
+  Query query = connection.Prepare(
+      "SELECT tile_key, keyframe_id, revision, is_current, checksum FROM keyframe_tiles "
+      "WHERE keyframe_id = ?");
+  query.Bind(keyframe_id);
+  while (query.Step()) {
+    const Row row = ReadRow(query);
+    if (row.revision > revision || row.revision < (row.is_current ? revision : 1)) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("store: keyframe ", keyframe_id, " changed last at revision ", revision,
+                           ", in the tile with the key ", row.tile_key, " it says ", row.revision));
+    }
   }
-  row.Rewind();
-  const std::uint64_t key = row.Unsigned();
-  return Status(StatusCode::kInvalidData,
-                StrCat("store: keyframe ", keyframe_id, " changed last at revision ", revision,
-                       ", in the tile with the key ", key, " it says ", row.Unsigned()));
+  return {};
 }
 
 std::vector<FootprintRow> FootprintsSince(Connection& connection,
                                           const TileId& tile,
                                           std::uint64_t revision) {
   Query row = connection.Prepare(
-      "SELECT keyframe_id, is_current FROM keyframe_tiles WHERE tile_key = ? AND revision > ? "
-      "ORDER BY keyframe_id");
+      "SELECT tile_key, keyframe_id, revision, is_current, checksum FROM keyframe_tiles "
+      "WHERE tile_key = ? AND revision > ? ORDER BY keyframe_id");
   row.Bind(tile.Key()).Bind(static_cast<std::int64_t>(revision) - (revision == 0 ? 1 : 0));
   std::vector<FootprintRow> rows;
   while (row.Step()) {
-    row.Rewind();
-    rows.push_back({row.Int(), row.Int() != 0});
+    const Row stored = ReadRow(row);
+    rows.push_back({stored.keyframe_id, stored.is_current});
   }
   return rows;
 }

@@ -12,6 +12,7 @@
 
 namespace atlas {
 
+// Reading throws what becomes kInvalidData when a row is damaged.
 std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id);
 // Makes `footprint` the current one from `revision` on; the one before becomes a former one.
 void WriteFootprint(Connection& connection,
@@ -22,7 +23,7 @@ void WriteFootprint(Connection& connection,
 void DeleteFootprint(Connection& connection, std::int64_t keyframe_id);
 // The union of the current footprints of a session's keyframes, in key order.
 std::vector<TileId> ReadSessionFootprint(Connection& connection, std::int64_t session_id);
-// Of all keyframes, in key order.
+// Of all keyframes, in key order. Damaged rows are believed, but for keys that no tile has.
 std::vector<TileId> ReadAllFootprints(Connection& connection);
 // The session's keyframes entered or left the map at `revision`.
 void TouchSessionFootprint(Connection& connection, std::int64_t session_id, std::uint64_t revision);

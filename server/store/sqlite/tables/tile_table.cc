@@ -104,13 +104,14 @@ void DeleteRow(Connection& connection, const TileId& id) {
 
 // After a damaged row went, whose numbers nobody can take away from the counters.
 void Recount(Connection& connection) {
-  connection.Execute(
-      "UPDATE counters SET value = (SELECT count(*) FROM tiles) WHERE id = 6;"
-      "UPDATE counters SET value = (SELECT coalesce(sum(blob_bytes), 0) FROM tiles) WHERE id = 7;"
-      "UPDATE counters SET value = (SELECT coalesce(sum(cells), 0) FROM tiles "
-      "WHERE key < 1 << 58) WHERE id = 8;"
-      "UPDATE counters SET value = (SELECT coalesce(sum(multilayer_cells), 0) FROM tiles "
-      "WHERE key < 1 << 58) WHERE id = 9;");
+  const auto recount = [&connection](Counter counter, const char* sql) {
+    SetCounter(connection, counter, static_cast<std::uint64_t>(connection.Ask(sql)));
+  };
+  recount(Counter::kTiles, "SELECT count(*) FROM tiles");
+  recount(Counter::kTileBytes, "SELECT coalesce(sum(blob_bytes), 0) FROM tiles");
+  recount(Counter::kCells, "SELECT coalesce(sum(cells), 0) FROM tiles WHERE key < 1 << 58");
+  recount(Counter::kMultilayerCells,
+          "SELECT coalesce(sum(multilayer_cells), 0) FROM tiles WHERE key < 1 << 58");
 }
 
 TileRow NewRow(const TileId& id, const TileContent& content) {

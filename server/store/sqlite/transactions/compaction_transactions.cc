@@ -7,6 +7,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
@@ -116,6 +117,8 @@ Result<CompactionResult> CompactInStore(Connection& connection, const Compaction
   result.horizon = result.revision;
   WriteCompaction(connection, {id, result.revision, compaction.before_ms, compaction.author,
                                result.dropped, result.bytes});
+  AddEvent(connection, {EventKind::kCompact, compaction.author, StrCat("compaction ", id),
+                        StrCat(result.dropped, " keyframes, ", result.bytes, " bytes")});
   return result;
 }
 

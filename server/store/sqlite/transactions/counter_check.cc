@@ -2,6 +2,7 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/table_sums.h"
 
 namespace atlas {
 namespace {
@@ -37,7 +38,7 @@ Status CheckCounters(Connection& connection) {
                                                      recount.what, ", and the rows say ", found));
     }
   }
-  return {};
+  return CheckTableSums(connection);
 }
 
 }  // namespace atlas

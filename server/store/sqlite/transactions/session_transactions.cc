@@ -3,6 +3,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
@@ -20,6 +21,10 @@ Result<SessionState> StateAfter(Connection& connection,
   return session.record.state == SessionState::kRetracted
              ? ReadStateBeforeRetraction(connection, session.id)
              : session.record.state;
+}
+
+EventKind KindOf(SessionAction action) {
+  return action == SessionAction::kRetract ? EventKind::kRetract : EventKind::kRestore;
 }
 
 std::uint32_t MarkSession(Connection& connection, std::int64_t session_id, std::uint64_t revision) {
@@ -44,6 +49,7 @@ SessionChangeResult EnterState(Connection& connection,
   if (was_in_map != IsInMap(state)) {
     result.tiles_marked = MarkSession(connection, session.id, result.revision);
   }
+  AddEvent(connection, {KindOf(change.action), change.author, StrCat(change.key), change.reason});
   return result;
 }
 

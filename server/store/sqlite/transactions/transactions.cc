@@ -10,6 +10,7 @@
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
@@ -21,6 +22,7 @@
 namespace atlas {
 namespace {
 
+constexpr const char* kItself = "atlasd";
 constexpr std::uint32_t kAllRows = std::numeric_limits<std::uint32_t>::max();
 
 // What was uploaded under a key.
@@ -118,6 +120,21 @@ Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const P
   return move;
 }
 
+// What is stored, and what lies over keyframes: other rules may have found nothing there. Rows with
+// keys that no tile has are left out, as everywhere.
+std::set<TileId> AllTiles(Connection& connection, std::uint8_t levels) {
+  std::set<TileId> tiles;
+  for (TileId tile : ReadAllFootprints(connection)) {
+    while (tiles.insert(tile).second && tile.level + 1 < levels) {
+      tile = tile.Parent();
+    }
+  }
+  for (const TileSummary& tile : ListTileRows(connection, -1, kAllRows)) {
+    tiles.insert(tile.id);
+  }
+  return tiles;
+}
+
 Status CheckKeysDiffer(const PoseBatch& batch) {
   std::set<KeyframeKey> seen;
   for (const NewPose& update : batch.poses) {
@@ -181,6 +198,8 @@ Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBat
   result.tiles_marked = static_cast<std::uint32_t>(marked.size());
   MarkTiles(connection, marked, result.revision);
   WritePoseBatch(connection, batch, result);
+  AddEvent(connection, {EventKind::kPoses, batch.author, StrCat("batch ", result.batch),
+                        StrCat(result.updated, " poses, ", result.tiles_marked, " tiles")});
   return result;
 }
 
@@ -209,28 +228,44 @@ std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>
   return static_cast<std::uint32_t>(ids.size());
 }
 
-// Marked is what is stored, and what lies over keyframes: other rules may have found nothing there.
-// Rows with keys that no tile has are left out, as everywhere.
+// Which marks there were is not known: no tile reflects anything for sure.
+void MarkAllInStore(Connection& connection, const std::string& why, std::uint8_t levels) {
+  ForgetMarks(connection);
+  const std::set<TileId> tiles = AllTiles(connection, levels);
+  const std::uint64_t revision = NextRevision(connection);
+  for (const TileId& tile : tiles) {
+    MarkTile(connection, tile, revision, 1);
+  }
+  AddEvent(connection,
+           {EventKind::kMarksRestored, kItself, "", StrCat(why, "; ", tiles.size(), " tiles")});
+}
+
 std::uint64_t AdoptFusionRulesInStore(Connection& connection,
                                       std::uint64_t rules,
                                       std::uint8_t levels) {
   if (ReadCounter(connection, Counter::kFusionRules) == rules) {
     return 0;
   }
-  std::set<TileId> tiles;
-  for (TileId tile : ReadAllFootprints(connection)) {
-    while (tiles.insert(tile).second && tile.level + 1 < levels) {
-      tile = tile.Parent();
-    }
-  }
-  for (const TileSummary& tile : ListTileRows(connection, -1, kAllRows)) {
-    tiles.insert(tile.id);
-  }
-  WriteFusionRules(connection, rules);
+  const std::uint64_t before = ReadCounter(connection, Counter::kFusionRules);
+  const std::set<TileId> tiles = AllTiles(connection, levels);
+  SetCounter(connection, Counter::kFusionRules, rules);
   if (!tiles.empty()) {
     MarkTiles(connection, tiles, NextRevision(connection));
+    AddEvent(connection, {EventKind::kRules, kItself, StrCat("rules ", rules),
+                          StrCat("before: ", before, "; ", tiles.size(), " tiles")});
   }
   return tiles.size();
+}
+
+Result<ClaimResult> ClaimDirtyInStore(Connection& connection,
+                                      const ClaimRequest& request,
+                                      std::uint8_t levels) {
+  auto claimed = ClaimTiles(connection, request);
+  if (claimed || claimed.error().code() != StatusCode::kInvalidData) {
+    return claimed;
+  }
+  MarkAllInStore(connection, claimed.error().message(), levels);
+  return ClaimTiles(connection, request);
 }
 
 }  // namespace atlas

@@ -1,6 +1,8 @@
 // The writes of the store, each as what happens inside its savepoint.
 #pragma once
 
+#include <string>
+
 #include "core/base/status.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/store_types.h"
@@ -14,6 +16,13 @@ Result<FinishResult> FinishTileInStore(Connection& connection,
                                        const FinishedTile& tile,
                                        std::uint8_t levels);
 std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids);
+// In the place of marks of which some are damaged or lost: on every tile there may be. `why` is for
+// people.
+void MarkAllInStore(Connection& connection, const std::string& why, std::uint8_t levels);
+// Goes on over a damaged mark: with marks on everything.
+Result<ClaimResult> ClaimDirtyInStore(Connection& connection,
+                                      const ClaimRequest& request,
+                                      std::uint8_t levels);
 std::uint64_t AdoptFusionRulesInStore(Connection& connection,
                                       std::uint64_t rules,
                                       std::uint8_t levels);

@@ -1,0 +1,37 @@
+// What happened to an atlas beside uploads: who did what, kept for good.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace atlas {
+
+// Frozen numbers (docs/formats/store.md).
+enum class EventKind : std::uint8_t {
+  kPoses = 1,            // a batch of corrections
+  kRetract = 2,          // of a session
+  kRestore = 3,          // of a session
+  kCompact = 4,          // keyframes that mattered nowhere went
+  kRules = 5,            // of fusion: every tile is fused again
+  kMarksRestored = 6,    // marks were damaged or lost: every tile is fused again
+  kKeyframeDamaged = 7,  // it is out of the map
+  kKeyframeHealed = 8,   // the vehicle sent it again
+  kKeyframeGivenUp = 9,  // by who asked for repairs
+  kSessionQuarantined = 10,
+  kSessionReleased = 11,
+  kSessionPurged = 12,
+  kBackupRestored = 13,
+  kUpgraded = 14,  // from an earlier version of the schema
+};
+
+struct Event {
+  std::uint64_t id = 0;        // 1, 2, 3, ...
+  std::uint64_t revision = 0;  // of the atlas after it
+  std::int64_t time_ms = 0;    // Unix time
+  EventKind kind = EventKind::kPoses;
+  std::string author;   // name of a certificate or token, or what the client calls itself
+  std::string subject;  // a session, say; may be empty
+  std::string detail;   // for people
+};
+
+}  // namespace atlas

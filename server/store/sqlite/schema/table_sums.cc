@@ -1,0 +1,142 @@
+#include "server/store/sqlite/schema/table_sums.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <string>
+#include <string_view>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+struct SummedTable {
+  RowKind kind;
+  const char* name;
+  const char* checksums;  // of all its rows
+};
+
+constexpr SummedTable kTables[] = {
+    {RowKind::kSession, "sessions", "SELECT checksum FROM sessions"},
+    {RowKind::kKeyframe, "keyframes", "SELECT checksum FROM keyframes"},
+    {RowKind::kPose, "poses", "SELECT checksum FROM poses"},
+    {RowKind::kPoseHistory, "pose_history", "SELECT checksum FROM pose_history"},
+    {RowKind::kPoseBatch, "pose_batches", "SELECT checksum FROM pose_batches"},
+    {RowKind::kTile, "tiles", "SELECT checksum FROM tiles"},
+    {RowKind::kSessionState, "session_states", "SELECT checksum FROM session_states"},
+    {RowKind::kCompaction, "compactions", "SELECT checksum FROM compactions"},
+    {RowKind::kTombstone, "tombstones", "SELECT checksum FROM tombstones"},
+    {RowKind::kStart, "starts", "SELECT checksum FROM starts"},
+    {RowKind::kCounter, "counters", "SELECT checksum FROM counters"},
+    {RowKind::kFootprint, "keyframe_tiles", "SELECT checksum FROM keyframe_tiles"},
+    {RowKind::kDirtyTile, "dirty_tiles", "SELECT checksum FROM dirty_tiles"},
+    {RowKind::kEvent, "events", "SELECT checksum FROM events"},
+    {RowKind::kDamagedKeyframe, "damaged_keyframes", "SELECT checksum FROM damaged_keyframes"},
+};
+
+struct TableSum {
+  std::int64_t rows = 0;
+  std::int64_t checksums = 0;
+
+  bool operator==(const TableSum&) const = default;
+};
+
+TableSum AddUp(Connection& connection, const SummedTable& table) {
+  Query row = connection.Prepare(table.checksums);
+  TableSum sum;
+  while (row.Step()) {
+    row.Rewind();
+    ++sum.rows;
+    sum.checksums ^= row.Int();
+  }
+  return sum;
+}
+
+Status Check(Connection& connection, const SummedTable& table) {
+  TableSum kept;
+  {
+    Query row = connection.Prepare("SELECT row_count, checksums FROM main.table_sums WHERE id = ?");
+    row.Bind(static_cast<std::int64_t>(table.kind));
+    if (!row.Step()) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("store: what table ", table.name, " should hold is not known"));
+    }
+    kept.rows = row.Int();
+    kept.checksums = row.Int();
+  }
+  const TableSum found = AddUp(connection, table);
+  if (found == kept) {
+    return {};
+  }
+  return Status(StatusCode::kInvalidData,
+                found.rows == kept.rows ? StrCat("store: rows of table ", table.name,
+                                                 " are not those that were written")
+                                        : StrCat("store: table ", table.name, " has ", found.rows,
+                                                 " rows, and should have ", kept.rows));
+}
+
+void Write(Connection& connection, const SummedTable& table) {
+  const TableSum sum = AddUp(connection, table);
+  connection
+      .Prepare(
+          "INSERT INTO main.table_sums (id, name, row_count, checksums) VALUES (?,?,?,?) "
+          "ON CONFLICT (id) DO UPDATE SET row_count = excluded.row_count, "
+          "checksums = excluded.checksums")
+      .Bind(static_cast<std::int64_t>(table.kind))
+      .Bind(std::string_view(table.name))
+      .Bind(sum.rows)
+      .Bind(sum.checksums)
+      .Run();
+}
+
+const SummedTable& Find(RowKind kind) {
+  return *std::find_if(std::begin(kTables), std::end(kTables),
+                       [kind](const SummedTable& table) { return table.kind == kind; });
+}
+
+// SQLite has no XOR; as the bits that both have are taken away, nothing overflows.
+std::string Xored(const std::string& a, const std::string& b) {
+  return StrCat("(", a, " | ", b, ") - (", a, " & ", b, ")");
+}
+
+}  // namespace
+
+void WriteTableSums(Connection& connection) {
+  for (const SummedTable& table : kTables) {
+    Write(connection, table);
+  }
+}
+void WriteTableSum(Connection& connection, RowKind table) {
+  Write(connection, Find(table));
+}
+
+// Triggers of the connection alone: what others delete is missed.
+void KeepTableSums(Connection& connection) {
+  for (const auto& [kind, name, checksums] : kTables) {
+    const auto trigger = [&](const char* event, const char* change, const std::string& sum) {
+      connection.Execute(
+          StrCat("CREATE TEMP TRIGGER ", name, "_", std::string_view(event, 6), " AFTER ", event,
+                 " ON main.", name, " BEGIN UPDATE table_sums SET row_count = row_count", change,
+                 ", checksums = ", sum, " WHERE id = ", static_cast<int>(kind), "; END")
+              .c_str());
+    };
+    trigger("INSERT", " + 1", Xored("checksums", "new.checksum"));
+    trigger("DELETE", " - 1", Xored("checksums", "old.checksum"));
+    const std::string turned = StrCat("(", Xored("old.checksum", "new.checksum"), ")");
+    trigger("UPDATE OF checksum", "", Xored("checksums", turned));
+  }
+}
+
+Status CheckTableSums(Connection& connection) {
+  for (const SummedTable& table : kTables) {
+    ATLAS_RETURN_IF_ERROR(Check(connection, table));
+  }
+  return {};
+}
+
+Status CheckTableSum(Connection& connection, RowKind table) {
+  return Check(connection, Find(table));
+}
+
+}  // namespace atlas

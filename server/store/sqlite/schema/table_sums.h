@@ -1,0 +1,23 @@
+// Rows that vanish leave nothing that could be damaged: of each table it is kept how many rows it
+// has, and the XOR of their checksums. Whoever changes the tables by other means than a connection
+// that keeps them is found out.
+#pragma once
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/schema/row_hash.h"
+
+namespace atlas {
+
+// Says of every table what it holds now.
+void WriteTableSums(Connection& connection);
+void WriteTableSum(Connection& connection, RowKind table);
+// From now on the statements of this connection keep them.
+void KeepTableSums(Connection& connection);
+
+// Reads the checksums of all rows, without their blobs. kInvalidData names the table that lost rows
+// or has others than were written.
+Status CheckTableSums(Connection& connection);
+Status CheckTableSum(Connection& connection, RowKind table);
+
+}  // namespace atlas

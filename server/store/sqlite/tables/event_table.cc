@@ -1,0 +1,84 @@
+#include "server/store/sqlite/tables/event_table.h"
+
+#include <chrono>
+#include <string_view>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/row_hash.h"
+
+namespace atlas {
+namespace {
+
+std::int64_t HashOf(const Event& event) {
+  return RowHash(RowKind::kEvent)
+      .Unsigned(event.id)
+      .Unsigned(event.revision)
+      .Int(event.time_ms)
+      .Int(static_cast<std::int64_t>(event.kind))
+      .Text(event.author)
+      .Text(event.subject)
+      .Text(event.detail)
+      .value();
+}
+
+std::int64_t NowMs() {
+  using std::chrono::milliseconds;
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<milliseconds>(now).count();
+}
+
+}  // namespace
+
+void AddEvent(Connection& connection, const NewEvent& event) {
+  const Event row{AddToCounter(connection, Counter::kEvents, 1),
+                  ReadCounter(connection, Counter::kRevision),
+                  NowMs(),
+                  event.kind,
+                  event.author,
+                  event.subject,
+                  event.detail};
+  connection
+      .Prepare(
+          "INSERT INTO events (id, revision, time_ms, kind, author, subject, detail, checksum) "
+          "VALUES (?,?,?,?,?,?,?,?)")
+      .Bind(row.id)
+      .Bind(row.revision)
+      .Bind(row.time_ms)
+      .Bind(static_cast<std::int64_t>(row.kind))
+      .Bind(std::string_view(row.author))
+      .Bind(std::string_view(row.subject))
+      .Bind(std::string_view(row.detail))
+      .Bind(HashOf(row))
+      .Run();
+}
+
+Result<std::vector<Event>> ReadEvents(Connection& connection,
+                                      std::uint64_t after_id,
+                                      std::uint32_t limit) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events "
+      "WHERE id > ? ORDER BY id LIMIT ?");
+  row.Bind(after_id).Bind(limit);
+  std::vector<Event> events;
+  while (row.Step()) {
+    row.Rewind();
+    Event event;
+    event.id = row.Unsigned();
+    event.revision = row.Unsigned();
+    event.time_ms = row.Int();
+    event.kind = static_cast<EventKind>(row.Int());
+    event.author = row.Text();
+    event.subject = row.Text();
+    event.detail = row.Text();
+    if (row.Int() != HashOf(event)) {
+      return Error(StatusCode::kInvalidData,
+                   StrCat("store: event ", event.id, " is damaged: wrong checksum"));
+    }
+    events.push_back(std::move(event));
+  }
+  return events;
+}
+
+}  // namespace atlas

@@ -1,0 +1,29 @@
+// Table events: who did what, appended to and never changed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/event_types.h"
+#include "server/store/sqlite/connection/connection.h"
+
+namespace atlas {
+
+struct NewEvent {
+  EventKind kind = EventKind::kPoses;
+  std::string author;
+  std::string subject;
+  std::string detail;
+};
+
+// At the revision that the atlas has now, at the time of the clock.
+void AddEvent(Connection& connection, const NewEvent& event);
+
+// Above `after_id` in order, up to `limit`. kInvalidData when one is damaged.
+Result<std::vector<Event>> ReadEvents(Connection& connection,
+                                      std::uint64_t after_id,
+                                      std::uint32_t limit);
+
+}  // namespace atlas
