@@ -1,10 +1,10 @@
 // The map over links that fail: a vehicle holds what the daemon has in the end, for few bytes more
 // than over a link that does not fail, and whoever watches is told everything.
-#include <atomic>
+#include <chrono>
 #include <iostream>
-#include <mutex>
+#include <map>
+#include <optional>
 #include <random>
-#include <thread>
 
 #include "tests/client/end_to_end/vehicle_fixture.h"
 #include "tests/client/link_faults/fault_plans.h"

@@ -28,7 +28,6 @@ class Uploading {
   explicit Uploading(const UploadLoad& load)
       : load_(load), left_(load.frames), end_(Clock::now() + load.patience) {}
 
-  // `session`: of the handshake; null: none is asked for.
   Result<UploadCount> Run(bool is_resuming) {
     Status failure;
     std::optional<AtlasLink> link;
