@@ -219,7 +219,8 @@ Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
   profile.driven_hold_ms = in.U32();
   profile.origin = DecodeOrigin(in);
   if (!in.ok() || in.remaining() != 0) {
-    return Error(StatusCode::kInvalidData, "map profile: truncated, has trailing bytes or a has_origin above 1");
+    return Error(StatusCode::kInvalidData,
+                 "map profile: truncated, has trailing bytes or a has_origin above 1");
   }
   if (Status status = profile.Validate(); !status.ok()) {
     return Error(StatusCode::kInvalidData, status.message());
