@@ -190,6 +190,25 @@ TEST(TileCodecTest, SectionsThatAreTooManyTogetherStayApart) {
   EXPECT_EQ(MergeSections(blob_of(0), blob_of(40)).error().code(), StatusCode::kInvalidData);
 }
 
+// Poses end at 20 km: nothing that reads a tile need fear for its sums.
+TEST(TileCodecTest, RefusesLayersOffTheWorld) {
+  const Tile tile = RandomTile({0, 0, 0}, SmallProfile(), 13);
+  const auto code_at = [&tile](std::int32_t altitude_mm) {
+    Tile moved = tile;
+    moved.cell_begin.assign(moved.cell_begin.size(), 1);
+    moved.cell_begin[0] = 0;
+    moved.layers.resize(1);
+    moved.layers[0].altitude_mm = altitude_mm;
+    return DecodeError(EncodeTile(moved, SmallProfile()).blob);
+  };
+  for (const std::int32_t sign : {-1, 1}) {
+    EXPECT_EQ(code_at(sign * kMaxAltitude_mm), StatusCode::kOk);
+    EXPECT_EQ(code_at(sign * (kMaxAltitude_mm + 1)), StatusCode::kInvalidData);
+    EXPECT_EQ(code_at(sign * INT32_MAX), StatusCode::kInvalidData);
+  }
+  EXPECT_EQ(code_at(INT32_MIN), StatusCode::kInvalidData);
+}
+
 TEST(TileCodecTest, RefusesSectionsThatLie) {
   const Tile tile = RandomTile({0, 0, 0}, SmallProfile(), 11);
   const auto refused = [&](TileSection section, auto change) {
