@@ -48,10 +48,9 @@ void Sync(AtlasClient& client) {
   query.area = DiscArea{{0.0, 0.0}, 100.0};
   query.takes_deltas = true;
   query.held = {{kEverySection, {{held_id, held.payload_hash}}, {{0x000c000000000000, 2, 3}}}};
-  const auto summary = client.Sync(query, [&](TileBlob tile) {
-    const TileId id = tile.id;
+  const auto summary = client.Sync(query, [&](const TileBlob& tile) {
     const Status put = store.Put(tile);
-    Require(!put.ok() || store.Read(id).has_value(), "a tile that was put can be read");
+    Require(!put.ok() || store.Read(tile.id).has_value(), "a tile that was put can be read");
     return Status();
   });
   if (summary) {

@@ -74,6 +74,27 @@ MapProfile TileProfile() {
   return testing::GoldenProfile();
 }
 
+namespace {
+
+// A floor that can be driven on, with a pillar in its middle.
+Bytes FlatTile() {
+  const MapProfile profile = TileProfile();
+  Tile tile = EmptyTile({0, 1, -1}, profile);
+  tile.contributors = {{"car", "drive"}};
+  const std::size_t cells = tile.cell_begin.size() - 1;
+  const TileLayer floor{
+      .altitude_mm = 1'500, .sigma_100um = 4, .occupancy = -64, .flags = 7, .observations = 9};
+  tile.layers.assign(cells, floor);
+  for (std::size_t cell = 0; cell < cells; ++cell) {
+    tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(cell + 1);
+  }
+  tile.layers[cells / 2] = {
+      .altitude_mm = 1'500, .sigma_100um = 4, .occupancy = 64, .observations = 9, .column = 0xFFF};
+  return EncodeTile(tile, profile).blob;
+}
+
+}  // namespace
+
 std::vector<Bytes> TileSeeds() {
   const MapProfile profile = TileProfile();
   const Tile full = testing::RandomTile({0, -7, 12}, profile, 5);
@@ -82,8 +103,8 @@ std::vector<Bytes> TileSeeds() {
   one.layers = {TileLayer{.altitude_mm = -1'200, .sigma_100um = 4, .flags = 7, .observations = 3}};
   std::fill(one.cell_begin.begin() + 100, one.cell_begin.end(), 1u);
   const Bytes blob = EncodeTile(full, profile).blob;
-  return {blob, EncodeTile(one, profile).blob,
-          SelectSections(blob, SectionMask{0b110}).value()};  // contributors and surface
+  return {blob, EncodeTile(one, profile).blob, SelectSections(blob, SectionMask{0b110}).value(),
+          FlatTile()};  // contributors and surface
 }
 
 }  // namespace atlas::fuzz
