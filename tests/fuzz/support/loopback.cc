@@ -35,12 +35,17 @@ void Prepare(int fd) {
 }  // namespace
 
 LoopbackSocket LoopbackSocket::Connect(std::uint16_t port) {
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  Prepare(fd);
   const sockaddr_in address = AddressOf(port);
-  Require(::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0,
-          "there is somebody to connect to");
-  return LoopbackSocket(fd);
+  while (true) {
+    const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    Prepare(fd);
+    if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+      return LoopbackSocket(fd);
+    }
+    const bool is_interrupted = errno == EINTR;  // by a fuzzer's clock
+    ::close(fd);
+    Require(is_interrupted, "there is somebody to connect to");
+  }
 }
 
 LoopbackSocket::~LoopbackSocket() {

@@ -104,7 +104,7 @@ std::vector<Bytes> TileSeeds() {
   std::fill(one.cell_begin.begin() + 100, one.cell_begin.end(), 1u);
   const Bytes blob = EncodeTile(full, profile).blob;
   return {blob, EncodeTile(one, profile).blob, SelectSections(blob, SectionMask{0b110}).value(),
-          FlatTile()};  // contributors and surface
+          FlatTile()};
 }
 
 }  // namespace atlas::fuzz
