@@ -28,7 +28,7 @@ fuzz_one() {
   local program=build/fuzz/bin/fuzz_$target corpus=build/fuzz/corpus/$target
   local committed=tests/fuzz/corpus/$target
   mkdir -p "$corpus"
-  "$program" --write-seeds "$corpus"
+  "$program" --write-seeds "$corpus" || return 1
   [[ -d $committed ]] || committed=
   ASAN_OPTIONS=quarantine_size_mb=16:allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1 \
     "$program" -max_total_time="$seconds" -max_len=65536 -timeout=10 -rss_limit_mb=512 -print_final_stats=1 \
