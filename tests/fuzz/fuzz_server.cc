@@ -49,14 +49,16 @@ class Daemon {
   std::future<void> run_;
 };
 
+// What its threads use to their end is there before the first daemon, and goes after the last.
+bool PrepareLibraries() {
+  UseStrictLog();
+  return OPENSSL_init_crypto(0, nullptr) == 1;
+}
+
 std::uint16_t PortOfDaemon() {
-  // OpenSSL goes after the last daemon, whose threads may still count a digest.
-  [[maybe_unused]] static const int kFirst = OPENSSL_init_crypto(0, nullptr);
+  [[maybe_unused]] static const bool kIsPrepared = PrepareLibraries();
   static std::unique_ptr<Daemon> daemon;
   static int inputs = 0;
-  if (inputs == 0) {
-    UseStrictLog();
-  }
   if (inputs++ % kInputsADaemon == 0) {
     daemon.reset();
     daemon = std::make_unique<Daemon>();
