@@ -50,9 +50,10 @@ class Daemon {
 };
 
 // What its threads use to their end is there before the first daemon, and goes after the last.
+// OpenSSL registers what takes it apart when it is asked for something that it has not done yet.
 bool PrepareLibraries() {
   UseStrictLog();
-  return OPENSSL_init_crypto(0, nullptr) == 1;
+  return OPENSSL_init_crypto(OPENSSL_INIT_ADD_ALL_DIGESTS, nullptr) == 1;
 }
 
 std::uint16_t PortOfDaemon() {
