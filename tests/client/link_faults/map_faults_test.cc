@@ -21,7 +21,7 @@ using std::chrono::seconds;
 constexpr std::uint32_t kSeed = 20'263;
 constexpr std::uint32_t kRounds = 12;
 constexpr seconds kPatience{60};
-// What a cut costs is what had come of a frame, and a handshake: 2 % more, measured.
+// What a cut costs is what had come of a frame, and a handshake: 2 % to 12 % more, measured.
 // Who began again each time would pay several times as much.
 constexpr double kMostBytes = 1.3;
 
