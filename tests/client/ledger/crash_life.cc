@@ -27,10 +27,8 @@ constexpr std::uint32_t kMostUp_ms = 400;
 constexpr std::uint32_t kStartsOfOneKilled = 5;
 constexpr std::uint32_t kKillsOfOneVehicle = 3;
 
-const std::vector<std::string>& Flags() {
-  static const std::vector<std::string> flags = {"--cell-size", "0.2",         "--workers",
-                                                 "2",           "--log-level", "error"};
-  return flags;
+std::vector<std::string> Flags() {
+  return {"--cell-size", "0.2", "--workers", "2", "--log-level", "error"};
 }
 
 bool IsFree(std::uint16_t port) {
@@ -167,7 +165,7 @@ void CrashLife::Check(bool is_last) {
 Bytes CrashLife::DigestAfter(DaemonProcess& daemon, bool is_last) {
   AtlasClient client = Await(daemon);
   if (is_last) SendSpools(client);
-  const Bytes digest = ValueOf(client.Digest(kPatience)).sha256;
+  Bytes digest = ValueOf(client.Digest(kPatience)).sha256;
   if (is_last) {
     const VerifySummary verified = ValueOf(client.Verify(true, kPatience));
     figures_.digest_mismatches += verified.damaged + verified.mismatched;

@@ -27,7 +27,7 @@ KeyframeKey FleetKey(int vehicle, const FrameId& frame) {
   return {FleetSession(vehicle, frame.session), frame.sequence};
 }
 
-std::int64_t FleetTime_ms(const FrameId& frame) {
+std::int64_t FleetTime(const FrameId& frame) {
   return 1'700'000'000'000 + 1'000'000 * std::int64_t{frame.session} + 100 * frame.sequence;
 }
 

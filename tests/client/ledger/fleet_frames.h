@@ -26,7 +26,7 @@ MapProfile FleetProfile();  // cells of 0.2 m
 
 SessionKey FleetSession(int vehicle, std::uint32_t session);
 KeyframeKey FleetKey(int vehicle, const FrameId& frame);
-std::int64_t FleetTime_ms(const FrameId& frame);
+std::int64_t FleetTime(const FrameId& frame);  // ms since 1970
 // Version 0 is the one that it is uploaded with, others are corrections: all differ.
 QuantizedPose FleetPose(int vehicle, const FrameId& frame, std::uint32_t version);
 Bytes FleetBlob(const KeyframeKey& key);

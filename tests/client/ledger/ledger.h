@@ -49,9 +49,9 @@ struct LedgerState {
   void Apply(std::string_view line);
 
  private:
-  void ApplyToFrame(std::string_view word, const FrameId& frame);
+  void ApplyToFrame(std::string_view word, const FrameId& id);
   void ApplyToPoses(std::string_view word, std::string_view rest);
-  void ApplyToSession(std::string_view word, std::uint32_t session);
+  void ApplyToSession(std::string_view word, std::uint32_t number);
 };
 
 class Ledger {

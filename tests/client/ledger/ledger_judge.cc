@@ -43,7 +43,7 @@ void LedgerJudge::JudgeFrames(int vehicle, const LedgerState& ledger, const Spoo
     known_.insert(key);
     const auto stored = atlas_.frames.find(key);
     if (stored != atlas_.frames.end()) {
-      const bool is_as_sent = stored->second.time_ms == FleetTime_ms(id) &&
+      const bool is_as_sent = stored->second.time_ms == FleetTime(id) &&
                               stored->second.blob_hash == Hash64(FleetBlob(key));
       if (!is_as_sent) Note(verdict_.altered, StrCat(key, " is not what was sent"));
     } else if (frame.is_acknowledged) {
@@ -71,9 +71,10 @@ void LedgerJudge::JudgePoses(int vehicle, const LedgerState& ledger) {
     if (stored == atlas_.frames.end()) continue;
     std::vector<std::uint32_t>& possible = versions[id];
     possible.insert(possible.begin(), 0);
-    const auto found = std::find_if(possible.rbegin(), possible.rend(), [&](std::uint32_t version) {
-      return FleetPose(vehicle, id, version) == stored->second.pose;
-    });
+    const auto is_at = [&, &frame_id = id](std::uint32_t version) {
+      return FleetPose(vehicle, frame_id, version) == stored->second.pose;
+    };
+    const auto found = std::find_if(possible.rbegin(), possible.rend(), is_at);
     if (found == possible.rend() || *found < at_least[id]) {
       Note(verdict_.misplaced, StrCat(stored->first, " is not at version ", at_least[id]));
     } else {
@@ -81,14 +82,13 @@ void LedgerJudge::JudgePoses(int vehicle, const LedgerState& ledger) {
     }
   }
   for (const auto& [version, batch] : ledger.batches) {
-    const auto has_it = [&](const FrameId& id) {
-      return stands[id] == version;
-    };
-    const auto has_none_since = [&](const FrameId& id) {
-      return stands[id] < version;
-    };
-    if (std::any_of(batch.frames.begin(), batch.frames.end(), has_it) &&
-        std::any_of(batch.frames.begin(), batch.frames.end(), has_none_since)) {
+    bool has_happened = false;
+    bool is_missing = false;
+    for (const FrameId& id : batch.frames) {
+      has_happened |= stands[id] == version;
+      is_missing |= stands[id] < version;
+    }
+    if (has_happened && is_missing) {
       Note(verdict_.torn, StrCat("car", vehicle, ": batch ", version, " happened in part"));
     }
   }

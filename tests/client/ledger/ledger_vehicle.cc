@@ -60,7 +60,7 @@ void LedgerVehicle::MakeLink() {
 Status LedgerVehicle::Run() {
   while (true) {
     const bool was_connected = link_->is_connected();
-    const Status status = Step();
+    Status status = Step();
     if (!status.ok() && !IsOfTheLink(status)) {
       ledger_.Write(StrCat("wrong ", StatusCodeName(status.code()), ": ", status.message()));
       return status;
@@ -111,7 +111,6 @@ Status LedgerVehicle::Step() {
   if (!client) return spool_ && IsOfTheLink(client.error()) ? Put() : client.error();
   switch (Below(8)) {
     case 0:
-      return MovePoses(**client);
     case 1:
       return MovePoses(**client);
     case 2:
@@ -124,8 +123,8 @@ Status LedgerVehicle::Step() {
 }
 
 KeyframeUpload LedgerVehicle::UploadOf(const FrameId& frame, ByteSpan blob) const {
-  return {FleetKey(options_.number, frame), FleetTime_ms(frame),
-          FleetPose(options_.number, frame, 0), blob};
+  return {FleetKey(options_.number, frame), FleetTime(frame), FleetPose(options_.number, frame, 0),
+          blob};
 }
 
 std::vector<FrameId> LedgerVehicle::Unanswered() const {

@@ -26,9 +26,8 @@ constexpr std::uint32_t kSeed = 20'262;
 constexpr std::uint32_t kFramesOfAVehicle = 96;
 constexpr int kVehicles = 6;
 
-const std::vector<std::string>& Flags() {
-  static const std::vector<std::string> flags = {"--cell-size", "0.2", "--log-level", "error"};
-  return flags;
+std::vector<std::string> Flags() {
+  return {"--cell-size", "0.2", "--log-level", "error"};
 }
 
 std::vector<FrameId> Frames() {
@@ -90,7 +89,7 @@ class UploadFaultsTest : public ::testing::Test {
         const KeyframeKey key = FleetKey(vehicle, frame);
         ASSERT_TRUE(atlas.frames.contains(key)) << key;
         const StoredFrame& stored = atlas.frames.at(key);
-        EXPECT_EQ(stored.time_ms, FleetTime_ms(frame)) << key;
+        EXPECT_EQ(stored.time_ms, FleetTime(frame)) << key;
         EXPECT_EQ(stored.pose, FleetPose(vehicle, frame, 0)) << key;
         EXPECT_EQ(stored.blob_hash, Hash64(FleetBlob(key))) << key;
       }

@@ -15,7 +15,7 @@ using std::chrono::milliseconds;
 constexpr std::size_t kFramesAtOnce = 24;
 
 KeyframeUpload UploadOf(const KeyframeKey& key, const FrameId& frame, int vehicle, ByteSpan blob) {
-  return {key, FleetTime_ms(frame), FleetPose(vehicle, frame, 0), blob};
+  return {key, FleetTime(frame), FleetPose(vehicle, frame, 0), blob};
 }
 
 bool IsOfTheLink(StatusCode code) {

@@ -75,7 +75,7 @@ void CloseByReset(int socket) {
   close(socket);
 }
 
-int PollTime_ms(std::chrono::steady_clock::time_point due) {
+int PollTime(std::chrono::steady_clock::time_point due) {
   if (due == std::chrono::steady_clock::time_point::max()) return -1;
   const auto wait =
       std::chrono::ceil<std::chrono::milliseconds>(due - std::chrono::steady_clock::now());
@@ -199,7 +199,7 @@ void LinkProxy::Wait() {
     }
     due = std::min(due, connection->due());
   }
-  poll(events.data(), events.size(), PollTime_ms(due));
+  poll(events.data(), events.size(), PollTime(due));
 }
 
 void LinkProxy::Accept() {
