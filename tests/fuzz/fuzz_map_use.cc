@@ -101,12 +101,8 @@ bool Run(ByteSpan blob) {
   return true;
 }
 
-Bytes Mutate(ByteSpan input, std::size_t max_size, Random& random) {
-  return MutatePacked(input, max_size, random, TilePacking());
-}
-
 }  // namespace
 
-const Target kTarget{&TileSeeds, &Run, &Mutate};
+const Target kTarget{&TileSeeds, &Run, &MutateTile};
 
 }  // namespace atlas::fuzz

@@ -66,8 +66,8 @@ void SealTileHeader(Bytes& blob) {
             blob.begin() + static_cast<std::ptrdiff_t>(header));
 }
 
-Packing TilePacking() {
-  return {&Unpack, &Pack, &SealTileHeader};
+Bytes MutateTile(ByteSpan blob, std::size_t max_size, Random& random) {
+  return MutatePacked(blob, max_size, random, {&Unpack, &Pack, &SealTileHeader});
 }
 
 MapProfile TileProfile() {

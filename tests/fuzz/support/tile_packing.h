@@ -6,7 +6,8 @@
 
 namespace atlas::fuzz {
 
-Packing TilePacking();
+// Goes behind its compression and its checksums.
+Bytes MutateTile(ByteSpan blob, std::size_t max_size, Random& random);
 // The header's checksum, over a table of as many sections as it says.
 void SealTileHeader(Bytes& blob);
 // Of 16 x 16 cells.
