@@ -95,7 +95,7 @@ std::optional<Bytes> MutateWireBlob(const google::protobuf::FieldDescriptor& fie
     return MutatePacked(blob, kMaxBlobBytes, random, KeyframePacking());
   }
   if (field.containing_type() == wire::TileMessage::descriptor()) {
-    return MutatePacked(blob, kMaxBlobBytes, random, TilePacking());
+    return MutateTile(blob, kMaxBlobBytes, random);
   }
   return std::nullopt;
 }
