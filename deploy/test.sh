@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize] [--long]
-#   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, and TSan over
-#               the tests labelled threads
+#   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, TSan over
+#               the tests labelled threads, and 10 s of each fuzzer
 #   --long      ten times as many random worlds in the tests that make them, the same payloads from
 #               g++ and clang++, and clang-tidy over all sources
 set -euo pipefail
@@ -51,6 +51,7 @@ if ((sanitize)); then
   export ATLAS_TEST_SCALE=0.1
   run asan all -L 'unit|integration' -LE data
   run tsan threads_tests -L threads
+  deploy/fuzz.sh 10
 fi
 if ((long)); then
   deploy/compilers.sh

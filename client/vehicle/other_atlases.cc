@@ -28,7 +28,7 @@ bool EachFile(const fs::path& folder, std::error_code& error, const OnFile& on_f
 OtherAtlases::OtherAtlases(const fs::path& root, const fs::path& open) {
   for (const fs::path& folder : AtlasFolders(root)) {
     if (folder == open) continue;
-    Other& other = others_.emplace_back(folder, 0);
+    Other& other = others_.emplace_back(Other{folder, 0});
     std::error_code ignored;  // it counts as much as was found
     EachFile(folder, ignored, [&](const fs::path&, std::uint64_t bytes) {
       other.bytes += bytes;

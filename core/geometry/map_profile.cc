@@ -111,7 +111,11 @@ void EncodeOrigin(const std::optional<GeodeticOrigin>& origin, ByteWriter& out) 
 }
 
 std::optional<GeodeticOrigin> DecodeOrigin(ByteReader& in) {
-  if (in.U8() == 0) {
+  const std::uint8_t has_origin = in.U8();
+  if (has_origin > 1) {
+    in.Fail();  // equal profiles have equal bytes
+  }
+  if (has_origin == 0) {
     return std::nullopt;
   }
   GeodeticOrigin origin;
@@ -215,7 +219,8 @@ Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
   profile.driven_hold_ms = in.U32();
   profile.origin = DecodeOrigin(in);
   if (!in.ok() || in.remaining() != 0) {
-    return Error(StatusCode::kInvalidData, "map profile: truncated or has trailing bytes");
+    return Error(StatusCode::kInvalidData,
+                 "map profile: truncated, has trailing bytes or a has_origin above 1");
   }
   if (Status status = profile.Validate(); !status.ok()) {
     return Error(StatusCode::kInvalidData, status.message());

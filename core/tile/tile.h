@@ -33,6 +33,10 @@ struct TileLayer {
   friend bool operator==(const TileLayer&, const TileLayer&) = default;
 };
 
+// No layer lies higher or lower: poses end at 20 km (pose.h), and a keyframe reaches less than 100
+// m above and below. Whoever reads a tile may subtract.
+inline constexpr std::int32_t kMaxAltitude_mm = 25'000'000;
+
 // No cell holds more layers: a bound on what hostile vehicles can make of a tile. Where more are
 // found, those with the most observations stay, the lower one of two equals.
 inline constexpr std::size_t kMaxCellLayers = 16;

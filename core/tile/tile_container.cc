@@ -104,7 +104,11 @@ Result<Bytes> MergeSections(ByteSpan blob, ByteSpan added) {
       std::unique(sections.begin(), sections.end(),
                   [](const RawSection& a, const RawSection& b) { return a.id == b.id; });
   sections.erase(end, sections.end());
-  return WriteRaw(*merged, kTileMagic);
+  Bytes both = WriteRaw(*merged, kTileMagic);
+  if (const auto read = ReadRaw(both, kTileMagic); !read) {  // more than a blob holds
+    return Error(read.error());
+  }
+  return both;
 }
 
 }  // namespace atlas

@@ -38,7 +38,7 @@ inline constexpr SectionMask kAllSections = ~SectionMask{0};
 // header, not the sections. Errors as DecodeContainer.
 Result<Bytes> SelectSections(ByteSpan blob, SectionMask sections);
 // The blob with the sections of both, those of `added` where both have one. kInvalidArgument: they
-// are of different tiles.
+// are of different tiles. kInvalidData: together they are more than a blob holds.
 Result<Bytes> MergeSections(ByteSpan blob, ByteSpan added);
 
 // Verifies every checksum and size. kUnsupported on another version, kInvalidData otherwise.

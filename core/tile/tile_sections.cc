@@ -139,9 +139,10 @@ Status CheckLayers(const Tile& tile) {
     }
   }
   const bool is_valid = std::all_of(tile.layers.begin(), tile.layers.end(), [](const auto& l) {
-    return (l.flags & ~kKnownFlags) == 0 && l.sigma_100um != 0;
+    return (l.flags & ~kKnownFlags) == 0 && l.sigma_100um != 0 &&
+           l.altitude_mm >= -kMaxAltitude_mm && l.altitude_mm <= kMaxAltitude_mm;
   });
-  return is_valid ? Status() : Damaged("a layer has unknown flags or no sigma");
+  return is_valid ? Status() : Damaged("a layer has unknown flags, no sigma or is off the world");
 }
 
 }  // namespace

@@ -65,12 +65,41 @@ class ShapeCheck {
     }
     const bool is_blob = field != nullptr && field->type() == FieldDescriptor::TYPE_BYTES;
     const int begin = in_.CurrentPosition();
-    if (!WireFormatLite::SkipField(&in_, tag)) {
+    if (field != nullptr && wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED &&
+        HasVarints(*field)) {
+      ATLAS_RETURN_IF_ERROR(PackedVarints());
+    } else if (!WireFormatLite::SkipField(&in_, tag)) {
       return Malformed();
     }
     bytes_left_ -= is_blob ? 1 : 1 + in_.CurrentPosition() - begin;
     return bytes_left_ >= 0 ? Status()
                             : Status(StatusCode::kResourceExhausted, "envelope: more than blobs");
+  }
+
+  static bool HasVarints(const FieldDescriptor& field) {
+    return field.is_packable() && WireFormatLite::WireTypeForFieldType(
+                                      static_cast<WireFormatLite::FieldType>(field.type())) ==
+                                      WireFormatLite::WIRETYPE_VARINT;
+  }
+
+  // Numbers of one byte take up to eight in memory. Those of fixed size take what they came in.
+  Status PackedVarints() {
+    int size = 0;
+    if (!in_.ReadVarintSizeAsInt(&size)) {
+      return Malformed();
+    }
+    const CodedInputStream::Limit limit = in_.PushLimit(size);
+    while (in_.BytesUntilLimit() > 0) {
+      std::uint64_t number = 0;
+      if (!in_.ReadVarint64(&number)) {
+        return Malformed();
+      }
+      if (++repeated_ > kMaxRepeatedFields) {
+        return TooMany("elements", kMaxRepeatedFields);
+      }
+    }
+    in_.PopLimit(limit);
+    return {};
   }
 
   Status Nested(const Descriptor& type) {

@@ -12,7 +12,8 @@ namespace atlas {
 
 namespace wire = roadatlas::v1;
 
-// Elements of one repeated field in one envelope: poses of a batch, sessions of a reply.
+// Elements of repeated fields in one envelope: poses of a batch, sessions of a reply. Packed
+// numbers of fixed size are not counted: they take no more room than they came in.
 inline constexpr std::uint32_t kMaxRepeatedFields = 1u << 18;
 // Fields this build does not know, in one envelope; they are skipped and dropped.
 inline constexpr std::uint32_t kMaxUnknownFields = 1024;

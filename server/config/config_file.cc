@@ -1,5 +1,6 @@
 #include "server/config/config_file.h"
 
+#include <cstdint>
 #include <system_error>
 #include <utility>
 
@@ -9,6 +10,11 @@
 
 namespace atlas {
 namespace {
+
+// Ten times what a file with all settings and a line about each takes. toml++ puts tables into
+// tables along a key with dots, however many, and takes them apart by recursion: 30,000 of them are
+// more than a stack holds.
+constexpr std::uintmax_t kMaxBytes = 16u << 10;
 
 using Types = std::map<std::string, SettingType>;
 using Settings = std::map<std::string, GivenSetting>;
@@ -89,6 +95,11 @@ Result<Settings> ReadConfigFile(const std::filesystem::path& path, const Types& 
   if (std::filesystem::is_directory(path, ignored)) {  // which toml++ takes for an empty file
     return Error(StatusCode::kInvalidArgument,
                  StrCat(path.string(), " is a folder: expected a file"));
+  }
+  const std::uintmax_t size = std::filesystem::file_size(path, ignored);
+  if (!ignored && size > kMaxBytes) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat(path.string(), ": ", size, " bytes, expected at most ", kMaxBytes));
   }
   FlatFile file(path, types);
   try {

@@ -178,7 +178,13 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
     Begin(Greet(*std::move(envelope)));
     return {};
   }
-  const Status denied = CheckMayAsk(access_.identity(), *envelope);
+  Status denied = CheckMayAsk(access_.identity(), *envelope);
+  const std::size_t unfolded_bytes = UnfoldedBytes(*envelope, payload.size());
+  if (denied.ok() && unfolded_bytes > 0) {
+    denied = held_.TakeLarge(unfolded_bytes);
+    const auto more = denied.ok() ? HoldRequest(unfolded_bytes) : nullptr;
+    held = std::make_shared<std::pair<std::shared_ptr<const void>, decltype(more)>>(held, more);
+  }
   Begin(Answer({std::make_shared<wire::Envelope>(*std::move(envelope)), std::move(held)}, denied));
   return {};
 }

@@ -17,6 +17,8 @@ namespace asio = boost::asio;
 
 // What smaller ones leave free is used by the next ones.
 constexpr std::size_t kNotedBytes = 1u << 20;
+constexpr std::size_t kNeverMuchBytes = 512;  // of a frame: 40 KB at most
+constexpr std::size_t kUsualUnfolding = 8;    // poses with names
 // Of nice(1), behind threads that answer small ones: a third of what they get of a busy core.
 constexpr int kYield = 5;
 
@@ -32,6 +34,14 @@ std::size_t BytesOf(const Result<PoseBatchRequest>& poses) {
 }
 
 }  // namespace
+
+std::size_t UnfoldedBytes(const wire::Envelope& request, std::size_t frame_bytes) {
+  if (frame_bytes < kNeverMuchBytes || request.has_upload_keyframe()) {
+    return 0;
+  }
+  const std::size_t bytes = request.SpaceUsedLong();
+  return bytes > kUsualUnfolding * frame_bytes ? bytes : 0;
+}
 
 LargeRequests::LargeRequests(FreedMemory& freed) : freed_(freed) {
   asio::post(pool_, [] { YieldToOthers(kYield); });

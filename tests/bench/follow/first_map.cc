@@ -56,7 +56,9 @@ Result<std::vector<TileId>> FinestTiles(const FirstMapOptions& options) {
 class Vehicle {
  public:
   Vehicle(const FirstMapOptions& options, std::vector<TileId> finest)
-      : options_(options), finest_(std::move(finest)), slow_(options.daemon, options.link) {}
+      : options_(options),
+        finest_(std::move(finest)),
+        slow_(options.daemon, {.pace = options.link}) {}
 
   Result<FirstMap> Run() {
     LinkOptions link_options;
@@ -103,7 +105,7 @@ class Vehicle {
     if (!map) return map.error();
     if (!first_.covered_s && Covers(*map)) {
       first_.covered_s = Elapsed_s();
-      first_.covered_bytes = slow_.bytes_down();
+      first_.covered_bytes = slow_.totals().bytes_down;
     }
     if (map->finest_places == last_finest_) return {};
     last_finest_ = map->finest_places;
@@ -130,7 +132,7 @@ class Vehicle {
 
   const FirstMapOptions& options_;
   const std::vector<TileId> finest_;
-  SlowLink slow_;
+  LinkProxy slow_;
   Clock::time_point start_;
   FirstMap first_;
   std::uint64_t last_finest_ = 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -12,15 +13,15 @@
 #include "client/connection/sync_query.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
-#include "tests/bench/follow/slow_link.h"
+#include "tests/client/support/link_proxy.h"
 
 namespace atlas::testing {
 
 struct FirstMapOptions {
   Endpoint daemon;
-  SlowLinkOptions link;
-  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();   // of the sensor
-  Eigen::Vector3d target_m = Eigen::Vector3d::Zero();  // ahead, to be planned to
+  LinkPace link{256'000.0, std::chrono::milliseconds(50)};  // of a mobile network
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();        // of the sensor
+  Eigen::Vector3d target_m = Eigen::Vector3d::Zero();       // ahead, to be planned to
   double radius_m = 100.0;
   SectionBits sections = kEverySection;
 };

@@ -36,7 +36,7 @@ class ChangedTileTest : public VehicleTest {
 
   // What comes over the wire until the store is up to date.
   static ReplyFrames SyncRecorded(const DaemonProcess& daemon, TileStore& store) {
-    CutProxy proxy(*Endpoint::Parse(daemon.address()), CutProxy::kNever);
+    LinkProxy proxy(*Endpoint::Parse(daemon.address()), {.is_recorded = true});
     {
       AtlasClient client = Connect(proxy.endpoint());
       const auto report = SyncStore(client, store, Everywhere());

@@ -33,7 +33,7 @@ class CutReplyTest : public VehicleTest {
 
   // What the daemon sends to somebody who syncs this store.
   ReplyFrames Record(TileStore store, const SyncQuery& query) const {
-    CutProxy proxy(daemon(), CutProxy::kNever);
+    LinkProxy proxy(daemon(), {.is_recorded = true});
     {
       AtlasClient client = Connect(proxy.endpoint());
       EXPECT_TRUE(SyncStore(client, store, query));
@@ -44,8 +44,8 @@ class CutReplyTest : public VehicleTest {
   Result<StoreSyncReport> SyncCut(TileStore& store,
                                   const SyncQuery& query,
                                   std::int64_t bytes,
-                                  CutProxy::Cut cut = CutProxy::Cut::kClose) const {
-    CutProxy proxy(daemon(), bytes, cut);
+                                  LinkCut::Kind kind = LinkCut::Kind::kClose) const {
+    LinkProxy proxy(daemon(), CutAfter(bytes, kind));
     AtlasClient client = Connect(proxy.endpoint());
     return SyncStore(client, store, query);
   }
@@ -124,7 +124,7 @@ TEST_F(CutReplyTest, AResetInTheMiddleOfAFrameLosesThatFrame) {
     SCOPED_TRACE(i);
     TileStore store = EmptyStore();
     const std::int64_t middle = (frames.ends[i - 1] + frames.ends[i]) / 2;
-    EXPECT_FALSE(SyncCut(store, Everywhere(), middle, CutProxy::Cut::kReset));
+    EXPECT_FALSE(SyncCut(store, Everywhere(), middle, LinkCut::Kind::kReset));
     EXPECT_LE(store.size(), frames.arrived[i - 1]);
     ExpectIsMap(store);
     ExpectNextSyncCompletes(store);

@@ -64,32 +64,46 @@ pid_t Spawn(std::vector<std::string> arguments, int stdout_fd, int log_fd) {
 }  // namespace
 
 DaemonProcess::DaemonProcess(const std::filesystem::path& data,
+                             const std::string& listen,
                              const std::vector<std::string>& more_flags,
-                             Log log) {
+                             Log log)
+    : has_http_(std::find(more_flags.begin(), more_flags.end(), "--http") != more_flags.end()) {
   const Pipe out = MakePipe();
   const Pipe err = log == Log::kKept ? MakePipe() : Pipe();
-  std::vector<std::string> arguments = {ATLASD_PATH, "--data", data.string(), "--listen",
-                                        "127.0.0.1:0"};
+  std::vector<std::string> arguments = {ATLASD_PATH, "--data", data.string(), "--listen", listen};
   arguments.insert(arguments.end(), more_flags.begin(), more_flags.end());
   pid_ = Spawn(std::move(arguments), out.write_fd, err.write_fd);
   close(out.write_fd);
   if (err.write_fd >= 0) close(err.write_fd);
+  out_fd_ = out.read_fd;
   log_fd_ = err.read_fd;
-  const std::string line = ReadLine(out.read_fd);
-  address_ = Rest(line, "listening ");
-  if (std::find(more_flags.begin(), more_flags.end(), "--http") != more_flags.end()) {
-    http_address_ = Rest(ReadLine(out.read_fd), "http ");
-  }
-  close(out.read_fd);
-  if (address_.empty()) {
-    Stop(SIGKILL);
-    throw std::runtime_error("the daemon printed '" + line + "'");
-  }
+}
+
+DaemonProcess::DaemonProcess(const std::filesystem::path& data,
+                             const std::vector<std::string>& more_flags,
+                             Log log)
+    : DaemonProcess(data, "127.0.0.1:0", more_flags, log) {
+  const std::string printed = AwaitListening();
+  if (address_.empty()) throw std::runtime_error("the daemon printed '" + printed + "'");
+}
+
+DaemonProcess DaemonProcess::Begin(const std::filesystem::path& data,
+                                   const std::string& listen,
+                                   const std::vector<std::string>& more_flags) {
+  return {data, listen, more_flags, Log::kOfTheTest};
 }
 
 DaemonProcess::~DaemonProcess() {
   if (pid_ > 0) Stop(SIGKILL);
+  close(out_fd_);
   if (log_fd_ >= 0) close(log_fd_);
+}
+
+std::string DaemonProcess::AwaitListening() {
+  std::string line = ReadLine(out_fd_);
+  address_ = Rest(line, "listening ");
+  if (has_http_) http_address_ = Rest(ReadLine(out_fd_), "http ");
+  return line;
 }
 
 std::uint16_t DaemonProcess::PortOf(const std::string& address) {

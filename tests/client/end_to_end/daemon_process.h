@@ -18,11 +18,18 @@ class DaemonProcess {
   DaemonProcess(const std::filesystem::path& data,
                 const std::vector<std::string>& more_flags,
                 Log log = Log::kOfTheTest);
+  // On that HOST:PORT, and without waiting: AwaitListening does.
+  static DaemonProcess Begin(const std::filesystem::path& data,
+                             const std::string& listen,
+                             const std::vector<std::string>& more_flags);
   ~DaemonProcess();
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;
   DaemonProcess(DaemonProcess&&) = delete;
   DaemonProcess& operator=(DaemonProcess&&) = delete;
+
+  // The line that it prints then. Another one, and the address stays empty: it does not.
+  std::string AwaitListening();
 
   const std::string& address() const { return address_; }
   std::uint16_t port() const { return PortOf(address_); }
@@ -36,11 +43,17 @@ class DaemonProcess {
   int Stop(int signal);
 
  private:
+  DaemonProcess(const std::filesystem::path& data,
+                const std::string& listen,
+                const std::vector<std::string>& more_flags,
+                Log log);
   static std::uint16_t PortOf(const std::string& address);
 
   pid_t pid_ = -1;
   std::string address_;  // HOST:PORT, as is the next
   std::string http_address_;
+  bool has_http_ = false;
+  int out_fd_ = -1;
   int log_fd_ = -1;
 };
 

@@ -28,10 +28,10 @@ inline void WriteOverpass(const fs::path& folder) {
   ASSERT_TRUE(status.ok()) << status.message();
 }
 
-class EndToEndTest : public testing::Test {
+class EndToEndTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    shared_root = fs::path(testing::TempDir()) / ("atlas_end_to_end." + std::to_string(getpid()));
+    shared_root = fs::path(::testing::TempDir()) / ("atlas_end_to_end." + std::to_string(getpid()));
     fs::remove_all(shared_root);
     fs::create_directories(shared_root);
     WriteOverpass(shared_drive = shared_root / "overpass");

@@ -10,8 +10,8 @@
 
 #include "client/vehicle/atlas_view.h"
 #include "client/vehicle/store_sync.h"
-#include "tests/client/end_to_end/cut_proxy.h"
 #include "tests/client/end_to_end/end_to_end_fixture.h"
+#include "tests/client/support/link_proxy.h"
 
 namespace atlas {
 
@@ -28,6 +28,10 @@ class VehicleTest : public EndToEndTest {
   }
   static AtlasClient Connect(const DaemonProcess& daemon) {
     return Connect(*Endpoint::Parse(daemon.address()));
+  }
+  // A link that breaks when so many bytes came from the daemon.
+  static LinkPlan CutAfter(std::int64_t bytes, LinkCut::Kind kind = LinkCut::Kind::kClose) {
+    return {.down = {.after_bytes = bytes, .kind = kind}};
   }
   static AtlasLink LinkTo(const Endpoint& endpoint) {
     LinkOptions options;

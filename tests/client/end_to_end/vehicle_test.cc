@@ -78,7 +78,7 @@ TEST_F(VehicleTest, ACutReplyLeavesAMapAndTheNextSyncCompletesIt) {
   TileStore store = StoreFor(client);
   std::size_t held = 0;
   for (const std::int64_t bytes : {20'000, 40'000}) {
-    CutProxy proxy(*Endpoint::Parse(daemon.address()), bytes);
+    LinkProxy proxy(*Endpoint::Parse(daemon.address()), CutAfter(bytes));
     AtlasClient cut = Connect(proxy.endpoint());
     const auto report = SyncStore(cut, store, Everywhere());
     ASSERT_FALSE(report);
@@ -119,7 +119,7 @@ TEST_F(VehicleTest, AfterACutTheHandshakeSaysHowFarASessionIsThere) {
   };
   EXPECT_EQ(last_sequence("monday"), std::nullopt);
   {
-    CutProxy proxy(endpoint, 400);
+    LinkProxy proxy(endpoint, CutAfter(400));
     EXPECT_NE(ingest(proxy.endpoint().ToText()).exit_code, 0);
   }
   const auto cut = last_sequence("monday");

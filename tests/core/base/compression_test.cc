@@ -1,5 +1,6 @@
 #include "core/base/compression.h"
 
+#include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -32,6 +33,21 @@ TEST(CompressionTest, RefusesAnotherDeclaredSize) {
   const auto result = Decompress(frame, text.size() + 1);
   ASSERT_FALSE(result.has_value());
   EXPECT_EQ(result.error().code(), StatusCode::kInvalidData);
+}
+
+// 64 MiB in a few KB: what it says first decides, whether it is true or not.
+TEST(CompressionTest, ABombIsNoLargerThanItWasMeantToBe) {
+  constexpr std::uint32_t kBombBytes = 64u << 20;
+  constexpr std::uint32_t kExpectedBytes = 1'000;
+  Bytes bomb = Compress(Bytes(kBombBytes), 3);
+  ASSERT_LT(bomb.size(), 16u << 10);
+  EXPECT_EQ(Decompress(bomb, kExpectedBytes).error().code(), StatusCode::kInvalidData);
+  // The content size, 4 bytes behind magic, descriptor and window (RFC 8878, 3.1.1.1).
+  ASSERT_EQ(bomb[4] >> 5U, 0b100) << "a size of 4 bytes and a window";
+  ByteWriter lie;
+  lie.U32(kExpectedBytes);
+  std::copy(lie.bytes().begin(), lie.bytes().end(), bomb.begin() + 6);
+  EXPECT_EQ(Decompress(bomb, kExpectedBytes).error().code(), StatusCode::kInvalidData);
 }
 
 TEST(CompressionTest, RefusesTruncationAndTrailingBytes) {

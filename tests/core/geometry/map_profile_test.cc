@@ -46,6 +46,13 @@ TEST(MapProfileTest, RefusesTruncationTrailingBytesAndNewerVersions) {
   EXPECT_EQ(MapProfile::Decode(bytes).error().code(), StatusCode::kUnsupported);
 }
 
+TEST(MapProfileTest, HasOneEncoding) {
+  Bytes bytes = GoldenProfile().Encode();
+  constexpr std::size_t kOriginBytes = 3 * 8;
+  bytes[bytes.size() - kOriginBytes - 1] = 2;  // has_origin: as good as 1, but other bytes
+  EXPECT_EQ(MapProfile::Decode(bytes).error().code(), StatusCode::kInvalidData);
+}
+
 TEST(MapProfileTest, NamesTheFieldOutOfRange) {
   const std::vector<std::pair<const char*, std::function<void(MapProfile&)>>> cases = {
       {"cell size",

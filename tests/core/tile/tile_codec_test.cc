@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/compression.h"
 #include "core/base/hash.h"
+#include "core/tile/raw_container.h"
 #include "core/tile/tile_container.h"
 #include "core/tile/tile_sections.h"
 #include "tests/core/support/golden.h"
@@ -154,6 +156,57 @@ TEST(TileCodecTest, SectionsOfDifferentTilesDoNotGoTogether) {
     EXPECT_EQ(SelectSections(cut, kAllSections).error().code(), StatusCode::kInvalidData);
     EXPECT_EQ(MergeSections(a, cut).error().code(), StatusCode::kInvalidData);
   }
+}
+
+// Tables that lie, with a checksum that fits.
+TEST(TileCodecTest, RefusesTablesAboveTheLimits) {
+  const Bytes content = Compress({}, 1);
+  const auto code_of = [&content](std::size_t count, std::uint32_t uncompressed_bytes) {
+    RawContainer raw{TileId{}.Key(), SmallProfile().Hash(), 1, {}};
+    for (std::size_t i = 0; i < count; ++i) {
+      raw.sections.push_back(
+          {static_cast<std::uint16_t>(i), uncompressed_bytes, Hash64(content), content});
+    }
+    const auto container = DecodeContainer(WriteRaw(raw, kTileMagic));
+    return container ? StatusCode::kOk : container.error().code();
+  };
+  EXPECT_EQ(code_of(64, 0), StatusCode::kOk);
+  EXPECT_EQ(code_of(65, 0), StatusCode::kInvalidData);
+  EXPECT_EQ(code_of(1, 1), StatusCode::kInvalidData);  // it is empty
+  EXPECT_EQ(code_of(1, kMaxTileBytes + 1), StatusCode::kInvalidData);
+  EXPECT_EQ(code_of(2, kMaxTileBytes / 2 + 1), StatusCode::kInvalidData);  // of all together
+  EXPECT_EQ(code_of(2, UINT32_MAX), StatusCode::kInvalidData);
+}
+
+TEST(TileCodecTest, SectionsThatAreTooManyTogetherStayApart) {
+  const auto blob_of = [](std::uint16_t first) {
+    TileContainer container;
+    for (std::uint16_t id = first; id < first + 40; ++id) {
+      container.sections.push_back({id, {}});
+    }
+    return EncodeContainer(container);
+  };
+  EXPECT_TRUE(MergeSections(blob_of(0), blob_of(20)).has_value());  // 60
+  EXPECT_EQ(MergeSections(blob_of(0), blob_of(40)).error().code(), StatusCode::kInvalidData);
+}
+
+// Poses end at 20 km: nothing that reads a tile need fear for its sums.
+TEST(TileCodecTest, RefusesLayersOffTheWorld) {
+  const Tile tile = RandomTile({0, 0, 0}, SmallProfile(), 13);
+  const auto code_at = [&tile](std::int32_t altitude_mm) {
+    Tile moved = tile;
+    moved.cell_begin.assign(moved.cell_begin.size(), 1);
+    moved.cell_begin[0] = 0;
+    moved.layers.resize(1);
+    moved.layers[0].altitude_mm = altitude_mm;
+    return DecodeError(EncodeTile(moved, SmallProfile()).blob);
+  };
+  for (const std::int32_t sign : {-1, 1}) {
+    EXPECT_EQ(code_at(sign * kMaxAltitude_mm), StatusCode::kOk);
+    EXPECT_EQ(code_at(sign * (kMaxAltitude_mm + 1)), StatusCode::kInvalidData);
+    EXPECT_EQ(code_at(sign * INT32_MAX), StatusCode::kInvalidData);
+  }
+  EXPECT_EQ(code_at(INT32_MIN), StatusCode::kInvalidData);
 }
 
 TEST(TileCodecTest, RefusesSectionsThatLie) {

@@ -113,6 +113,40 @@ TEST(EnvelopeTest, CapsElementsSpreadOverSeveralBodies) {
   EXPECT_EQ(ParseCode(Repeat(half, 2)), StatusCode::kInvalidData);
 }
 
+// A byte each on the wire, four or eight in memory.
+TEST(EnvelopeTest, CapsPackedNumbersToo) {
+  const auto code_of = [](std::uint32_t sections, std::uint32_t revisions) {
+    wire::Envelope envelope;
+    envelope.mutable_query_region()->mutable_sections()->Resize(static_cast<int>(sections), 1);
+    const std::string query = envelope.SerializeAsString();
+    envelope.mutable_sync_manifest()->mutable_revisions()->Resize(static_cast<int>(revisions), 1);
+    const std::string manifest = envelope.SerializeAsString();
+    Bytes payload(query.begin(), query.end());
+    payload.insert(payload.end(), manifest.begin(), manifest.end());
+    return ParseCode(payload);
+  };
+  EXPECT_EQ(code_of(kMaxRepeatedFields - 1, 0), StatusCode::kOk);  // the field counts as one
+  EXPECT_EQ(code_of(kMaxRepeatedFields, 0), StatusCode::kInvalidData);
+  EXPECT_EQ(code_of(0, kMaxRepeatedFields), StatusCode::kInvalidData);
+  EXPECT_EQ(code_of(kMaxRepeatedFields / 2, kMaxRepeatedFields / 2), StatusCode::kInvalidData);
+}
+
+// What a client may hold and ask for at most is in no envelope too much.
+TEST(EnvelopeTest, PackedKeysAreNotCounted) {
+  wire::Envelope envelope;
+  for (int i = 0; i < 2; ++i) {
+    envelope.mutable_sync_request()->add_held()->mutable_keys()->Resize(kMaxRepeatedFields, 7);
+  }
+  const std::string text = envelope.SerializeAsString();
+  EXPECT_EQ(ParseCode(Bytes(text.begin(), text.end())), StatusCode::kOk);
+}
+
+TEST(EnvelopeTest, RefusesPackedNumbersThatAreCut) {
+  const Bytes sections = {0x4A, 0x04, 0x32,
+                          0x02, 0x01, 0x80};  // query_region, sections: 1 and half
+  EXPECT_EQ(ParseCode(sections), StatusCode::kInvalidData);
+}
+
 TEST(EnvelopeTest, AKeyframeIsSmallButForItsBlob) {
   const auto payload_of = [](const wire::Envelope& envelope) {
     Bytes frame = EncodeEnvelopeFrame(envelope).value();

@@ -124,6 +124,25 @@ TEST_F(DaemonConfigTest, AFolderIsNoConfigurationFile) {
               HasSubstr("is a folder"));
 }
 
+// Brackets, and keys of tables within tables: as many as there is room for, and more.
+TEST_F(DaemonConfigTest, AFileHoweverDeepIsRefused) {
+  const auto repeated = [](std::string_view text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) {
+      all += text;
+    }
+    return all;
+  };
+  EXPECT_THAT(RefusedFile("x = " + repeated("[", 8'000)), HasSubstr("line 1"));
+  EXPECT_THAT(RefusedFile("x" + repeated(".x", 8'000) + " = 1"), HasSubstr("unknown key 'x'"));
+  for (const int deep : {16'000, 100'000}) {
+    EXPECT_THAT(RefusedFile("x" + repeated(".x", deep) + " = 1"),
+                HasSubstr("bytes, expected at most 16384"));
+    EXPECT_THAT(RefusedFile("[x" + repeated(".x", deep) + "]"),
+                HasSubstr("bytes, expected at most 16384"));
+  }
+}
+
 TEST_F(DaemonConfigTest, AValueOfAnotherTypeIsAnErrorWithItsLine) {
   EXPECT_THAT(RefusedFile("data = '/x'\nworkers = '3'\n"),
               HasSubstr("line 2: 'workers': expected a number"));

@@ -149,6 +149,41 @@ TEST_F(LargeRequestTest, CountsAsWhatIsMadeOfIt) {
   ExpectHoldsNothing();
 }
 
+// Groups of held tiles without a tile: two bytes each on their way, a hundred and more in memory.
+TEST_F(LargeRequestTest, ASmallOneCountsAsWhatItUnfoldsTo) {
+  constexpr std::size_t kUnfoldedBytes = 700'000;
+  net_.max_held_bytes = 3 * kUnfoldedBytes;
+  Serve(0);  // nothing is ever fused: whoever waits for a revision holds his request
+  UploadDrive(1);
+  wire::Envelope sync = SyncOf(7, false);
+  for (int i = 0; i < 7'000; ++i) {
+    sync.mutable_sync_request()->add_held();
+  }
+  sync.mutable_sync_request()->set_wait_revision(1);
+  sync.mutable_sync_request()->set_timeout_ms(60'000);
+  ASSERT_LT(sync.ByteSizeLong(), net_.large_frame_bytes);
+  const auto waiting = Connect();
+  waiting->Send(sync);
+  const auto deadline = Clock::now() + std::chrono::seconds(30);
+  while (server_->ReadFigures().held_bytes < kUnfoldedBytes && Clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_GT(server_->ReadFigures().held_bytes, kUnfoldedBytes);
+  const auto others = Connect();
+  std::size_t refused = 0;
+  for (std::uint64_t id = 8; id < 11; ++id) {
+    sync.set_request_id(id);
+    others->Send(sync);
+    others->Send(CancelOf(100 + id));
+    const auto reply = others->Receive();
+    refused += CodeOf(reply) == StatusCode::kResourceExhausted ? 1U : 0U;
+    if (!reply->has_cancel_reply()) {
+      EXPECT_TRUE(others->Receive()->has_cancel_reply()) << "the connection goes on";
+    }
+  }
+  EXPECT_GT(refused, 0U);
+}
+
 // A keyframe that there was no room for is missing, as one that was refused later would be: those
 // behind it wait for it.
 TEST_F(LargeRequestTest, BehindAKeyframeWithoutRoomNothingIsTaken) {

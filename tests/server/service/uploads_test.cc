@@ -1,8 +1,14 @@
 // What is accepted and what is refused before it can do harm.
+#include <gmock/gmock.h>
+
+#include "core/base/str_cat.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace atlas {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 class UploadTest : public ServiceTest {
  protected:
@@ -40,6 +46,53 @@ TEST_F(UploadTest, RefusesNamesTimesAndPosesThatAreNone) {
   request.pose.x_um = INT64_MAX;
   EXPECT_EQ(UploadCode(request), StatusCode::kInvalidData);
   EXPECT_EQ(service_->ReadStatus()->counts.keyframes, 1u);
+}
+
+TEST_F(UploadTest, TimesThatCannotBeAreNamed) {
+  constexpr std::int64_t kYear2100_ms = 4'102'444'800'000;
+  for (const std::int64_t time_ms : {INT64_MIN, std::int64_t{-1}, kYear2100_ms, INT64_MAX}) {
+    UploadRequest request = DriveUpload(0);
+    request.time_ms = time_ms;
+    const auto put = Upload(std::move(request));
+    ASSERT_FALSE(put.has_value()) << time_ms;
+    EXPECT_EQ(put.error().code(), StatusCode::kInvalidData);
+    EXPECT_THAT(put.error().message(), HasSubstr(StrCat("keyframe bus/day/0: time is ", time_ms)));
+  }
+}
+
+// Farther than any map goes, each coordinate by itself.
+TEST_F(UploadTest, PlacesOffTheWorldAreNamed) {
+  const auto refusal = [this](std::int64_t QuantizedPose::*coordinate, std::int64_t um) {
+    UploadRequest request = DriveUpload(0);
+    request.pose.*coordinate = um;
+    const auto put = Upload(std::move(request));
+    EXPECT_EQ(put ? StatusCode::kOk : put.error().code(), StatusCode::kInvalidData) << um;
+    return put ? std::string() : put.error().message();
+  };
+  for (const auto coordinate : {&QuantizedPose::x_um, &QuantizedPose::y_um, &QuantizedPose::z_um}) {
+    for (const std::int64_t um : {INT64_MIN, -10'000'000'000'001, 10'000'000'000'001, INT64_MAX}) {
+      EXPECT_THAT(refusal(coordinate, um), AllOf(HasSubstr("keyframe bus/day/0"), HasSubstr("km")));
+    }
+  }
+}
+
+// A continent away is a place like any other: it makes its own tiles, and none in between.
+TEST_F(UploadTest, AContinentAwayIsOnTheMap) {
+  Open(1);
+  UploadDrive(1);
+  const std::uint64_t tiles_here = [this] {
+    Digest();
+    return service_->ReadStatus()->counts.tiles;
+  }();
+  UploadRequest far = DriveUpload(1);
+  far.pose.x_um = 9'999'900'000'000;
+  far.pose.y_um = -9'999'900'000'000;
+  ASSERT_TRUE(Upload(std::move(far)).has_value());
+  Digest();
+  EXPECT_LE(service_->ReadStatus()->counts.tiles, 3 * tiles_here);
+  ASSERT_TRUE(Change("day", SessionAction::kRetract).has_value());
+  Digest();
+  EXPECT_EQ(service_->ReadStatus()->counts.tiles, 0u);
 }
 
 TEST_F(UploadTest, RefusesDamagedAndForeignBlobs) {
