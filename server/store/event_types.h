@@ -22,7 +22,11 @@ enum class EventKind : std::uint8_t {
   kSessionPurged = 12,
   kBackupRestored = 13,
   kUpgraded = 14,  // from an earlier version of the schema
+  kCountersRestored = 15,
 };
+
+// The author of what nobody asked for.
+inline constexpr const char* kAtlasItself = "atlasd";
 
 struct Event {
   std::uint64_t id = 0;        // 1, 2, 3, ...

@@ -366,13 +366,15 @@ Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& opt
   return directory.Publish();
 }
 
-// A lost mark is a tile that is wrong for ever: what is not sure is marked again.
-void RestoreMarks(Connection& writer, std::uint8_t levels) {
+// What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
+// marked again.
+void Mend(Connection& writer, std::uint8_t levels) {
+  writer.Execute("BEGIN IMMEDIATE");
+  RestoreCounters(writer);
   if (const Status status = CheckMarks(writer); !status.ok()) {
-    writer.Execute("BEGIN IMMEDIATE");
     MarkAllInStore(writer, status.message(), levels);
-    writer.Execute("COMMIT");
   }
+  writer.Execute("COMMIT");
 }
 
 Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
@@ -390,7 +392,7 @@ Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
     AddRowHash(*writer);
     KeepTableSums(*writer);
     DropAllLeases(*writer);
-    RestoreMarks(*writer, identity->profile.levels);
+    Mend(*writer, identity->profile.levels);
     return std::make_unique<SqliteStore>(options, std::move(directory), *identity,
                                          std::move(writer));
   } catch (const std::exception& error) {

@@ -1,5 +1,8 @@
 #include "server/store/sqlite/schema/counters.h"
 
+#include <optional>
+#include <string_view>
+
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/row_hash.h"
@@ -19,19 +22,25 @@ void Write(Connection& connection, Counter counter, std::uint64_t value) {
       .Run();
 }
 
-}  // namespace
-
-std::uint64_t ReadCounter(Connection& connection, Counter counter) {
+// Nothing if it is damaged or missing.
+std::optional<std::uint64_t> Find(Connection& connection, Counter counter) {
   Query row = connection.Prepare("SELECT value, checksum FROM counters WHERE id = ?");
   row.Bind(static_cast<std::int64_t>(counter));
   if (!row.Step()) {
-    ThrowDamaged(StrCat("counter ", static_cast<int>(counter), " is missing"));
+    return std::nullopt;
   }
   const std::uint64_t value = row.Unsigned();
-  if (row.Int() != HashOf(counter, value)) {
-    ThrowDamaged(StrCat("counter ", static_cast<int>(counter), " is damaged: wrong checksum"));
+  return row.Int() == HashOf(counter, value) ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+std::uint64_t ReadCounter(Connection& connection, Counter counter) {
+  const auto value = Find(connection, counter);
+  if (!value) {
+    ThrowDamaged(StrCat("counter ", static_cast<int>(counter), " is damaged or missing"));
   }
-  return value;
+  return *value;
 }
 
 std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t delta) {
@@ -42,6 +51,22 @@ std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t
 
 void SetCounter(Connection& connection, Counter counter, std::uint64_t value) {
   Write(connection, counter, value);
+}
+
+bool IsCounterIntact(Connection& connection, Counter counter) {
+  return Find(connection, counter).has_value();
+}
+
+void RewriteCounter(Connection& connection,
+                    Counter counter,
+                    const char* name,
+                    std::uint64_t value) {
+  connection.Prepare("INSERT OR REPLACE INTO counters (id, name, value, checksum) VALUES (?,?,?,?)")
+      .Bind(static_cast<std::int64_t>(counter))
+      .Bind(std::string_view(name))
+      .Bind(value)
+      .Bind(HashOf(counter, value))
+      .Run();
 }
 
 }  // namespace atlas

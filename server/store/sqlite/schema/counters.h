@@ -33,4 +33,9 @@ std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t
 // Whatever it was before.
 void SetCounter(Connection& connection, Counter counter, std::uint64_t value);
 
+// It is there, and as it was written.
+bool IsCounterIntact(Connection& connection, Counter counter);
+// Adds it if it is missing.
+void RewriteCounter(Connection& connection, Counter counter, const char* name, std::uint64_t value);
+
 }  // namespace atlas

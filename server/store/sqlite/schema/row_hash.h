@@ -14,7 +14,7 @@ namespace atlas {
 enum class RowKind : std::uint8_t {
   kMeta = 1,
   kSession = 2,
-  kKeyframe = 3,
+  kFormerKeyframe = 3,
   kPose = 4,
   kPoseHistory = 5,
   kPoseBatch = 6,
@@ -28,6 +28,7 @@ enum class RowKind : std::uint8_t {
   kDirtyTile = 14,
   kEvent = 15,
   kDamagedKeyframe = 16,
+  kKeyframe = 17,
 };
 
 // Integers as 8 bytes little-endian, text and bytes with their length before them.

@@ -75,7 +75,9 @@ CREATE TABLE tiles (
   blob_bytes INTEGER NOT NULL, blob_hash INTEGER NOT NULL,
   checksum INTEGER NOT NULL,
   blob BLOB NOT NULL);
-CREATE INDEX tile_summaries ON tiles (key, revision, payload_hash, blob_bytes);
+CREATE INDEX tile_summaries ON tiles
+  (key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, blob_hash,
+   checksum);
 
 CREATE TABLE keyframe_tiles (
   tile_key INTEGER NOT NULL, keyframe_id INTEGER NOT NULL,

@@ -25,12 +25,13 @@ std::int64_t HashOf(const TileClaim& claim) {
 // The lowest level with a mark of the wave, leased or not: keys begin with the level.
 std::optional<std::uint8_t> LowestLevel(Connection& connection, const ClaimRequest& request) {
   Query row = connection.Prepare(
-      "SELECT level FROM dirty_tiles WHERE since <= ? AND retry_at_ms <= ? ORDER BY key LIMIT 1");
+      "SELECT key FROM dirty_tiles WHERE since <= ? AND retry_at_ms <= ? ORDER BY key LIMIT 1");
   row.Bind(request.wave).Bind(request.now_ms);
   if (!row.Step()) {
     return std::nullopt;
   }
-  return static_cast<std::uint8_t>(row.Int());
+  const auto id = TileId::FromKey(row.Unsigned());
+  return id ? id->level : std::uint8_t{0};  // a damaged mark is found when the level is read
 }
 
 Result<std::vector<TileClaim>> FreeMarks(Connection& connection,
@@ -93,23 +94,18 @@ Result<ClaimResult> ClaimTiles(Connection& connection, const ClaimRequest& reque
   }
   ClaimResult result{std::move(*marks), false};
   for (const TileClaim& claim : result.claims) {
-    connection
-        .Prepare(
-            "UPDATE dirty_tiles SET lease_owner = ?, lease_until_ms = ? WHERE key = ? "
-            "AND shard = ?")
+    connection.Prepare("UPDATE dirty_tiles SET lease_owner = ?, lease_until_ms = ? WHERE key = ?")
         .Bind(std::string_view(request.owner))
         .Bind(request.now_ms + request.lease_ms)
         .Bind(claim.id.Key())
-        .Bind(ShardOf(claim.id))
         .Run();
   }
   return result;
 }
 
 Status CheckClaim(Connection& connection, const TileClaim& claim) {
-  Query row = connection.Prepare(
-      "SELECT coalesce(lease_owner, '') FROM dirty_tiles WHERE key = ? AND shard = ?");
-  row.Bind(claim.id.Key()).Bind(ShardOf(claim.id));
+  Query row = connection.Prepare("SELECT coalesce(lease_owner, '') FROM dirty_tiles WHERE key = ?");
+  row.Bind(claim.id.Key());
   if (row.Step() && row.Text() == claim.owner) {
     return {};
   }
@@ -118,22 +114,19 @@ Status CheckClaim(Connection& connection, const TileClaim& claim) {
 }
 
 void SettleClaim(Connection& connection, const TileClaim& claim) {
-  const int cleared =
-      connection.Prepare("DELETE FROM dirty_tiles WHERE key = ? AND shard = ? AND generation = ?")
-          .Bind(claim.id.Key())
-          .Bind(ShardOf(claim.id))
-          .Bind(claim.generation)
-          .Run();
+  const int cleared = connection.Prepare("DELETE FROM dirty_tiles WHERE key = ? AND generation = ?")
+                          .Bind(claim.id.Key())
+                          .Bind(claim.generation)
+                          .Run();
   if (cleared != 0) {
     return;
   }
   connection
       .Prepare(
           "UPDATE dirty_tiles SET since = ?1, lease_owner = NULL, lease_until_ms = 0, "
-          "checksum = row_hash(14, key, generation, ?1) WHERE key = ?2 AND shard = ?3")
+          "checksum = row_hash(14, key, generation, ?1) WHERE key = ?2")
       .Bind(claim.generation + 1)
       .Bind(claim.id.Key())
-      .Bind(ShardOf(claim.id))
       .Run();
 }
 
@@ -142,13 +135,12 @@ void PostponeClaim(Connection& connection, const TileClaim& claim, std::int64_t 
       .Prepare(
           "UPDATE dirty_tiles SET lease_owner = NULL, lease_until_ms = 0, "
           "attempts = attempts + (? > 0 AND generation = ?), "
-          "retry_at_ms = iif(generation = ?, ?, 0) WHERE key = ? AND shard = ?")
+          "retry_at_ms = iif(generation = ?, ?, 0) WHERE key = ?")
       .Bind(retry_at_ms)
       .Bind(claim.generation)
       .Bind(claim.generation)
       .Bind(retry_at_ms)
       .Bind(claim.id.Key())
-      .Bind(ShardOf(claim.id))
       .Run();
 }
 

@@ -14,37 +14,64 @@
 namespace atlas {
 namespace {
 
-std::int64_t HashOf(const KeyframeRow& row) {
-  RowHash hash(RowKind::kKeyframe);
+// Everything in the row but the blob, which has a hash of its own.
+struct Row {
+  KeyframeRow row;
+  std::int64_t shard = 0;
+  std::uint64_t revision = 0;
+  std::optional<PositionPrior> prior = {};
+};
+
+void AddCommon(RowHash& hash, const KeyframeRow& row) {
   hash.Int(row.record.id).Int(row.session_id).Int(row.record.key.sequence).Int(row.record.time_ms);
   hash.Int(row.record.grid.cell_size_um).Int(row.record.grid.radius_cells);
   for (const std::int32_t part : row.record.level_quaternion) {
     hash.Int(part);
   }
-  return hash.Int(row.blob_bytes).Unsigned(row.blob_hash).value();
+  hash.Int(row.blob_bytes).Unsigned(row.blob_hash);
 }
 
-// Columns: id, session_id, sequence, time_ms, cell_size_um, radius_cells, level quaternion,
-// blob_bytes, blob_hash, checksum.
-Result<KeyframeRow> ReadRow(Query& row) {
-  KeyframeRow result;
-  KeyframeRecord& r = result.record;
-  r.id = row.Int();
-  result.session_id = row.Int();
-  r.key.sequence = row.Unsigned32();
-  r.time_ms = row.Int();
-  r.grid.cell_size_um = row.Unsigned32();
-  r.grid.radius_cells = row.Int32();
+std::int64_t HashOf(const Row& row) {
+  RowHash hash(RowKind::kKeyframe);
+  AddCommon(hash, row.row);
+  hash.Int(row.shard).Unsigned(row.revision).Int(row.prior ? 1 : 0);
+  const PositionPrior prior = row.prior.value_or(PositionPrior{});
+  return hash.Int(prior.x_um).Int(prior.y_um).Int(prior.z_um).Int(prior.radius_mm).value();
+}
+
+// Of rows that earlier versions of the schema wrote: to write them anew is to write their blobs.
+std::int64_t FormerHashOf(const Row& row) {
+  RowHash hash(RowKind::kFormerKeyframe);
+  AddCommon(hash, row.row);
+  return hash.value();
+}
+
+// Columns: id to blob_hash, shard, revision, whether there is a prior, the prior, checksum.
+Result<KeyframeRow> ReadRow(Query& query) {
+  Row row;
+  KeyframeRecord& r = row.row.record;
+  r.id = query.Int();
+  row.row.session_id = query.Int();
+  r.key.sequence = query.Unsigned32();
+  r.time_ms = query.Int();
+  r.grid.cell_size_um = query.Unsigned32();
+  r.grid.radius_cells = query.Int32();
   for (std::int32_t& part : r.level_quaternion) {
-    part = row.Int32();
+    part = query.Int32();
   }
-  result.blob_bytes = row.Unsigned32();
-  result.blob_hash = row.Unsigned();
-  if (row.Int() != HashOf(result)) {
+  row.row.blob_bytes = query.Unsigned32();
+  row.row.blob_hash = query.Unsigned();
+  row.shard = query.Int();
+  row.revision = query.Unsigned();
+  const bool has_prior = query.Int() != 0;
+  const PositionPrior prior{query.Int(), query.Int(), query.Int(), query.Unsigned32()};
+  row.prior = has_prior ? std::optional(prior) : std::nullopt;
+  const std::int64_t checksum = query.Int();
+  if (checksum != HashOf(row) && checksum != FormerHashOf(row)) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the row of keyframe ", r.id, " is damaged: wrong checksum"));
   }
-  return result;
+  return std::move(row.row);
 }
 
 void BindPrior(Query& query, const std::optional<PositionPrior>& prior) {
@@ -72,8 +99,10 @@ Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
                                                    std::uint32_t sequence) {
   Query row = connection.Prepare(
       "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
-      "level_qy, level_qz, blob_bytes, blob_hash, checksum FROM keyframes "
-      "WHERE session_id = ? AND sequence = ?");
+      "level_qy, level_qz, blob_bytes, blob_hash, shard, revision, prior_x_um IS NOT NULL, "
+      "coalesce(prior_x_um, 0), coalesce(prior_y_um, 0), coalesce(prior_z_um, 0), "
+      "coalesce(prior_radius_mm, 0), checksum FROM keyframes WHERE session_id = ? AND sequence = "
+      "?");
   row.Bind(session_id).Bind(sequence);
   if (!row.Step()) {
     return std::nullopt;
@@ -88,7 +117,9 @@ Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
 Result<KeyframeRow> ReadKeyframeRow(Connection& connection, std::int64_t id) {
   Query row = connection.Prepare(
       "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
-      "level_qy, level_qz, blob_bytes, blob_hash, checksum FROM keyframes WHERE id = ?");
+      "level_qy, level_qz, blob_bytes, blob_hash, shard, revision, prior_x_um IS NOT NULL, "
+      "coalesce(prior_x_um, 0), coalesce(prior_y_um, 0), coalesce(prior_z_um, 0), "
+      "coalesce(prior_radius_mm, 0), checksum FROM keyframes WHERE id = ?");
   row.Bind(id);
   if (!row.Step()) {
     return Error(StatusCode::kInvalidData,
@@ -202,25 +233,31 @@ void InsertKeyframe(Connection& connection,
                     std::int64_t id,
                     std::int64_t session_id,
                     std::uint64_t revision) {
-  KeyframeRow row;
-  row.record = {id, keyframe.key, keyframe.time_ms, keyframe.grid, keyframe.level_quaternion, {},
-                {}};
-  row.session_id = session_id;
-  row.blob_hash = Hash64(keyframe.blob);
-  row.blob_bytes = static_cast<std::uint32_t>(keyframe.blob.size());
+  Row row;
+  row.row.record = {
+      id, keyframe.key, keyframe.time_ms, keyframe.grid, keyframe.level_quaternion, {}, {}};
+  row.row.session_id = session_id;
+  row.row.blob_hash = Hash64(keyframe.blob);
+  row.row.blob_bytes = static_cast<std::uint32_t>(keyframe.blob.size());
+  row.shard = keyframe.footprint.empty() ? 0 : ShardOf(keyframe.footprint.front());
+  row.revision = revision;
+  row.prior = keyframe.prior;
   Query query = connection.Prepare(
       "INSERT INTO keyframes (id, shard, session_id, sequence, time_ms, revision, cell_size_um, "
       "radius_cells, level_qw, level_qx, level_qy, level_qz, prior_x_um, prior_y_um, prior_z_um, "
       "prior_radius_mm, blob_bytes, blob_hash, checksum, blob) "
       "VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
-  query.Bind(id).Bind(keyframe.footprint.empty() ? 0 : ShardOf(keyframe.footprint.front()));
+  query.Bind(id).Bind(row.shard);
   query.Bind(session_id).Bind(keyframe.key.sequence).Bind(keyframe.time_ms).Bind(revision);
   query.Bind(keyframe.grid.cell_size_um).Bind(keyframe.grid.radius_cells);
   for (const std::int32_t part : keyframe.level_quaternion) {
     query.Bind(part);
   }
   BindPrior(query, keyframe.prior);
-  query.Bind(row.blob_bytes).Bind(row.blob_hash).Bind(HashOf(row)).Bind(ByteSpan(keyframe.blob));
+  query.Bind(row.row.blob_bytes)
+      .Bind(row.row.blob_hash)
+      .Bind(HashOf(row))
+      .Bind(ByteSpan(keyframe.blob));
   query.Run();
 }
 

@@ -1,6 +1,8 @@
 #include "server/store/sqlite/tables/tile_table.h"
 
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
@@ -13,6 +15,8 @@ namespace atlas {
 namespace {
 
 constexpr std::size_t kMaxRanges = 64;
+constexpr std::int64_t kPage = 1'024;
+constexpr std::int64_t kNoLimit = -1;
 
 struct TileRow {
   std::uint64_t key = 0;
@@ -43,6 +47,18 @@ struct TileRow {
   }
 };
 
+// Everything but the blob.
+void ReadNumbers(Query& query, TileRow& row) {
+  row.revision = query.Unsigned();
+  row.fused_revision = query.Unsigned();
+  row.payload_hash = query.Unsigned();
+  row.cells = query.Unsigned32();
+  row.multilayer_cells = query.Unsigned32();
+  row.blob_bytes = query.Unsigned32();
+  row.blob_hash = query.Unsigned();
+  row.checksum = query.Int();
+}
+
 std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
   Query query = connection.Prepare(
       "SELECT revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
@@ -53,14 +69,7 @@ std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
   }
   TileRow row;
   row.key = id.Key();
-  row.revision = query.Unsigned();
-  row.fused_revision = query.Unsigned();
-  row.payload_hash = query.Unsigned();
-  row.cells = query.Unsigned32();
-  row.multilayer_cells = query.Unsigned32();
-  row.blob_bytes = query.Unsigned32();
-  row.blob_hash = query.Unsigned();
-  row.checksum = query.Int();
+  ReadNumbers(query, row);
   row.blob = query.Blob();
   return row;
 }
@@ -96,10 +105,7 @@ void InsertRow(Connection& connection, const TileId& id, const TileRow& row) {
 }
 
 void DeleteRow(Connection& connection, const TileId& id) {
-  connection.Prepare("DELETE FROM tiles WHERE key = ? AND shard = ?")
-      .Bind(id.Key())
-      .Bind(ShardOf(id))
-      .Run();
+  connection.Prepare("DELETE FROM tiles WHERE key = ?").Bind(id.Key()).Run();
 }
 
 // After a damaged row went, whose numbers nobody can take away from the counters.
@@ -126,20 +132,50 @@ TileRow NewRow(const TileId& id, const TileContent& content) {
   return row;
 }
 
-// Columns: key, revision, payload_hash, blob_bytes. A key that no tile has is left out: its row
-// fails its checksum when it is read.
-std::optional<TileSummary> ReadSummary(Query& row) {
-  row.Rewind();
-  const auto id = TileId::FromKey(row.Unsigned());
-  if (!id) {
-    return std::nullopt;
+// The rows of a range of keys by the index, which is small, and by the table.
+constexpr const char* kByIndex =
+    "SELECT key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
+    "blob_hash, checksum FROM tiles INDEXED BY tile_summaries "
+    "WHERE key BETWEEN ? AND ? ORDER BY key LIMIT ?";
+constexpr const char* kByTable =
+    "SELECT key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
+    "blob_hash, checksum FROM tiles NOT INDEXED WHERE key BETWEEN ? AND ? ORDER BY key LIMIT ?";
+
+enum class Damaged { kFails, kIsListed };
+
+// A key that no tile has is left out; what else is damaged fails when it is read. False: it met
+// damage that it was to fail for.
+bool AddSummaries(Query& query, Damaged damaged, std::vector<TileSummary>& tiles) {
+  while (query.Step()) {
+    query.Rewind();
+    TileRow row;
+    row.key = query.Unsigned();
+    ReadNumbers(query, row);
+    if (damaged == Damaged::kFails && row.checksum != row.ExpectedChecksum()) {
+      return false;
+    }
+    if (const auto id = TileId::FromKey(row.key)) {
+      tiles.push_back({*id, row.revision, row.payload_hash, row.blob_bytes});
+    }
   }
-  TileSummary summary;
-  summary.id = *id;
-  summary.revision = row.Unsigned();
-  summary.payload_hash = row.Unsigned();
-  summary.blob_bytes = row.Unsigned32();
-  return summary;
+  return true;
+}
+
+// By the table where the index is damaged: a tile that it does not show must not count as gone.
+std::vector<TileSummary> ReadRange(Connection& connection,
+                                   std::int64_t first,
+                                   std::int64_t last,
+                                   std::int64_t limit) {
+  std::vector<TileSummary> tiles;
+  Query by_index = connection.Prepare(kByIndex);
+  by_index.Bind(first).Bind(last).Bind(limit);
+  if (!AddSummaries(by_index, Damaged::kFails, tiles)) {
+    tiles.clear();
+    Query by_table = connection.Prepare(kByTable);
+    by_table.Bind(first).Bind(last).Bind(limit);
+    AddSummaries(by_table, Damaged::kIsListed, tiles);
+  }
+  return tiles;
 }
 
 }  // namespace
@@ -190,47 +226,30 @@ void ScanTileRows(Connection& connection,
                   const TileRect& rect,
                   const std::function<void(const TileSummary&)>& visit) {
   for (const KeyRange& range : CoverRect(rect, kMaxRanges)) {
-    Query row = connection.Prepare(
-        "SELECT key, revision, payload_hash, blob_bytes FROM tiles INDEXED BY tile_summaries "
-        "WHERE key BETWEEN ? AND ? ORDER BY key");
-    row.Bind(range.first).Bind(range.last);
-    while (row.Step()) {
-      const auto summary = ReadSummary(row);
-      if (summary && rect.Contains(summary->id)) {
-        visit(*summary);
+    std::int64_t first = range.first;
+    while (true) {
+      const auto page = ReadRange(connection, first, range.last, kPage);
+      if (page.empty()) {
+        break;
       }
+      for (const TileSummary& tile : page) {
+        if (rect.Contains(tile.id)) {
+          visit(tile);
+        }
+      }
+      first = static_cast<std::int64_t>(page.back().id.Key()) + 1;
     }
   }
 }
 
 std::vector<TileSummary> ReadTileBlockRows(Connection& connection, std::uint64_t block) {
-  Query row = connection.Prepare(
-      "SELECT key, revision, payload_hash, blob_bytes FROM tiles INDEXED BY tile_summaries "
-      "WHERE key BETWEEN ? AND ? ORDER BY key");
-  row.Bind(FirstKeyOf(block)).Bind(FirstKeyOf(block + 1) - 1);
-  std::vector<TileSummary> tiles;
-  while (row.Step()) {
-    if (const auto summary = ReadSummary(row)) {
-      tiles.push_back(*summary);
-    }
-  }
-  return tiles;
+  return ReadRange(connection, FirstKeyOf(block), FirstKeyOf(block + 1) - 1, kNoLimit);
 }
 
 std::vector<TileSummary> ListTileRows(Connection& connection,
                                       std::int64_t after_key,
                                       std::uint32_t limit) {
-  Query row = connection.Prepare(
-      "SELECT key, revision, payload_hash, blob_bytes FROM tiles INDEXED BY tile_summaries "
-      "WHERE key > ? ORDER BY key LIMIT ?");
-  row.Bind(after_key).Bind(limit);
-  std::vector<TileSummary> tiles;
-  while (row.Step()) {
-    if (const auto summary = ReadSummary(row)) {
-      tiles.push_back(*summary);
-    }
-  }
-  return tiles;
+  return ReadRange(connection, after_key + 1, std::numeric_limits<std::int64_t>::max(), limit);
 }
 
 }  // namespace atlas

@@ -1,44 +1,99 @@
 #include "server/store/sqlite/transactions/counter_check.h"
 
+#include <optional>
+
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/table_sums.h"
+#include "server/store/sqlite/tables/event_table.h"
 
 namespace atlas {
 namespace {
 
+enum class Told { kExactly, kAtLeast };
+
 struct Recount {
   Counter counter;
-  const char* what;
+  const char* name;  // column name of table counters
+  Told told;         // by the rows
   const char* sql;
 };
 
+// Cells: of level 0, the keys of which begin with 0 (tile_id.h).
 constexpr Recount kRecounts[] = {
-    {Counter::kKeyframes, "keyframes", "SELECT count(*) FROM keyframes"},
-    {Counter::kKeyframeBytes, "bytes of keyframes",
+    {Counter::kRevision, "revision", Told::kAtLeast,
+     "SELECT max(coalesce((SELECT max(revision) FROM pose_history), 0), "
+     "coalesce((SELECT max(revision) FROM tiles), 0), "
+     "coalesce((SELECT max(generation) FROM dirty_tiles), 0), "
+     "coalesce((SELECT max(revision) FROM session_states), 0), "
+     "coalesce((SELECT max(revision) FROM events), 0), "
+     "coalesce((SELECT max(revision) FROM starts), 0))"},
+    {Counter::kBatch, "batch", Told::kAtLeast, "SELECT coalesce(max(id), 0) FROM pose_batches"},
+    {Counter::kLastKeyframeId, "last_keyframe_id", Told::kAtLeast,
+     "SELECT coalesce(max(id), 0) FROM keyframes"},
+    {Counter::kKeyframes, "keyframes", Told::kExactly, "SELECT count(*) FROM keyframes"},
+    {Counter::kKeyframeBytes, "keyframe_bytes", Told::kExactly,
      "SELECT coalesce(sum(blob_bytes), 0) FROM keyframes"},
-    {Counter::kSessions, "sessions", "SELECT count(*) FROM sessions"},
-    {Counter::kTiles, "tiles", "SELECT count(*) FROM tiles"},
-    {Counter::kTileBytes, "bytes of tiles", "SELECT coalesce(sum(blob_bytes), 0) FROM tiles"},
-    {Counter::kCompactions, "compactions", "SELECT count(*) FROM compactions"},
-    {Counter::kCompacted, "keyframes that were dropped", "SELECT count(*) FROM tombstones"},
-    {Counter::kHistoryHorizon, "as the oldest revision that is kept",
+    {Counter::kTiles, "tiles", Told::kExactly, "SELECT count(*) FROM tiles"},
+    {Counter::kTileBytes, "tile_bytes", Told::kExactly,
+     "SELECT coalesce(sum(blob_bytes), 0) FROM tiles"},
+    {Counter::kCells, "cells", Told::kExactly,
+     "SELECT coalesce(sum(cells), 0) FROM tiles WHERE key BETWEEN 0 AND (1 << 58) - 1"},
+    {Counter::kMultilayerCells, "multilayer_cells", Told::kExactly,
+     "SELECT coalesce(sum(multilayer_cells), 0) FROM tiles WHERE key BETWEEN 0 AND (1 << 58) - 1"},
+    {Counter::kSessions, "sessions", Told::kExactly, "SELECT count(*) FROM sessions"},
+    {Counter::kHistoryHorizon, "history_horizon", Told::kExactly,
      "SELECT coalesce(max(revision), 0) FROM compactions"},
+    {Counter::kCompactions, "compactions", Told::kExactly, "SELECT count(*) FROM compactions"},
+    {Counter::kCompacted, "compacted", Told::kExactly, "SELECT count(*) FROM tombstones"},
+    {Counter::kFusionRules, "fusion_rules", Told::kAtLeast, "SELECT 0"},  // unknown
+    {Counter::kEvents, "events", Told::kExactly, "SELECT coalesce(max(id), 0) FROM events"},
 };
+
+// Numbers that may have been given to something of which no row is left.
+constexpr std::uint64_t kSkipped = 1 << 20;
+
+std::uint64_t Count(Connection& connection, const Recount& recount) {
+  Query row = connection.Prepare(recount.sql);
+  return row.Step() ? row.Unsigned() : 0;
+}
+
+std::uint64_t SafeValue(Connection& connection, const Recount& recount) {
+  const std::uint64_t told = Count(connection, recount);
+  const bool is_number = recount.told == Told::kAtLeast && recount.counter != Counter::kFusionRules;
+  return is_number ? told + kSkipped : told;
+}
 
 }  // namespace
 
 Status CheckCounters(Connection& connection) {
   for (const Recount& recount : kRecounts) {
-    Query row = connection.Prepare(recount.sql);
-    const std::uint64_t found = row.Step() ? row.Unsigned() : 0;
+    const std::uint64_t found = Count(connection, recount);
     const std::uint64_t counted = ReadCounter(connection, recount.counter);
-    if (found != counted) {
-      return Status(StatusCode::kInvalidData, StrCat("store: it counts ", counted, " ",
-                                                     recount.what, ", and the rows say ", found));
+    if (recount.told == Told::kExactly ? found != counted : found > counted) {
+      return Status(StatusCode::kInvalidData, StrCat("store: counter ", recount.name, " is ",
+                                                     counted, ", and the rows say ", found));
     }
   }
   return CheckTableSums(connection);
+}
+
+int RestoreCounters(Connection& connection) {
+  std::string names;
+  int restored = 0;
+  for (const Recount& recount : kRecounts) {
+    if (IsCounterIntact(connection, recount.counter)) {
+      continue;
+    }
+    RewriteCounter(connection, recount.counter, recount.name, SafeValue(connection, recount));
+    names += StrCat(names.empty() ? "" : ", ", recount.name);
+    ++restored;
+  }
+  if (restored > 0) {
+    WriteTableSum(connection, RowKind::kCounter);
+    AddEvent(connection, {EventKind::kCountersRestored, kAtlasItself, names, "damaged or missing"});
+  }
+  return restored;
 }
 
 }  // namespace atlas

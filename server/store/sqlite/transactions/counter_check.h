@@ -1,4 +1,4 @@
-// Whether the counters say what the rows do.
+// Counters against the rows they count.
 #pragma once
 
 #include "core/base/status.h"
@@ -6,8 +6,13 @@
 
 namespace atlas {
 
-// Counts all rows. kInvalidData names the counter that is wrong, the horizon of the history among
-// them.
+// kInvalidData names the first counter that is damaged or not what the rows say, or the table that
+// lost rows.
 Status CheckCounters(Connection& connection);
+
+// Writes counters that are damaged or missing anew, inside of a transaction: from the rows where
+// they tell, the others so far above all that rows tell that no number is given twice. An event
+// names them. The value: how many.
+int RestoreCounters(Connection& connection);
 
 }  // namespace atlas

@@ -22,7 +22,6 @@
 namespace atlas {
 namespace {
 
-constexpr const char* kItself = "atlasd";
 constexpr std::uint32_t kAllRows = std::numeric_limits<std::uint32_t>::max();
 
 // What was uploaded under a key.
@@ -236,8 +235,8 @@ void MarkAllInStore(Connection& connection, const std::string& why, std::uint8_t
   for (const TileId& tile : tiles) {
     MarkTile(connection, tile, revision, 1);
   }
-  AddEvent(connection,
-           {EventKind::kMarksRestored, kItself, "", StrCat(why, "; ", tiles.size(), " tiles")});
+  AddEvent(connection, {EventKind::kMarksRestored, kAtlasItself, "",
+                        StrCat(why, "; ", tiles.size(), " tiles")});
 }
 
 std::uint64_t AdoptFusionRulesInStore(Connection& connection,
@@ -251,7 +250,7 @@ std::uint64_t AdoptFusionRulesInStore(Connection& connection,
   SetCounter(connection, Counter::kFusionRules, rules);
   if (!tiles.empty()) {
     MarkTiles(connection, tiles, NextRevision(connection));
-    AddEvent(connection, {EventKind::kRules, kItself, StrCat("rules ", rules),
+    AddEvent(connection, {EventKind::kRules, kAtlasItself, StrCat("rules ", rules),
                           StrCat("before: ", before, "; ", tiles.size(), " tiles")});
   }
   return tiles.size();
