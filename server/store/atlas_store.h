@@ -14,6 +14,7 @@
 
 #include "core/base/status.h"
 #include "server/store/compaction_types.h"
+#include "server/store/damage_types.h"
 #include "server/store/event_types.h"
 #include "server/store/store_types.h"
 #include "server/store/tile_index.h"
@@ -35,8 +36,9 @@ class AtlasStore : public TileIndex {
   virtual Result<AtlasLine> ReadLine() = 0;
 
   // Same key, blob hash and time as a stored one: a duplicate, nothing changes, even if its pose
-  // was corrected since. Other content under the key: kConflict. Marks the footprint dirty. All the
-  // same where a compaction dropped the stored one.
+  // was corrected since, unless what is stored is damaged: that is put right then. Other content
+  // under the key: kConflict. Marks the footprint dirty. All the same where a compaction dropped
+  // the stored one.
   virtual void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) = 0;
   // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
   // and marks nothing. Marks the union of the old and the new footprints. Neither uploads nor poses
@@ -71,6 +73,15 @@ class AtlasStore : public TileIndex {
   // marked, in the same transaction: it is what its keyframes say by these. The value: marks set.
   virtual void AdoptFusionRules(std::uint64_t rules, Done<std::uint64_t> done) = 0;
 
+  // Looks whether these keyframes can be fused. Those that are damaged and that the atlas itself
+  // cannot restore are listed, once, and stay out of the map until PutKeyframe brings the same
+  // bytes or RepairKeyframe ends it. The value: listed anew.
+  virtual void NoteDamage(std::vector<std::int64_t> keyframes, Done<std::uint32_t> done) = 0;
+  virtual void RepairKeyframe(KeyframeRepair repair, Done<RepairOutcome> done) = 0;
+  // Sessions, counters, marks and indexes are made right by the rows that are there, and those are
+  // what every table should hold from then on. The value: how much was not as it should be.
+  virtual void RepairTables(std::string author, Done<std::uint32_t> done) = 0;
+
   enum class ProbeDepth { kQueue, kDisk };
   // Goes the way of a write and changes nothing: `done` tells that the queue moves and, with kDisk,
   // that the disk takes what is written.
@@ -92,6 +103,9 @@ class AtlasStore : public TileIndex {
   // kInvalidArgument: the atlas is not there yet. kNotFound: so old that its history is gone.
   virtual Status CheckRevision(std::uint64_t revision) = 0;
   virtual Result<Bytes> ReadKeyframeBlob(std::int64_t id) = 0;
+  // Those that touch or touched a level-0 tile, whether they are damaged or not.
+  virtual Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) = 0;
+  virtual Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() = 0;
   // Ids above `after_id` in order, up to `limit`.
   virtual Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                             std::uint32_t limit) = 0;

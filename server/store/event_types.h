@@ -23,6 +23,7 @@ enum class EventKind : std::uint8_t {
   kBackupRestored = 13,
   kUpgraded = 14,  // from an earlier version of the schema
   kCountersRestored = 15,
+  kTablesRepaired = 16,  // by who asked for repairs
 };
 
 // The author of what nobody asked for.

@@ -4,18 +4,16 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/atlas_opening.h"
 #include "server/store/sqlite/connection/log_copier.h"
-#include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/reader_pool.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
-#include "server/store/sqlite/schema/row_hash.h"
-#include "server/store/sqlite/schema/schema.h"
-#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/compaction_table.h"
+#include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
@@ -26,6 +24,7 @@
 #include "server/store/sqlite/transactions/compaction_transactions.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/current_reads.h"
+#include "server/store/sqlite/transactions/damage_transactions.h"
 #include "server/store/sqlite/transactions/history_reads.h"
 #include "server/store/sqlite/transactions/session_transactions.h"
 #include "server/store/sqlite/transactions/transactions.h"
@@ -33,10 +32,6 @@
 
 namespace atlas {
 namespace {
-
-DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
-  return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
-}
 
 DatabaseOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
   return {std::move(file), DatabaseOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
@@ -162,6 +157,23 @@ class SqliteStore final : public AtlasStore {
         });
   }
 
+  void NoteDamage(std::vector<std::int64_t> keyframes, Done<std::uint32_t> done) override {
+    Write<std::uint32_t>(std::move(done), [k = std::move(keyframes)](Connection& connection) {
+      return Result<std::uint32_t>(NoteDamageInStore(connection, k));
+    });
+  }
+  void RepairKeyframe(KeyframeRepair repair, Done<RepairOutcome> done) override {
+    Write<RepairOutcome>(std::move(done), [r = std::move(repair)](Connection& connection) {
+      return RepairKeyframeInStore(connection, r);
+    });
+  }
+  void RepairTables(std::string author, Done<std::uint32_t> done) override {
+    const std::uint8_t levels = identity_.profile.levels;
+    Write<std::uint32_t>(std::move(done), [levels, a = std::move(author)](Connection& connection) {
+      return RepairTablesInStore(connection, a, levels);
+    });
+  }
+
   void Probe(ProbeDepth depth, Done<bool> done) override {
     writes_.SubmitProbe(MakeWrite<bool>(std::move(done), [depth](Connection& connection) {
       if (depth == ProbeDepth::kDisk) {
@@ -199,6 +211,15 @@ class SqliteStore final : public AtlasStore {
   }
   Result<Bytes> ReadKeyframeBlob(std::int64_t id) override {
     return readers_.Run<Bytes>([id](Connection& connection) { return ReadBlob(connection, id); });
+  }
+  Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) override {
+    return readers_.Run<std::vector<std::int64_t>>([&id](Connection& connection) {
+      return Result<std::vector<std::int64_t>>(atlas::ListKeyframesOfTile(connection, id));
+    });
+  }
+  Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() override {
+    return readers_.Run<std::vector<DamagedKeyframe>>(
+        [](Connection& connection) { return ReadDamagedKeyframes(connection); });
   }
   Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                     std::uint32_t limit) override {
@@ -348,58 +369,6 @@ Status SqliteStore::ScanTiles(const TileRect& rect,
   });
 }
 
-Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
-  if (!options.new_profile) {
-    return Status(StatusCode::kNotFound,
-                  StrCat("there is no atlas in ", options.directory.string()));
-  }
-  ATLAS_RETURN_IF_ERROR(options.new_profile->Validate());
-  directory.RemoveUnfinished();
-  try {
-    Connection connection(
-        {directory.unfinished_file(), DatabaseOptions::Mode::kCreate, 2'000, 5'000});
-    CreateSchema(connection, {*options.new_profile, options.new_atlas_id, 1});
-  } catch (const std::exception& error) {
-    directory.RemoveUnfinished();
-    return StatusFromException(error).WithContext("creating an atlas");
-  }
-  return directory.Publish();
-}
-
-// What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
-// marked again.
-void Mend(Connection& writer, std::uint8_t levels) {
-  writer.Execute("BEGIN IMMEDIATE");
-  RestoreCounters(writer);
-  if (const Status status = CheckMarks(writer); !status.ok()) {
-    MarkAllInStore(writer, status.message(), levels);
-  }
-  writer.Execute("COMMIT");
-}
-
-Result<std::unique_ptr<AtlasStore>> OpenAtlas(DataDirectory directory,
-                                              const SqliteStoreOptions& options) {
-  if (Status status = RenewLog(directory.database_file()); !status.ok()) {
-    return Error(status.WithContext(directory.database_file().string()));
-  }
-  try {
-    auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
-    auto identity = ReadIdentity(*writer);
-    if (!identity) {
-      return Error(identity.error().WithContext(directory.database_file().string()));
-    }
-    writer->Execute("PRAGMA journal_mode = WAL");
-    AddRowHash(*writer);
-    KeepTableSums(*writer);
-    DropAllLeases(*writer);
-    Mend(*writer, identity->profile.levels);
-    return std::make_unique<SqliteStore>(options, std::move(directory), *identity,
-                                         std::move(writer));
-  } catch (const std::exception& error) {
-    return Error(StatusFromException(error).WithContext(directory.database_file().string()));
-  }
-}
-
 }  // namespace
 
 Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& options) {
@@ -407,12 +376,12 @@ Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& op
   if (!directory) {
     return Error(directory.error());
   }
-  if (!directory->has_atlas()) {
-    if (Status status = CreateAtlas(*directory, options); !status.ok()) {
-      return Error(std::move(status));
-    }
+  auto atlas = OpenAtlas(*directory, options);
+  if (!atlas) {
+    return Error(atlas.error());
   }
-  return OpenAtlas(std::move(*directory), options);
+  return std::make_unique<SqliteStore>(options, std::move(*directory), atlas->identity,
+                                       std::move(atlas->writer));
 }
 
 }  // namespace atlas

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -53,31 +54,31 @@ TableSum AddUp(Connection& connection, const SummedTable& table) {
   return sum;
 }
 
+// Nothing if its row is not there.
+std::optional<TableSum> ReadKept(Connection& connection, RowKind kind) {
+  Query row = connection.Prepare("SELECT row_count, checksums FROM main.table_sums WHERE id = ?");
+  row.Bind(static_cast<std::int64_t>(kind));
+  return row.Step() ? std::optional(TableSum{row.Int(), row.Int()}) : std::nullopt;
+}
+
 Status Check(Connection& connection, const SummedTable& table) {
-  TableSum kept;
-  {
-    Query row = connection.Prepare("SELECT row_count, checksums FROM main.table_sums WHERE id = ?");
-    row.Bind(static_cast<std::int64_t>(table.kind));
-    if (!row.Step()) {
-      return Status(StatusCode::kInvalidData,
-                    StrCat("store: what table ", table.name, " should hold is not known"));
-    }
-    kept.rows = row.Int();
-    kept.checksums = row.Int();
+  const auto kept = ReadKept(connection, table.kind);
+  if (!kept) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("store: what table ", table.name, " should hold is not known"));
   }
   const TableSum found = AddUp(connection, table);
-  if (found == kept) {
+  if (found == *kept) {
     return {};
   }
   return Status(StatusCode::kInvalidData,
-                found.rows == kept.rows ? StrCat("store: rows of table ", table.name,
-                                                 " are not those that were written")
-                                        : StrCat("store: table ", table.name, " has ", found.rows,
-                                                 " rows, and should have ", kept.rows));
+                found.rows == kept->rows ? StrCat("store: rows of table ", table.name,
+                                                  " are not those that were written")
+                                         : StrCat("store: table ", table.name, " has ", found.rows,
+                                                  " rows, and should have ", kept->rows));
 }
 
-void Write(Connection& connection, const SummedTable& table) {
-  const TableSum sum = AddUp(connection, table);
+void WriteKept(Connection& connection, const SummedTable& table, const TableSum& sum) {
   connection
       .Prepare(
           "INSERT INTO main.table_sums (id, name, row_count, checksums) VALUES (?,?,?,?) "
@@ -88,6 +89,10 @@ void Write(Connection& connection, const SummedTable& table) {
       .Bind(sum.rows)
       .Bind(sum.checksums)
       .Run();
+}
+
+void Write(Connection& connection, const SummedTable& table) {
+  WriteKept(connection, table, AddUp(connection, table));
 }
 
 const SummedTable& Find(RowKind kind) {
@@ -109,6 +114,14 @@ void WriteTableSums(Connection& connection) {
 }
 void WriteTableSum(Connection& connection, RowKind table) {
   Write(connection, Find(table));
+}
+
+void WithoutCounting(Connection& connection, RowKind table, const std::function<void()>& restore) {
+  const auto kept = ReadKept(connection, table);
+  restore();
+  if (kept) {
+    WriteKept(connection, Find(table), *kept);
+  }
 }
 
 // Triggers of the connection alone: what others delete is missed.

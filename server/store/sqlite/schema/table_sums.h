@@ -3,6 +3,8 @@
 // that keeps them is found out.
 #pragma once
 
+#include <functional>
+
 #include "core/base/status.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/schema/row_hash.h"
@@ -14,6 +16,10 @@ void WriteTableSums(Connection& connection);
 void WriteTableSum(Connection& connection, RowKind table);
 // From now on the statements of this connection keep them.
 void KeepTableSums(Connection& connection);
+
+// Runs `restore`, which makes rows what they were written as: their table holds what it should
+// then, and nothing is counted.
+void WithoutCounting(Connection& connection, RowKind table, const std::function<void()>& restore);
 
 // Reads the checksums of all rows, without their blobs. kInvalidData names the table that lost rows
 // or has others than were written.

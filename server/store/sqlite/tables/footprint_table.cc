@@ -43,15 +43,21 @@ struct Row {
   }
 };
 
-// Columns: tile_key, keyframe_id, revision, is_current, checksum. Throws where they are damaged.
-Row ReadRow(Query& query) {
+// Columns: tile_key, keyframe_id, revision, is_current, checksum. Nothing: it is damaged, and of
+// `row` only the key is to be believed.
+bool ReadIntactRow(Query& query, Row& row) {
   query.Rewind();
-  Row row;
   row.tile_key = query.Unsigned();
   row.keyframe_id = query.Int();
   row.revision = query.Unsigned();
   row.is_current = query.Int() != 0;
-  if (query.Int() != row.Checksum()) {
+  return query.Int() == row.Checksum();
+}
+
+// Throws where it is damaged.
+Row ReadRow(Query& query) {
+  Row row;
+  if (!ReadIntactRow(query, row)) {
     ThrowDamaged(StrCat("the footprint of keyframe ", row.keyframe_id, " in the tile with the key ",
                         row.tile_key, " is damaged: wrong checksum"));
   }
@@ -135,6 +141,62 @@ void WriteFootprint(Connection& connection,
   }
   for (; !footprint.empty(); footprint = footprint.subspan(1)) {
     AddRows(connection, kAddOne, footprint.first(1), keyframe_id, revision);
+  }
+}
+
+std::vector<TileId> ReadFootprintUnchecked(Connection& connection, std::int64_t keyframe_id) {
+  Query row = connection.Prepare("SELECT tile_key FROM keyframe_tiles WHERE keyframe_id = ?");
+  row.Bind(keyframe_id);
+  std::vector<TileId> tiles;
+  while (row.Step()) {
+    row.Rewind();
+    if (const auto id = TileId::FromKey(row.Unsigned()); id && id->level == 0) {
+      tiles.push_back(*id);
+    }
+  }
+  return tiles;
+}
+
+std::vector<std::int64_t> ListKeyframesOfTile(Connection& connection, const TileId& tile) {
+  Query row = connection.Prepare("SELECT keyframe_id FROM keyframe_tiles WHERE tile_key = ?");
+  row.Bind(tile.Key());
+  std::vector<std::int64_t> ids;
+  while (row.Step()) {
+    row.Rewind();
+    ids.push_back(row.Int());
+  }
+  return ids;
+}
+
+void RestoreFootprint(Connection& connection,
+                      std::int64_t keyframe_id,
+                      std::span<const TileId> footprint,
+                      std::uint64_t revision) {
+  std::vector<Row> kept;  // of earlier poses
+  {
+    Query query = connection.Prepare(
+        "SELECT tile_key, keyframe_id, revision, is_current, checksum FROM keyframe_tiles "
+        "WHERE keyframe_id = ?");
+    query.Bind(keyframe_id);
+    Row row;
+    while (query.Step()) {
+      if (ReadIntactRow(query, row) && !row.is_current) {
+        kept.push_back(row);
+      }
+    }
+  }
+  DeleteFootprint(connection, keyframe_id);
+  WriteFootprint(connection, keyframe_id, footprint, revision);
+  for (const Row& row : kept) {
+    connection
+        .Prepare(
+            "INSERT OR IGNORE INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current, "
+            "checksum) VALUES (?,?,?,0,?)")
+        .Bind(row.tile_key)
+        .Bind(row.keyframe_id)
+        .Bind(row.revision)
+        .Bind(row.Checksum())
+        .Run();
   }
 }
 

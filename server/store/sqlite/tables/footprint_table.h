@@ -14,6 +14,15 @@ namespace atlas {
 
 // Reading throws what becomes kInvalidData when a row is damaged.
 std::vector<TileId> ReadFootprint(Connection& connection, std::int64_t keyframe_id);
+// Every tile that a row names, of now or earlier, whatever its checksum says.
+std::vector<TileId> ReadFootprintUnchecked(Connection& connection, std::int64_t keyframe_id);
+// The keyframes of a tile likewise.
+std::vector<std::int64_t> ListKeyframesOfTile(Connection& connection, const TileId& tile);
+// Makes `footprint` the current one since `revision`, whatever the rows say; damaged ones go.
+void RestoreFootprint(Connection& connection,
+                      std::int64_t keyframe_id,
+                      std::span<const TileId> footprint,
+                      std::uint64_t revision);
 // Makes `footprint` the current one from `revision` on; the one before becomes a former one.
 void WriteFootprint(Connection& connection,
                     std::int64_t keyframe_id,

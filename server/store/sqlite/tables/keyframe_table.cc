@@ -1,9 +1,12 @@
 #include "server/store/sqlite/tables/keyframe_table.h"
 
+#include <exception>
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
@@ -82,14 +85,35 @@ void BindPrior(Query& query, const std::optional<PositionPrior>& prior) {
   }
 }
 
-// At which it was placed last, or its session entered or left the map.
-std::uint64_t LastChange(Connection& connection, std::int64_t id) {
-  Query row = connection.Prepare(
-      "SELECT max(revision) FROM (SELECT revision FROM pose_history WHERE keyframe_id = ? "
-      "UNION ALL SELECT s.revision FROM session_states s JOIN keyframes k "
-      "ON k.session_id = s.session_id WHERE k.id = ?)");
-  row.Bind(id).Bind(id);
-  return row.Step() ? row.Unsigned() : 0;
+// `sql` names the columns in the order of the table.
+void WriteRow(Connection& connection,
+              const char* sql,
+              const NewKeyframe& keyframe,
+              std::int64_t id,
+              std::int64_t session_id,
+              std::uint64_t revision) {
+  Row row;
+  row.row.record = {
+      id, keyframe.key, keyframe.time_ms, keyframe.grid, keyframe.level_quaternion, {}, {}};
+  row.row.session_id = session_id;
+  row.row.blob_hash = Hash64(keyframe.blob);
+  row.row.blob_bytes = static_cast<std::uint32_t>(keyframe.blob.size());
+  row.shard = keyframe.footprint.empty() ? 0 : ShardOf(keyframe.footprint.front());
+  row.revision = revision;
+  row.prior = keyframe.prior;
+  Query query = connection.Prepare(sql);
+  query.Bind(id).Bind(row.shard);
+  query.Bind(session_id).Bind(keyframe.key.sequence).Bind(keyframe.time_ms).Bind(revision);
+  query.Bind(keyframe.grid.cell_size_um).Bind(keyframe.grid.radius_cells);
+  for (const std::int32_t part : keyframe.level_quaternion) {
+    query.Bind(part);
+  }
+  BindPrior(query, keyframe.prior);
+  query.Bind(row.row.blob_bytes)
+      .Bind(row.row.blob_hash)
+      .Bind(HashOf(row))
+      .Bind(ByteSpan(keyframe.blob));
+  query.Run();
 }
 
 }  // namespace
@@ -218,9 +242,7 @@ Result<Bytes> ReadBlob(Connection& connection, std::int64_t id) {
   if (!row) {
     return Error(row.error());
   }
-  Query query = connection.Prepare("SELECT blob FROM keyframes WHERE id = ?");
-  query.Bind(id);
-  Bytes blob = query.Step() ? query.Blob() : Bytes();
+  Bytes blob = ReadBlobUnchecked(connection, id);
   if (blob.size() != row->blob_bytes || Hash64(blob) != row->blob_hash) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the blob of keyframe ", id, " is damaged: wrong checksum"));
@@ -228,37 +250,72 @@ Result<Bytes> ReadBlob(Connection& connection, std::int64_t id) {
   return blob;
 }
 
+std::int64_t FindKeyframeId(Connection& connection,
+                            std::int64_t session_id,
+                            std::uint32_t sequence) {
+  Query row = connection.Prepare("SELECT id FROM keyframes WHERE session_id = ? AND sequence = ?");
+  row.Bind(session_id).Bind(sequence);
+  return row.Step() ? row.Int() : 0;
+}
+
+Status CheckKeyframe(Connection& connection, std::int64_t id) {
+  const auto record = ReadKeyframeRecord(connection, id);
+  if (!record) {
+    return record.error();
+  }
+  const auto blob = ReadBlob(connection, id);
+  if (!blob) {
+    return blob.error();
+  }
+  try {
+    ReadFootprint(connection, id);
+  } catch (const std::exception& error) {
+    return StatusFromException(error);
+  }
+  return {};
+}
+
+std::uint64_t LastChange(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT max(revision) FROM (SELECT revision FROM pose_history WHERE keyframe_id = ? "
+      "UNION ALL SELECT s.revision FROM session_states s JOIN keyframes k "
+      "ON k.session_id = s.session_id WHERE k.id = ?)");
+  row.Bind(id).Bind(id);
+  return row.Step() ? row.Unsigned() : 0;
+}
+
+Bytes ReadBlobUnchecked(Connection& connection, std::int64_t id) {
+  Query query = connection.Prepare("SELECT blob FROM keyframes WHERE id = ?");
+  query.Bind(id);
+  return query.Step() ? query.Blob() : Bytes();
+}
+
 void InsertKeyframe(Connection& connection,
                     const NewKeyframe& keyframe,
                     std::int64_t id,
                     std::int64_t session_id,
                     std::uint64_t revision) {
-  Row row;
-  row.row.record = {
-      id, keyframe.key, keyframe.time_ms, keyframe.grid, keyframe.level_quaternion, {}, {}};
-  row.row.session_id = session_id;
-  row.row.blob_hash = Hash64(keyframe.blob);
-  row.row.blob_bytes = static_cast<std::uint32_t>(keyframe.blob.size());
-  row.shard = keyframe.footprint.empty() ? 0 : ShardOf(keyframe.footprint.front());
-  row.revision = revision;
-  row.prior = keyframe.prior;
-  Query query = connection.Prepare(
-      "INSERT INTO keyframes (id, shard, session_id, sequence, time_ms, revision, cell_size_um, "
-      "radius_cells, level_qw, level_qx, level_qy, level_qz, prior_x_um, prior_y_um, prior_z_um, "
-      "prior_radius_mm, blob_bytes, blob_hash, checksum, blob) "
-      "VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
-  query.Bind(id).Bind(row.shard);
-  query.Bind(session_id).Bind(keyframe.key.sequence).Bind(keyframe.time_ms).Bind(revision);
-  query.Bind(keyframe.grid.cell_size_um).Bind(keyframe.grid.radius_cells);
-  for (const std::int32_t part : keyframe.level_quaternion) {
-    query.Bind(part);
-  }
-  BindPrior(query, keyframe.prior);
-  query.Bind(row.row.blob_bytes)
-      .Bind(row.row.blob_hash)
-      .Bind(HashOf(row))
-      .Bind(ByteSpan(keyframe.blob));
-  query.Run();
+  WriteRow(connection,
+           "INSERT INTO keyframes (id, shard, session_id, sequence, time_ms, revision, "
+           "cell_size_um, radius_cells, level_qw, level_qx, level_qy, level_qz, prior_x_um, "
+           "prior_y_um, prior_z_um, prior_radius_mm, blob_bytes, blob_hash, checksum, blob) "
+           "VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
+           keyframe, id, session_id, revision);
+}
+
+void RestoreKeyframe(Connection& connection,
+                     const NewKeyframe& keyframe,
+                     std::int64_t id,
+                     std::int64_t session_id,
+                     std::uint64_t revision) {
+  WithoutCounting(connection, RowKind::kKeyframe, [&] {
+    WriteRow(connection,
+             "INSERT OR REPLACE INTO keyframes (id, shard, session_id, sequence, time_ms, "
+             "revision, cell_size_um, radius_cells, level_qw, level_qx, level_qy, level_qz, "
+             "prior_x_um, prior_y_um, prior_z_um, prior_radius_mm, blob_bytes, blob_hash, "
+             "checksum, blob) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
+             keyframe, id, session_id, revision);
+  });
 }
 
 void DeleteKeyframe(Connection& connection, std::int64_t id) {

@@ -36,11 +36,29 @@ Result<std::optional<KeyframeRecord>> FindKeyframeRecord(Connection& connection,
 // The blob, its hash verified.
 Result<Bytes> ReadBlob(Connection& connection, std::int64_t id);
 
+// By the index of keys alone: the row may be damaged. 0: there is none.
+std::int64_t FindKeyframeId(Connection& connection,
+                            std::int64_t session_id,
+                            std::uint32_t sequence);
+// kInvalidData when the row, its session, its pose, its tiles of now or its blob is damaged: fusion
+// cannot have it.
+Status CheckKeyframe(Connection& connection, std::int64_t id);
+// The revision at which it was placed last, or its session entered or left the map.
+std::uint64_t LastChange(Connection& connection, std::int64_t id);
+// What is in the row, whatever its hash says; empty: no row.
+Bytes ReadBlobUnchecked(Connection& connection, std::int64_t id);
+
 void InsertKeyframe(Connection& connection,
                     const NewKeyframe& keyframe,
                     std::int64_t id,
                     std::int64_t session_id,
                     std::uint64_t revision);
+// In the place of a damaged row: as it was inserted.
+void RestoreKeyframe(Connection& connection,
+                     const NewKeyframe& keyframe,
+                     std::int64_t id,
+                     std::int64_t session_id,
+                     std::uint64_t revision);
 // The row and its blob.
 void DeleteKeyframe(Connection& connection, std::int64_t id);
 

@@ -4,6 +4,7 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/table_sums.h"
 
 namespace atlas {
 namespace {
@@ -45,6 +46,44 @@ std::int64_t HistoryHash(const PoseChange& change) {
   return AddPose(hash.Text(change.author), change.pose).value();
 }
 
+Result<PoseChange> ReadCurrent(Connection& connection, std::int64_t keyframe_id) {
+  Query row = connection.Prepare(
+      "SELECT revision, batch, x_um, y_um, z_um, qw, qx, qy, qz, checksum FROM poses "
+      "WHERE keyframe_id = ?");
+  row.Bind(keyframe_id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the pose of keyframe ", keyframe_id, " is missing"));
+  }
+  PoseChange stored;
+  stored.keyframe_id = keyframe_id;
+  stored.revision = row.Unsigned();
+  stored.batch = row.Unsigned();
+  ReadPoseColumns(row, stored.pose);
+  if (row.Int() != CurrentHash(stored)) {
+    return Error(StatusCode::kInvalidData, StrCat("store: the pose of keyframe ", keyframe_id,
+                                                  " is damaged: wrong checksum"));
+  }
+  return stored;
+}
+
+void WriteCurrent(Connection& connection, const PoseChange& change) {
+  Query current = connection.Prepare(
+      "INSERT OR REPLACE INTO poses (keyframe_id, revision, batch, x_um, y_um, z_um, "
+      "qw, qx, qy, qz, checksum) VALUES (?,?,?,?,?,?,?,?,?,?,?)");
+  current.Bind(change.keyframe_id).Bind(change.revision).Bind(change.batch);
+  BindPose(current, change.pose).Bind(CurrentHash(change)).Run();
+}
+
+void AddToHistory(Connection& connection, const PoseChange& change) {
+  Query history = connection.Prepare(
+      "INSERT INTO pose_history (keyframe_id, revision, batch, author, x_um, y_um, z_um, "
+      "qw, qx, qy, qz, checksum) VALUES (?,?,?,?,?,?,?,?,?,?,?,?)");
+  history.Bind(change.keyframe_id).Bind(change.revision).Bind(change.batch);
+  history.Bind(std::string_view(change.author));
+  BindPose(history, change.pose).Bind(HistoryHash(change)).Run();
+}
+
 // Columns: keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum.
 Result<PoseChange> ReadHistoryRow(Query& row) {
   row.Rewind();
@@ -65,24 +104,8 @@ Result<PoseChange> ReadHistoryRow(Query& row) {
 }  // namespace
 
 Result<QuantizedPose> ReadPose(Connection& connection, std::int64_t keyframe_id) {
-  Query row = connection.Prepare(
-      "SELECT revision, batch, x_um, y_um, z_um, qw, qx, qy, qz, checksum FROM poses "
-      "WHERE keyframe_id = ?");
-  row.Bind(keyframe_id);
-  if (!row.Step()) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("store: the pose of keyframe ", keyframe_id, " is missing"));
-  }
-  PoseChange stored;
-  stored.keyframe_id = keyframe_id;
-  stored.revision = row.Unsigned();
-  stored.batch = row.Unsigned();
-  ReadPoseColumns(row, stored.pose);
-  if (row.Int() != CurrentHash(stored)) {
-    return Error(StatusCode::kInvalidData, StrCat("store: the pose of keyframe ", keyframe_id,
-                                                  " is damaged: wrong checksum"));
-  }
-  return stored.pose;
+  const auto stored = ReadCurrent(connection, keyframe_id);
+  return stored ? Result<QuantizedPose>(stored->pose) : Error(stored.error());
 }
 
 Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
@@ -131,17 +154,53 @@ Status CheckPoseHistory(Connection& connection,
 }
 
 void WritePose(Connection& connection, const PoseChange& change) {
-  Query current = connection.Prepare(
-      "INSERT OR REPLACE INTO poses (keyframe_id, revision, batch, x_um, y_um, z_um, "
-      "qw, qx, qy, qz, checksum) VALUES (?,?,?,?,?,?,?,?,?,?,?)");
-  current.Bind(change.keyframe_id).Bind(change.revision).Bind(change.batch);
-  BindPose(current, change.pose).Bind(CurrentHash(change)).Run();
-  Query history = connection.Prepare(
-      "INSERT INTO pose_history (keyframe_id, revision, batch, author, x_um, y_um, z_um, "
-      "qw, qx, qy, qz, checksum) VALUES (?,?,?,?,?,?,?,?,?,?,?,?)");
-  history.Bind(change.keyframe_id).Bind(change.revision).Bind(change.batch);
-  history.Bind(std::string_view(change.author));
-  BindPose(history, change.pose).Bind(HistoryHash(change)).Run();
+  WriteCurrent(connection, change);
+  AddToHistory(connection, change);
+}
+
+bool RestorePose(Connection& connection, std::int64_t keyframe_id, const std::string& author) {
+  const auto current = ReadCurrent(connection, keyframe_id);
+  const PoseChange* last = nullptr;  // that is intact
+  std::size_t damaged = 0;
+  const auto history = ReadPoseHistory(connection, keyframe_id);
+  for (const auto& line : history) {
+    damaged += line ? 0 : 1;
+    last = line && (last == nullptr || last->revision < line->revision) ? &*line : last;
+  }
+  if (!current && damaged == 0 && last != nullptr) {
+    WithoutCounting(connection, RowKind::kPose, [&] { WriteCurrent(connection, *last); });
+    return true;
+  }
+  const bool is_last_lost =
+      current && (last == nullptr || last->revision < current->revision) && damaged <= 1;
+  if (is_last_lost) {
+    WithoutCounting(connection, RowKind::kPoseHistory, [&] {
+      DeleteDamagedPoses(connection, keyframe_id);
+      PoseChange line = *current;
+      line.author = author;
+      AddToHistory(connection, line);
+    });
+  }
+  return is_last_lost;
+}
+
+int DeleteDamagedPoses(Connection& connection, std::int64_t keyframe_id) {
+  std::vector<std::int64_t> damaged;
+  {
+    Query row = connection.Prepare(
+        "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum, "
+        "id FROM pose_history WHERE keyframe_id = ?");
+    row.Bind(keyframe_id);
+    while (row.Step()) {
+      if (!ReadHistoryRow(row)) {
+        damaged.push_back(row.Int());
+      }
+    }
+  }
+  for (const std::int64_t id : damaged) {
+    connection.Prepare("DELETE FROM pose_history WHERE id = ?").Bind(id).Run();
+  }
+  return static_cast<int>(damaged.size());
 }
 
 void DeletePoses(Connection& connection, std::int64_t keyframe_id) {

@@ -36,6 +36,13 @@ Status CheckPoseHistory(Connection& connection,
 // The current pose and its line in the history.
 void WritePose(Connection& connection, const PoseChange& change);
 
+// Puts a current pose right by its line in the history, or that line by the current pose, where one
+// of the two is damaged and the other tells. `author`: of a line that is written anew. False: none
+// tells, or nothing is damaged.
+bool RestorePose(Connection& connection, std::int64_t keyframe_id, const std::string& author);
+// Takes damaged lines out of the history. How many.
+int DeleteDamagedPoses(Connection& connection, std::int64_t keyframe_id);
+
 // The current pose and the whole history.
 void DeletePoses(Connection& connection, std::int64_t keyframe_id);
 

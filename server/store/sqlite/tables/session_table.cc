@@ -1,11 +1,13 @@
 #include "server/store/sqlite/tables/session_table.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 
@@ -49,6 +51,27 @@ Result<SessionRow> ReadRow(Query& row) {
                                                   r.key, ") is damaged: wrong checksum"));
   }
   return result;
+}
+
+// What its keyframes and tombstones say.
+void CountRows(Connection& connection, SessionRow& session) {
+  SessionRecord& r = session.record;
+  Query row = connection.Prepare(
+      "SELECT count(*) FILTER (WHERE is_stored), coalesce(sum(bytes) FILTER (WHERE is_stored), 0), "
+      "coalesce(min(time_ms), 0), coalesce(max(time_ms), 0), coalesce(max(sequence), 0), "
+      "count(*) FILTER (WHERE NOT is_stored) FROM ("
+      "SELECT 1 AS is_stored, blob_bytes AS bytes, time_ms, sequence FROM keyframes "
+      "WHERE session_id = ?1 UNION ALL "
+      "SELECT 0, blob_bytes, time_ms, sequence FROM tombstones WHERE session_id = ?1)");
+  row.Bind(session.id);
+  if (row.Step()) {
+    r.keyframes = row.Unsigned();
+    r.bytes = row.Unsigned();
+    r.first_time_ms = row.Int();
+    r.last_time_ms = row.Int();
+    r.last_sequence = row.Unsigned32();
+    r.compacted = row.Unsigned();
+  }
 }
 
 }  // namespace
@@ -126,6 +149,75 @@ void WriteSession(Connection& connection, const SessionRow& row) {
       .Bind(r.compacted)
       .Bind(HashOf(row))
       .Run();
+}
+
+std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+      "last_sequence, compacted, checksum FROM sessions NOT INDEXED");
+  std::vector<std::int64_t> damaged;
+  while (row.Step()) {
+    if (!ReadRow(row)) {
+      row.Rewind();
+      damaged.push_back(row.Int());
+    }
+  }
+  return damaged;
+}
+
+Status RestoreSession(Connection& connection, std::int64_t id) {
+  SessionRow row;
+  row.id = id;
+  SessionRecord& r = row.record;
+  {
+    Query names = connection.Prepare(
+        "SELECT vehicle, session FROM sessions INDEXED BY sqlite_autoindex_sessions_1 "
+        "WHERE vehicle >= '' AND id = ?");
+    names.Bind(id);
+    if (!names.Step()) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("store: the index of session ", id, " is damaged, as is its row"));
+    }
+    r.key.vehicle = names.Text();
+    r.key.session = names.Text();
+  }
+  const auto state = ReadSessionStateAt(connection, id, std::numeric_limits<std::int64_t>::max());
+  if (!state) {
+    return state.error();
+  }
+  r.state = *state;
+  CountRows(connection, row);
+  WithoutCounting(connection, RowKind::kSession, [&] { WriteSession(connection, row); });
+  return {};
+}
+
+int RecountSessions(Connection& connection) {
+  std::vector<SessionRow> rows;
+  {
+    Query query = connection.Prepare(
+        "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+        "last_sequence, compacted, checksum FROM sessions NOT INDEXED");
+    while (query.Step()) {
+      if (auto row = ReadRow(query)) {
+        rows.push_back(std::move(*row));
+      }
+    }
+  }
+  int changed = 0;
+  for (SessionRow& row : rows) {
+    SessionRow counted = row;
+    CountRows(connection, counted);
+    if (counted.record.keyframes != row.record.keyframes ||
+        counted.record.bytes != row.record.bytes ||
+        counted.record.compacted != row.record.compacted) {
+      row.record.keyframes = counted.record.keyframes;
+      row.record.bytes = counted.record.bytes;
+      row.record.compacted = counted.record.compacted;
+      WriteSession(connection, row);
+      ++changed;
+    }
+  }
+  return changed;
 }
 
 Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key) {

@@ -22,6 +22,14 @@ Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
 // kInvalidData when its row, a line of its history or a tombstone of its keyframes is damaged.
 Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 
+// Ids of those whose rows are damaged.
+std::vector<std::int64_t> ListDamagedSessions(Connection& connection);
+// Writes the row anew, from the index of names, the history of states and the keyframes.
+// kInvalidData when the history does not tell.
+Status RestoreSession(Connection& connection, std::int64_t id);
+// Counts what is stored of each. How many counted something else.
+int RecountSessions(Connection& connection);
+
 // The live session `key`, made if it is new.
 Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key);
 void WriteSession(Connection& connection, const SessionRow& row);

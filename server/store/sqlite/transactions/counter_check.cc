@@ -78,6 +78,18 @@ Status CheckCounters(Connection& connection) {
   return CheckTableSums(connection);
 }
 
+int RecountCounters(Connection& connection) {
+  int changed = 0;
+  for (const Recount& recount : kRecounts) {
+    const std::uint64_t found = Count(connection, recount);
+    if (recount.told == Told::kExactly && ReadCounter(connection, recount.counter) != found) {
+      SetCounter(connection, recount.counter, found);
+      ++changed;
+    }
+  }
+  return changed;
+}
+
 int RestoreCounters(Connection& connection) {
   std::string names;
   int restored = 0;

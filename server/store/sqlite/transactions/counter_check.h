@@ -14,5 +14,7 @@ Status CheckCounters(Connection& connection);
 // they tell, the others so far above all that rows tell that no number is given twice. An event
 // names them. The value: how many.
 int RestoreCounters(Connection& connection);
+// Writes what the rows say into the counters that say something else. How many.
+int RecountCounters(Connection& connection);
 
 }  // namespace atlas

@@ -18,6 +18,7 @@
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
+#include "server/store/sqlite/transactions/damage_transactions.h"
 
 namespace atlas {
 namespace {
@@ -153,11 +154,18 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKe
     return Error(session.error());
   }
   const auto stored = FindUpload(connection, session->id, keyframe.key.sequence);
+  if (stored && !*stored) {
+    return AddKeyframe(connection, keyframe, *session);
+  }
+  const auto healed = HealInStore(connection, session->id, keyframe);
+  if (!healed) {
+    return Error(healed.error());
+  }
+  if (*healed) {
+    return **healed;
+  }
   if (!stored) {
     return Error(stored.error());
-  }
-  if (!*stored) {
-    return AddKeyframe(connection, keyframe, *session);
   }
   if (!IsSameUpload(**stored, keyframe)) {
     return Error(

@@ -1,0 +1,88 @@
+#include "server/store/sqlite/atlas_opening.h"
+
+#include <exception>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/log_renewal.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/table_sums.h"
+#include "server/store/sqlite/tables/dirty_table.h"
+#include "server/store/sqlite/tables/event_table.h"
+#include "server/store/sqlite/tables/session_table.h"
+#include "server/store/sqlite/transactions/counter_check.h"
+#include "server/store/sqlite/transactions/transactions.h"
+
+namespace atlas {
+namespace {
+
+DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
+  return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
+}
+
+Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
+  if (!options.new_profile) {
+    return Status(StatusCode::kNotFound,
+                  StrCat("there is no atlas in ", options.directory.string()));
+  }
+  ATLAS_RETURN_IF_ERROR(options.new_profile->Validate());
+  directory.RemoveUnfinished();
+  try {
+    Connection connection(
+        {directory.unfinished_file(), DatabaseOptions::Mode::kCreate, 2'000, 5'000});
+    CreateSchema(connection, {*options.new_profile, options.new_atlas_id, 1});
+  } catch (const std::exception& error) {
+    directory.RemoveUnfinished();
+    return StatusFromException(error).WithContext("creating an atlas");
+  }
+  return directory.Publish();
+}
+
+// What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
+// marked again.
+void Mend(Connection& writer, std::uint8_t levels) {
+  writer.Execute("BEGIN IMMEDIATE");
+  RestoreCounters(writer);
+  for (const std::int64_t session : ListDamagedSessions(writer)) {
+    if (RestoreSession(writer, session).ok()) {  // who needs one that cannot be, is told
+      AddEvent(writer, {EventKind::kTablesRepaired, kAtlasItself,
+                        StrCat("session number ", session), "its row was damaged"});
+    }
+  }
+  if (const Status status = CheckMarks(writer); !status.ok()) {
+    MarkAllInStore(writer, status.message(), levels);
+  }
+  writer.Execute("COMMIT");
+}
+
+}  // namespace
+
+Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
+  if (!directory.has_atlas()) {
+    if (Status status = CreateAtlas(directory, options); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  if (Status status = RenewLog(directory.database_file()); !status.ok()) {
+    return Error(status.WithContext(directory.database_file().string()));
+  }
+  try {
+    auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
+    auto identity = ReadIdentity(*writer);
+    if (!identity) {
+      return Error(identity.error().WithContext(directory.database_file().string()));
+    }
+    writer->Execute("PRAGMA journal_mode = WAL");
+    AddRowHash(*writer);
+    KeepTableSums(*writer);
+    DropAllLeases(*writer);
+    Mend(*writer, identity->profile.levels);
+    return OpenedAtlas{std::move(*identity), std::move(writer)};
+  } catch (const std::exception& error) {
+    return Error(StatusFromException(error).WithContext(directory.database_file().string()));
+  }
+}
+
+}  // namespace atlas

@@ -1,0 +1,22 @@
+// From a directory to an atlas that can be written to: made if there is none, and what every write
+// counts on put right.
+#pragma once
+
+#include <memory>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/data_directory.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace atlas {
+
+struct OpenedAtlas {
+  StoreIdentity identity;
+  std::unique_ptr<Connection> writer;
+};
+
+// Errors as OpenSqliteStore. The directory stays locked by the caller.
+Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreOptions& options);
+
+}  // namespace atlas
