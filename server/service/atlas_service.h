@@ -105,8 +105,8 @@ class AtlasService {
 
   // whole_atlas.h
   Result<AtlasDigest> Digest(const Patience& patience) { return whole_.Digest(patience); }
-  Result<VerifyReport> Verify(bool rebuild, const Patience& patience) {
-    return whole_.Verify(rebuild, patience);
+  Result<VerifyReport> Verify(const VerifyRequest& request, const Patience& patience) {
+    return whole_.Verify(request, patience);
   }
   Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience) {
     return whole_.Compact(request, patience);

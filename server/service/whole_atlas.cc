@@ -41,14 +41,15 @@ Result<AtlasDigest> WholeAtlas::Digest(const Patience& patience) const {
   }
 }
 
-Result<VerifyReport> WholeAtlas::Verify(bool rebuild, const Patience& patience) const {
+Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
+                                        const Patience& patience) const {
   const FusionWait::Limit limit(patience);
   AtlasVerifier::Options options;
-  options.rebuild = rebuild;
+  options.request = request;
   options.check_stop = wait_.Check(limit, "the atlas was not verified in time");
   while (true) {
     std::uint64_t clean_revision = 0;
-    if (rebuild) {
+    if (request.rebuild) {
       const auto clean = wait_.UntilCleanInTime(limit);
       if (!clean) {
         return Error(clean.error());
@@ -63,6 +64,7 @@ Result<VerifyReport> WholeAtlas::Verify(bool rebuild, const Patience& patience) 
     if (!report) {
       return Error(report.error());
     }
+    changes_.Notify();  // what was marked can be built
     const auto after = store_.ReadCounts();
     if (!after) {
       return Error(after.error());
@@ -71,9 +73,9 @@ Result<VerifyReport> WholeAtlas::Verify(bool rebuild, const Patience& patience) 
     // A tile that changed between being read and being rebuilt is no mismatch, and a keyframe that
     // was dropped since it was listed no damage: look again.
     const bool is_in_doubt =
-        (rebuild && report->mismatched > 0 && after->revision != clean_revision) ||
+        (request.rebuild && report->mismatched > 0 && after->revision != clean_revision) ||
         (report->damaged > 0 && after->compacted != before->compacted);
-    if (!is_in_doubt) {
+    if (!is_in_doubt || request.repair) {
       return report;
     }
     if (limit.is_over()) {

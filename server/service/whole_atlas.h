@@ -27,7 +27,7 @@ class WholeAtlas {
   // kInvalidData names the damage that keeps the atlas from becoming clean.
   Result<AtlasDigest> Digest(const Patience& patience) const;
   // `rebuild` waits and reports what is damaged; a plain check does not wait.
-  Result<VerifyReport> Verify(bool rebuild, const Patience& patience) const;
+  Result<VerifyReport> Verify(const VerifyRequest& request, const Patience& patience) const;
   // Drops the keyframes that matter nowhere any more (preset bounded); the tiles stay as they are.
   // kUnavailable while another one is under way, kInvalidData names what is damaged; errors as
   // CheckCompaction and CompactAt. Without success everything is as it was.

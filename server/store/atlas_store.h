@@ -103,6 +103,8 @@ class AtlasStore : public TileIndex {
   // kInvalidArgument: the atlas is not there yet. kNotFound: so old that its history is gone.
   virtual Status CheckRevision(std::uint64_t revision) = 0;
   virtual Result<Bytes> ReadKeyframeBlob(std::int64_t id) = 0;
+  // Row, session and pose, without a look at its tiles.
+  virtual Result<KeyframeRecord> ReadKeyframeRecord(std::int64_t id) = 0;
   // Those that touch or touched a level-0 tile, whether they are damaged or not.
   virtual Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) = 0;
   virtual Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() = 0;

@@ -78,7 +78,7 @@ bool ReadAsDaemon(const ScratchFolder& folder) {
   AtlasService service(
       **store, [] { return TinyAtlas::kNow_ms; }, [](LogLevel, const std::string&) {},
       service_options);
-  const auto report = service.Verify(false, {std::chrono::seconds(5), {}});
+  const auto report = service.Verify({}, {std::chrono::seconds(5), {}});
   static_cast<void>(service.ListSessions());
   static_cast<void>(service.ReadStatus());
   const Patience patience{std::chrono::seconds(5), {}};

@@ -278,6 +278,22 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
        StrCat("fusion: tile ", claim.id, " keeps its content and stays dirty, next attempt in ",
               backoff, " ms: ", why.message()));
   worker.returns.push_back({claim, clock_() + backoff});
+  if (is_damage && is_news && claim.id.level == 0) {
+    NoteDamage(claim.id);
+  }
+}
+
+// Which of the tile's keyframes are damaged is looked up, and noted for good.
+void FusionScheduler::NoteDamage(const TileId& tile) {
+  const auto keyframes = store_.ListKeyframesOfTile(tile);
+  const auto noted =
+      keyframes ? Await<std::uint32_t>(
+                      [&](auto done) { store_.NoteDamage(*keyframes, std::move(done)); })
+                : Result<std::uint32_t>(Error(keyframes.error()));
+  if (!noted) {
+    log_(LogLevel::kError, StrCat("fusion: cannot note what is damaged of tile ", tile, ": ",
+                                  noted.error().message()));
+  }
 }
 
 // True when there are some that can be built again, and the parent then.

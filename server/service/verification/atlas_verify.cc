@@ -7,6 +7,7 @@
 #include "core/keyframe/keyframe_codec.h"
 #include "core/tile/tile_codec.h"
 #include "server/service/upload_check.h"
+#include "server/store/await.h"
 
 namespace atlas {
 namespace {
@@ -38,14 +39,74 @@ AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
       builder_(store, keyframes_, tiles_, options_.tile_bytes) {}
 
 Result<VerifyReport> AtlasVerifier::Run() {
-  for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyCompactions,
-                          &AtlasVerifier::VerifyCounters, &AtlasVerifier::VerifyKeyframes,
-                          &AtlasVerifier::VerifyTiles, &AtlasVerifier::VerifyMissingTiles}) {
+  for (const auto step : {&AtlasVerifier::RepairTables, &AtlasVerifier::VerifySessions,
+                          &AtlasVerifier::VerifyCompactions, &AtlasVerifier::VerifyCounters,
+                          &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
+                          &AtlasVerifier::VerifyMissingTiles}) {
     if (Status status = (this->*step)(); !status.ok()) {
       return Error(std::move(status));
     }
   }
+  if (report_.given_up > 0) {
+    if (Status status = RepairTables(); !status.ok()) {  // what tables should hold without those
+      return Error(std::move(status));
+    }
+  }
   return std::move(report_);
+}
+
+Status AtlasVerifier::RepairTables() {
+  if (!options_.request.repair) {
+    return {};
+  }
+  const auto repaired = Await<std::uint32_t>(
+      [this](auto done) { store_.RepairTables(options_.request.author, std::move(done)); });
+  if (!repaired) {
+    return repaired.error();
+  }
+  report_.damaged += *repaired;
+  report_.restored += *repaired;
+  return {};
+}
+
+std::optional<std::vector<TileId>> AtlasVerifier::FootprintOf(std::int64_t id) {
+  const auto stored = store_.ReadKeyframeRecord(id);
+  if (!stored) {
+    return std::nullopt;
+  }
+  auto placed = CheckPose(*stored, stored->pose, store_.identity().profile);
+  return placed ? std::optional(std::move(placed->footprint)) : std::nullopt;
+}
+
+Status AtlasVerifier::HandleKeyframe(std::int64_t id, const Status& damage) {
+  if (damage.code() != StatusCode::kInvalidData) {
+    return damage;
+  }
+  if (!options_.request.repair) {
+    const auto noted = Await<std::uint32_t>(
+        [&](auto done) { store_.NoteDamage({id}, std::move(done)); });
+    return noted ? Status() : noted.error();
+  }
+  const auto outcome = Await<RepairOutcome>([&](auto done) {
+    store_.RepairKeyframe({id, options_.request.author, FootprintOf(id), true}, std::move(done));
+  });
+  if (!outcome) {
+    return outcome.error();
+  }
+  report_.restored += *outcome == RepairOutcome::kRestored ? 1 : 0;
+  report_.given_up += *outcome == RepairOutcome::kGivenUp ? 1 : 0;
+  return {};
+}
+
+// A damaged tile is built again from its keyframes.
+Status AtlasVerifier::HandleTile(const TileId& id) {
+  const auto marked = Await<std::uint32_t>(
+      [&](auto done) { store_.MarkDirty({id}, std::move(done)); });
+  if (!marked) {
+    return marked.error();
+  }
+  ++report_.restored;
+  return {};
 }
 
 // Counts damage; every other failure ends the verification.
@@ -60,11 +121,12 @@ Status AtlasVerifier::Note(Status problem) {
   return {};
 }
 
-void AtlasVerifier::Mismatch(const TileId& id, const std::string& what) {
+Status AtlasVerifier::Mismatch(const TileId& id, const std::string& what) {
   ++report_.mismatched;
   if (report_.findings.size() < options_.max_findings) {
     report_.findings.push_back(StrCat("tile ", id, " ", what));
   }
+  return options_.request.repair ? HandleTile(id) : Status();
 }
 
 Status AtlasVerifier::VerifySessions() {
@@ -107,7 +169,10 @@ Status AtlasVerifier::VerifyKeyframes() {
     for (const std::int64_t id : *ids) {
       ATLAS_RETURN_IF_ERROR(options_.check_stop());
       ++report_.checked;
-      ATLAS_RETURN_IF_ERROR(Note(CheckKeyframe(id)));
+      if (const Status status = CheckKeyframe(id); !status.ok()) {
+        ATLAS_RETURN_IF_ERROR(Note(status));
+        ATLAS_RETURN_IF_ERROR(HandleKeyframe(id, status));
+      }
     }
     after = ids->back();
   }
@@ -148,7 +213,10 @@ Status AtlasVerifier::VerifyTiles() {
     for (const TileSummary& tile : *page) {
       ATLAS_RETURN_IF_ERROR(options_.check_stop());
       ++report_.checked;
-      ATLAS_RETURN_IF_ERROR(Note(CheckTile(tile.id)));
+      if (const Status status = CheckTile(tile.id); !status.ok()) {
+        ATLAS_RETURN_IF_ERROR(Note(status));
+        ATLAS_RETURN_IF_ERROR(HandleTile(tile.id));
+      }
     }
     after = static_cast<std::int64_t>(page->back().id.Key());
   }
@@ -163,7 +231,7 @@ Status AtlasVerifier::CheckTile(const TileId& id) {
     return {};
   }
   ATLAS_RETURN_IF_ERROR(CheckTileBlob(**tile, store_.identity().profile));
-  if (!options_.rebuild) {
+  if (!options_.request.rebuild) {
     return {};
   }
   ATLAS_RETURN_IF_ERROR(CheckParentExists(id));
@@ -181,13 +249,12 @@ Status AtlasVerifier::CompareTile(const TileId& id, const std::optional<StoredTi
     return {};
   }
   if (!built->content || !stored) {
-    Mismatch(id, stored ? "is stored but its keyframes make none" : "is missing");
-    return {};
+    return Mismatch(id, stored ? "is stored but its keyframes make none" : "is missing");
   }
   const auto expected = TilePayloadFromBlob(built->content->blob);
   const auto actual = TilePayloadFromBlob(stored->blob);
   if (!expected || !actual || *expected != *actual) {
-    Mismatch(id, "is not what its keyframes make");
+    return Mismatch(id, "is not what its keyframes make");
   }
   return {};
 }
@@ -206,7 +273,7 @@ Status AtlasVerifier::CheckParentExists(const TileId& id) {
 // Level-0 tiles that keyframes touch but that are not stored: nothing may be seen in them.
 Status AtlasVerifier::VerifyMissingTiles() {
   std::int64_t after = -1;
-  while (options_.rebuild) {
+  while (options_.request.rebuild) {
     const auto page = store_.ListFootprintTiles(0, after, kPage);
     if (!page) {
       return page.error();

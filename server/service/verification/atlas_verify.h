@@ -1,10 +1,12 @@
 // Reads everything back: every checksum, every blob, and if asked every tile against one rebuilt
-// from the keyframes. Changes nothing.
+// from the keyframes. Damaged keyframes are listed, damaged tiles marked; with `repair` damage is put
+// right where something tells how, and given up where nothing does.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,12 +22,20 @@ struct VerifyReport {
   std::uint64_t mismatched = 0;       // stored tile is not what its keyframes make
   std::vector<std::string> findings;  // the first few
   std::uint64_t revision = 0;
+  std::uint64_t restored = 0;  // of what is damaged: it is whole again, or will be with the next fusion
+  std::uint64_t given_up = 0;  // keyframes that are gone
+};
+
+struct VerifyRequest {
+  bool rebuild = false;
+  bool repair = false;
+  std::string author;  // of repairs
 };
 
 class AtlasVerifier {
  public:
   struct Options {
-    bool rebuild = false;
+    VerifyRequest request;
     std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded
     std::size_t tile_bytes = std::size_t{128} << 20;      // of the tile that is rebuilt
     std::size_t max_findings = 20;
@@ -38,6 +48,7 @@ class AtlasVerifier {
   Result<VerifyReport> Run();
 
  private:
+  Status RepairTables();
   Status VerifySessions();
   Status VerifyCompactions();
   Status VerifyCounters();
@@ -45,11 +56,15 @@ class AtlasVerifier {
   Status VerifyTiles();
   Status VerifyMissingTiles();
   Status CheckKeyframe(std::int64_t id);
+  Status HandleKeyframe(std::int64_t id, const Status& damage);
+  Status HandleTile(const TileId& id);
+  // Where it lies, if its row and its pose can be read.
+  std::optional<std::vector<TileId>> FootprintOf(std::int64_t id);
   Status CheckTile(const TileId& id);
   Status CompareTile(const TileId& id, const std::optional<StoredTile>& stored);
   Status CheckParentExists(const TileId& id);
   Status Note(Status problem);
-  void Mismatch(const TileId& id, const std::string& what);
+  Status Mismatch(const TileId& id, const std::string& what);
 
   AtlasStore& store_;
   Options options_;

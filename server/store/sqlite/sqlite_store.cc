@@ -212,6 +212,10 @@ class SqliteStore final : public AtlasStore {
   Result<Bytes> ReadKeyframeBlob(std::int64_t id) override {
     return readers_.Run<Bytes>([id](Connection& connection) { return ReadBlob(connection, id); });
   }
+  Result<KeyframeRecord> ReadKeyframeRecord(std::int64_t id) override {
+    return readers_.Run<KeyframeRecord>(
+        [id](Connection& connection) { return atlas::ReadKeyframeRecord(connection, id); });
+  }
   Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) override {
     return readers_.Run<std::vector<std::int64_t>>([&id](Connection& connection) {
       return Result<std::vector<std::int64_t>>(atlas::ListKeyframesOfTile(connection, id));

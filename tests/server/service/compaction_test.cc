@@ -51,7 +51,7 @@ class CompactionTest : public ServiceTest {
     return digest;
   }
   void ExpectSound() {
-    const auto report = service_->Verify(true, Long());
+    const auto report = service_->Verify({.rebuild = true}, Long());
     ASSERT_TRUE(report.has_value()) << report.error().message();
     EXPECT_EQ(report->damaged, 0u);
     EXPECT_EQ(report->mismatched, 0u) << report->findings.front();
@@ -252,11 +252,11 @@ TEST_F(CompactionTest, VerifyFindsLostTombstones) {
   Open();
   UploadPasses(0, 4);
   ASSERT_EQ(Compact(kAll_ms)->stored.dropped, kKeyframes);
-  EXPECT_EQ(service_->Verify(false, Long())->damaged, 0u);
+  EXPECT_EQ(service_->Verify({}, Long())->damaged, 0u);
   Tamper("DELETE FROM tombstones WHERE sequence = 2");
   Open();
   // For its session, its compaction and the count of all.
-  EXPECT_EQ(service_->Verify(false, Long())->damaged, 3u);
+  EXPECT_EQ(service_->Verify({}, Long())->damaged, 3u);
 }
 
 TEST_F(CompactionTest, VerifyFindsALostCompaction) {
@@ -265,7 +265,7 @@ TEST_F(CompactionTest, VerifyFindsALostCompaction) {
   ASSERT_EQ(Compact(kAll_ms)->stored.dropped, kKeyframes);
   Tamper("DELETE FROM compactions");
   Open();
-  const auto report = service_->Verify(false, Long());
+  const auto report = service_->Verify({}, Long());
   EXPECT_EQ(report->damaged, 1u);
   EXPECT_EQ(report->findings.at(0), "store: it counts 1 compactions, and the rows say 0");
 }
@@ -338,7 +338,7 @@ TEST_F(CompactionTest, UploadsGoOnMeanwhile) {
       const auto done = Compact(5 * kPass_ms);
       EXPECT_TRUE(done || done.error().code() == StatusCode::kUnavailable);
       dropped += done ? done->stored.dropped : 0;
-      EXPECT_EQ(service_->Verify(false, Long())->damaged, 0u);
+      EXPECT_EQ(service_->Verify({}, Long())->damaged, 0u);
     }
   }
   const auto last = Compact(5 * kPass_ms);

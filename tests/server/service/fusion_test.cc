@@ -58,7 +58,7 @@ TEST_F(AtlasTest, OrderDuplicatesWorkersRestartsAndDetoursDoNotMatter) {
     const AtlasDigest digest = Digest();
     EXPECT_EQ(digest.sha256, expected.sha256);
     EXPECT_EQ(digest.tiles, expected.tiles);
-    const auto report = service_->Verify(true, Long());
+    const auto report = service_->Verify({.rebuild = true}, Long());
     ASSERT_TRUE(report.has_value()) << report.error().message();
     EXPECT_EQ(report->damaged, 0u);
     EXPECT_EQ(report->mismatched, 0u);
@@ -103,7 +103,7 @@ TEST_F(AtlasTest, VerifyCountsDamagedTilesAndKeyframes) {
          "UPDATE tiles SET blob = zeroblob(length(blob)) WHERE key = (SELECT min(key) FROM tiles);"
          "UPDATE keyframes SET blob = zeroblob(length(blob)) WHERE id = 2");
   Open(1);
-  const auto report = service_->Verify(false, Long());
+  const auto report = service_->Verify({}, Long());
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(report->damaged, 2u);
   EXPECT_EQ(report->checked, 4 + clean.tiles);
@@ -116,8 +116,8 @@ TEST_F(AtlasTest, VerifyAndDigestGiveUpInTime) {
   UploadDrive(4);
   Digest();
   const Patience none{std::chrono::milliseconds(0), {}};
-  EXPECT_EQ(service_->Verify(false, none).error().code(), StatusCode::kTimeout);
-  EXPECT_EQ(service_->Verify(true, none).error().code(), StatusCode::kTimeout);
+  EXPECT_EQ(service_->Verify({}, none).error().code(), StatusCode::kTimeout);
+  EXPECT_EQ(service_->Verify({.rebuild = true}, none).error().code(), StatusCode::kTimeout);
   EXPECT_EQ(service_->Digest(none).error().code(), StatusCode::kTimeout);
 }
 
@@ -127,7 +127,7 @@ TEST_F(AtlasTest, VerifyNoticesKeyframesThatVanished) {
   Digest();
   Tamper("data", "DELETE FROM keyframes WHERE id = 2");
   Open(1);
-  const auto report = service_->Verify(false, Long());
+  const auto report = service_->Verify({}, Long());
   ASSERT_TRUE(report.has_value());
   EXPECT_THAT(report->findings,
               ::testing::ElementsAre("store: it counts 4 keyframes, and the rows say 3",
@@ -146,10 +146,10 @@ TEST_F(AtlasTest, VerifyNoticesLostRevisionsAndCounters) {
     Open(1);
     UploadDrive(4);
     Digest();
-    EXPECT_EQ(service_->Verify(false, Long())->damaged, 0u);
+    EXPECT_EQ(service_->Verify({}, Long())->damaged, 0u);
     Tamper("data", tampering);
     Open(1);
-    EXPECT_EQ(service_->Verify(false, Long())->damaged, 1u) << tampering;
+    EXPECT_EQ(service_->Verify({}, Long())->damaged, 1u) << tampering;
     Close();
     std::filesystem::remove_all(directory_ / "data");
   }
@@ -166,10 +166,10 @@ TEST_F(AtlasTest, VerifyIsContentAfterEverySortOfChange) {
   move(2, 30.0);
   ASSERT_TRUE(Change("day", SessionAction::kRetract).has_value());
   move(1, -20.0);
-  EXPECT_EQ(service_->Verify(true, Long())->damaged, 0u);
+  EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0u);
   ASSERT_TRUE(Change("day", SessionAction::kRestore).has_value());
   move(2, 0.0);
-  const auto report = service_->Verify(true, Long());
+  const auto report = service_->Verify({.rebuild = true}, Long());
   EXPECT_EQ(report->damaged, 0u) << report->findings.at(0);
   EXPECT_EQ(report->mismatched, 0u);
 }
@@ -183,13 +183,13 @@ TEST_F(AtlasTest, RebuildFindsTilesThatAreNotWhatTheirKeyframesMake) {
          "DELETE FROM tiles WHERE key = (SELECT min(key) FROM tiles);"
          "DELETE FROM keyframe_tiles WHERE keyframe_id = 1");
   Open(1);
-  const auto plain = service_->Verify(false, Long());
+  const auto plain = service_->Verify({}, Long());
   EXPECT_EQ(plain->damaged, 2u);
   EXPECT_EQ(plain->mismatched, 0u);
   ASSERT_EQ(plain->findings.size(), 2u);
   EXPECT_THAT(plain->findings[0], ::testing::HasSubstr(" tiles, and the rows say "));
   EXPECT_EQ(plain->findings[1], "keyframe bus/day/0: the store lists other tiles than it touches");
-  const auto rebuilt = service_->Verify(true, Long());
+  const auto rebuilt = service_->Verify({.rebuild = true}, Long());
   ASSERT_TRUE(rebuilt.has_value()) << rebuilt.error().message();
   EXPECT_GT(rebuilt->mismatched, 1u);
 }
@@ -235,7 +235,7 @@ TEST_F(AtlasTest, WaitsForADamagedKeyframeEndAndNameIt) {
   EXPECT_GT(status->damaged_tiles, 0u);
   EXPECT_EQ(status->damaged_tiles, status->counts.dirty_tiles);
   EXPECT_EQ(store_->ReadTile(touched).value().value().blob, before.blob);
-  const auto report = service_->Verify(true, Long());
+  const auto report = service_->Verify({.rebuild = true}, Long());
   ASSERT_TRUE(report.has_value()) << report.error().message();
   EXPECT_GT(report->damaged, 1u);  // the keyframe, and the tiles that cannot be rebuilt
   EXPECT_EQ(report->mismatched, 0u);

@@ -178,7 +178,7 @@ TEST_F(HistoryTest, RetractingLeavesWhatWouldBeThereWithoutTheSession) {
   ASSERT_TRUE(Change("day", SessionAction::kRetract).has_value());
   ASSERT_TRUE(Change("night", SessionAction::kRetract).has_value());
   EXPECT_EQ(Digest().tiles, 0u);
-  EXPECT_EQ(service_->Verify(true, Long())->mismatched, 0u);
+  EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->mismatched, 0u);
   EXPECT_EQ(DigestAt(both.revision).sha256, both.sha256);
 }
 
@@ -346,7 +346,7 @@ TEST_F(HistoryTest, DamageInThePastIsNamedAndMarksNothing) {
                                Long());
   EXPECT_EQ(service_->NextTile(*query).error().code(), StatusCode::kInvalidData);
   EXPECT_EQ(service_->ReadStatus()->counts.dirty_tiles, 0u);
-  EXPECT_EQ(service_->Verify(false, Long())->damaged, 1u);
+  EXPECT_EQ(service_->Verify({}, Long())->damaged, 1u);
 }
 
 TEST_F(HistoryTest, SessionChangesAreChecked) {

@@ -341,7 +341,7 @@ void AtlasPlayer::CompareNotes() {
 }
 
 void AtlasPlayer::Verify() {
-  const auto report = service_->Verify(true, Long());
+  const auto report = service_->Verify({.rebuild = true}, Long());
   if (Fail(!report, [&] { return "verify: " + report.error().message(); })) {
     return;
   }
