@@ -6,7 +6,7 @@ BUILD_PACKAGES=(
   libprotobuf-dev protobuf-compiler
   libsqlite3-dev libsqlitecpp-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev
-  libssl-dev libpng-dev prometheus-cpp-dev
+  libssl-dev libpng-dev prometheus-cpp-dev libjemalloc-dev
 )
 TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-protobuf python3-xxhash python3-zstandard
   xz-utils)

@@ -27,7 +27,6 @@
 #include "server/net/tcp_server.h"
 #include "server/operations_port.h"
 #include "server/service/atlas_service.h"
-#include "server/service/process_memory.h"
 
 namespace atlas {
 namespace {
@@ -252,7 +251,6 @@ int Main(int argc, const char* const* argv) {
 }  // namespace atlas
 
 int main(int argc, char** argv) {
-  atlas::ReturnLargeBlocks();
   try {
     return atlas::Main(argc, argv);
   } catch (const std::exception& error) {

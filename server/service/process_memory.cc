@@ -1,18 +1,19 @@
 #include "server/service/process_memory.h"
 
+#include <cstddef>
 #include <fstream>
 
 #include <malloc.h>
 #include <unistd.h>
 
+// jemalloc's, where the program is linked with it.
+extern "C" int mallctl(const char* name,
+                       void* old_value,
+                       std::size_t* old_size,
+                       void* new_value,
+                       std::size_t new_size) __attribute__((weak));
+
 namespace atlas {
-namespace {
-
-// That the heap of a thread keeps behind its last block: with less, whatever decodes an upload has
-// the system clear the same pages again for each.
-[[maybe_unused]] constexpr int kKeptBytes = 1 << 20;
-
-}  // namespace
 
 std::uint64_t ResidentBytes() {
   std::ifstream statm("/proc/self/statm");
@@ -22,14 +23,11 @@ std::uint64_t ResidentBytes() {
   return statm ? resident_pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
 }
 
-void ReturnLargeBlocks() {
-#ifdef M_MMAP_THRESHOLD  // glibc: else it learns to keep them
-  ::mallopt(M_MMAP_THRESHOLD, 4 << 20);
-  ::mallopt(M_TRIM_THRESHOLD, kKeptBytes);
-#endif
-}
-
 void ReturnFreeMemory() {
+  if (&mallctl != nullptr) {
+    mallctl("arena.4096.purge", nullptr, nullptr, nullptr, 0);  // MALLCTL_ARENAS_ALL
+    return;
+  }
 #ifdef __GLIBC__
   ::malloc_trim(0);
 #endif

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
-#include "server/service/process_memory.h"
 #include "server/store/await.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/sqlite_store.h"
@@ -43,7 +42,6 @@ std::filesystem::path NewDirectory() {
 
 AtlasAtWork::AtlasAtWork(const MapProfile& profile, const FusionOptions& fusion)
     : directory_(NewDirectory()), profile_(profile), fusion_(fusion) {
-  ReturnLargeBlocks();  // as atlasd, and so is this
   fusion_.building.survey_files.directory = directory_ / "surveys";
   Open();
   Start();
