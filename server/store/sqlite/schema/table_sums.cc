@@ -19,21 +19,22 @@ struct SummedTable {
 };
 
 constexpr SummedTable kTables[] = {
-    {RowKind::kSession, "sessions", "SELECT checksum FROM sessions"},
-    {RowKind::kKeyframe, "keyframes", "SELECT checksum FROM keyframes"},
-    {RowKind::kPose, "poses", "SELECT checksum FROM poses"},
-    {RowKind::kPoseHistory, "pose_history", "SELECT checksum FROM pose_history"},
-    {RowKind::kPoseBatch, "pose_batches", "SELECT checksum FROM pose_batches"},
-    {RowKind::kTile, "tiles", "SELECT checksum FROM tiles"},
-    {RowKind::kSessionState, "session_states", "SELECT checksum FROM session_states"},
-    {RowKind::kCompaction, "compactions", "SELECT checksum FROM compactions"},
-    {RowKind::kTombstone, "tombstones", "SELECT checksum FROM tombstones"},
-    {RowKind::kStart, "starts", "SELECT checksum FROM starts"},
-    {RowKind::kCounter, "counters", "SELECT checksum FROM counters"},
-    {RowKind::kFootprint, "keyframe_tiles", "SELECT checksum FROM keyframe_tiles"},
-    {RowKind::kDirtyTile, "dirty_tiles", "SELECT checksum FROM dirty_tiles"},
-    {RowKind::kEvent, "events", "SELECT checksum FROM events"},
-    {RowKind::kDamagedKeyframe, "damaged_keyframes", "SELECT checksum FROM damaged_keyframes"},
+    {RowKind::kSession, "sessions", "SELECT checksum FROM sessions NOT INDEXED"},
+    {RowKind::kKeyframe, "keyframes", "SELECT checksum FROM keyframes NOT INDEXED"},
+    {RowKind::kPose, "poses", "SELECT checksum FROM poses NOT INDEXED"},
+    {RowKind::kPoseHistory, "pose_history", "SELECT checksum FROM pose_history NOT INDEXED"},
+    {RowKind::kPoseBatch, "pose_batches", "SELECT checksum FROM pose_batches NOT INDEXED"},
+    {RowKind::kTile, "tiles", "SELECT checksum FROM tiles NOT INDEXED"},
+    {RowKind::kSessionState, "session_states", "SELECT checksum FROM session_states NOT INDEXED"},
+    {RowKind::kCompaction, "compactions", "SELECT checksum FROM compactions NOT INDEXED"},
+    {RowKind::kTombstone, "tombstones", "SELECT checksum FROM tombstones NOT INDEXED"},
+    {RowKind::kStart, "starts", "SELECT checksum FROM starts NOT INDEXED"},
+    {RowKind::kCounter, "counters", "SELECT checksum FROM counters NOT INDEXED"},
+    {RowKind::kFootprint, "keyframe_tiles", "SELECT checksum FROM keyframe_tiles NOT INDEXED"},
+    {RowKind::kDirtyTile, "dirty_tiles", "SELECT checksum FROM dirty_tiles NOT INDEXED"},
+    {RowKind::kEvent, "events", "SELECT checksum FROM events NOT INDEXED"},
+    {RowKind::kDamagedKeyframe, "damaged_keyframes",
+     "SELECT checksum FROM damaged_keyframes NOT INDEXED"},
 };
 
 struct TableSum {

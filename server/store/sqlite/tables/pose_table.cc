@@ -164,7 +164,7 @@ bool RestorePose(Connection& connection, std::int64_t keyframe_id, const std::st
   std::size_t damaged = 0;
   const auto history = ReadPoseHistory(connection, keyframe_id);
   for (const auto& line : history) {
-    damaged += line ? 0 : 1;
+    damaged += line ? 0U : 1U;
     last = line && (last == nullptr || last->revision < line->revision) ? &*line : last;
   }
   if (!current && damaged == 0 && last != nullptr) {

@@ -243,7 +243,9 @@ void ScanTileRows(Connection& connection,
 }
 
 std::vector<TileSummary> ReadTileBlockRows(Connection& connection, std::uint64_t block) {
-  return ReadRange(connection, FirstKeyOf(block), FirstKeyOf(block + 1) - 1, kNoLimit);
+  const auto first = static_cast<std::int64_t>(FirstKeyOf(block));
+  const auto last = static_cast<std::int64_t>(FirstKeyOf(block + 1) - 1);
+  return ReadRange(connection, first, last, kNoLimit);
 }
 
 std::vector<TileSummary> ListTileRows(Connection& connection,

@@ -64,6 +64,13 @@ std::uint64_t SafeValue(Connection& connection, const Recount& recount) {
   return is_number ? told + kSkipped : told;
 }
 
+// That every index has the rows of its table, and every page its place.
+Status CheckStructure(Connection& connection) {
+  Query row = connection.Prepare("PRAGMA integrity_check(1)");
+  const std::string found = row.Step() ? row.Text() : std::string("no answer");
+  return found == "ok" ? Status() : Status(StatusCode::kInvalidData, StrCat("store: ", found));
+}
+
 }  // namespace
 
 Status CheckCounters(Connection& connection) {
@@ -75,7 +82,8 @@ Status CheckCounters(Connection& connection) {
                                                      counted, ", and the rows say ", found));
     }
   }
-  return CheckTableSums(connection);
+  ATLAS_RETURN_IF_ERROR(CheckTableSums(connection));
+  return CheckStructure(connection);
 }
 
 int RecountCounters(Connection& connection) {
