@@ -44,12 +44,37 @@ Result<AtlasDigest> WholeAtlas::Digest(const Patience& patience) const {
 Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
                                         const Patience& patience) const {
   const FusionWait::Limit limit(patience);
+  if (!request.repair) {
+    return VerifyInTime(request.rebuild, limit);
+  }
   AtlasVerifier::Options options;
   options.request = request;
+  options.check_stop = wait_.Check(limit, "the atlas was not repaired in time");
+  auto repaired = AtlasVerifier(store_, options).Run();
+  changes_.Notify();  // what was marked can be built
+  if (!repaired) {
+    return repaired;
+  }
+  if (const auto clean = wait_.UntilCleanInTime(limit); !clean) {
+    return Error(clean.error());
+  }
+  auto left = VerifyInTime(request.rebuild, limit);
+  if (left) {
+    left->restored = repaired->restored;
+    left->given_up = repaired->given_up;
+    left->findings.insert(left->findings.begin(), repaired->findings.begin(),
+                          repaired->findings.end());
+  }
+  return left;
+}
+
+Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const FusionWait::Limit& limit) const {
+  AtlasVerifier::Options options;
+  options.request.rebuild = rebuild;
   options.check_stop = wait_.Check(limit, "the atlas was not verified in time");
   while (true) {
     std::uint64_t clean_revision = 0;
-    if (request.rebuild) {
+    if (rebuild) {
       const auto clean = wait_.UntilCleanInTime(limit);
       if (!clean) {
         return Error(clean.error());
@@ -64,18 +89,18 @@ Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
     if (!report) {
       return Error(report.error());
     }
-    changes_.Notify();  // what was marked can be built
     const auto after = store_.ReadCounts();
     if (!after) {
       return Error(after.error());
     }
     report->revision = after->revision;
+    changes_.Notify();  // tiles that are damaged were marked
     // A tile that changed between being read and being rebuilt is no mismatch, and a keyframe that
     // was dropped since it was listed no damage: look again.
     const bool is_in_doubt =
-        (request.rebuild && report->mismatched > 0 && after->revision != clean_revision) ||
+        (rebuild && report->mismatched > 0 && after->revision != clean_revision) ||
         (report->damaged > 0 && after->compacted != before->compacted);
-    if (!is_in_doubt || request.repair) {
+    if (!is_in_doubt) {
       return report;
     }
     if (limit.is_over()) {

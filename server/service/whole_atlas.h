@@ -26,7 +26,8 @@ class WholeAtlas {
 
   // kInvalidData names the damage that keeps the atlas from becoming clean.
   Result<AtlasDigest> Digest(const Patience& patience) const;
-  // `rebuild` waits and reports what is damaged; a plain check does not wait.
+  // `rebuild` waits and reports what is damaged; a plain check does not wait. With `repair` it is
+  // verified again after that.
   Result<VerifyReport> Verify(const VerifyRequest& request, const Patience& patience) const;
   // Drops the keyframes that matter nowhere any more (preset bounded); the tiles stay as they are.
   // kUnavailable while another one is under way, kInvalidData names what is damaged; errors as
@@ -34,6 +35,7 @@ class WholeAtlas {
   Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience);
 
  private:
+  Result<VerifyReport> VerifyInTime(bool rebuild, const FusionWait::Limit& limit) const;
   // Of an atlas without dirty tiles, nor damage.
   Result<std::uint64_t> CleanRevision(const FusionWait::Limit& limit) const;
 

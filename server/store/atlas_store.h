@@ -78,9 +78,8 @@ class AtlasStore : public TileIndex {
   // bytes or RepairKeyframe ends it. The value: listed anew.
   virtual void NoteDamage(std::vector<std::int64_t> keyframes, Done<std::uint32_t> done) = 0;
   virtual void RepairKeyframe(KeyframeRepair repair, Done<RepairOutcome> done) = 0;
-  // Sessions, counters, marks and indexes are made right by the rows that are there, and those are
-  // what every table should hold from then on. The value: how much was not as it should be.
-  virtual void RepairTables(std::string author, Done<std::uint32_t> done) = 0;
+  // The value: how much was not as it should be.
+  virtual void RepairTables(TableRepair what, std::string author, Done<std::uint32_t> done) = 0;
 
   enum class ProbeDepth { kQueue, kDisk };
   // Goes the way of a write and changes nothing: `done` tells that the queue moves and, with kDisk,

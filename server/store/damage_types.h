@@ -27,6 +27,12 @@ struct KeyframeRepair {
   bool gives_up = false;
 };
 
+// Before keyframes are repaired and after it.
+enum class TableRepair {
+  kRows,  // sessions, counters, marks and indexes, by what other rows say
+  kSums,  // then what is counted, and what every table should hold, by the rows that are there
+};
+
 enum class RepairOutcome { kIntact, kRestored, kGivenUp, kDamaged };
 
 }  // namespace atlas

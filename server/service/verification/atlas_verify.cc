@@ -39,32 +39,31 @@ AtlasVerifier::AtlasVerifier(AtlasStore& store, Options options)
       builder_(store, keyframes_, tiles_, options_.tile_bytes) {}
 
 Result<VerifyReport> AtlasVerifier::Run() {
-  for (const auto step : {&AtlasVerifier::RepairTables, &AtlasVerifier::VerifySessions,
-                          &AtlasVerifier::VerifyCompactions, &AtlasVerifier::VerifyCounters,
-                          &AtlasVerifier::VerifyKeyframes, &AtlasVerifier::VerifyTiles,
-                          &AtlasVerifier::VerifyMissingTiles}) {
+  if (Status status = RepairTables(TableRepair::kRows); !status.ok()) {
+    return Error(std::move(status));
+  }
+  for (const auto step : {&AtlasVerifier::VerifySessions, &AtlasVerifier::VerifyCompactions,
+                          &AtlasVerifier::VerifyCounters, &AtlasVerifier::VerifyKeyframes,
+                          &AtlasVerifier::VerifyTiles, &AtlasVerifier::VerifyMissingTiles}) {
     if (Status status = (this->*step)(); !status.ok()) {
       return Error(std::move(status));
     }
   }
-  if (report_.given_up > 0) {
-    if (Status status = RepairTables(); !status.ok()) {  // what tables should hold without those
-      return Error(std::move(status));
-    }
+  if (Status status = RepairTables(TableRepair::kSums); !status.ok()) {
+    return Error(std::move(status));
   }
   return std::move(report_);
 }
 
-Status AtlasVerifier::RepairTables() {
+Status AtlasVerifier::RepairTables(TableRepair what) {
   if (!options_.request.repair) {
     return {};
   }
   const auto repaired = Await<std::uint32_t>(
-      [this](auto done) { store_.RepairTables(options_.request.author, std::move(done)); });
+      [&](auto done) { store_.RepairTables(what, options_.request.author, std::move(done)); });
   if (!repaired) {
     return repaired.error();
   }
-  report_.damaged += *repaired;
   report_.restored += *repaired;
   return {};
 }
@@ -83,8 +82,8 @@ Status AtlasVerifier::HandleKeyframe(std::int64_t id, const Status& damage) {
     return damage;
   }
   if (!options_.request.repair) {
-    const auto noted = Await<std::uint32_t>(
-        [&](auto done) { store_.NoteDamage({id}, std::move(done)); });
+    const auto noted =
+        Await<std::uint32_t>([&](auto done) { store_.NoteDamage({id}, std::move(done)); });
     return noted ? Status() : noted.error();
   }
   const auto outcome = Await<RepairOutcome>([&](auto done) {
@@ -93,15 +92,15 @@ Status AtlasVerifier::HandleKeyframe(std::int64_t id, const Status& damage) {
   if (!outcome) {
     return outcome.error();
   }
-  report_.restored += *outcome == RepairOutcome::kRestored ? 1 : 0;
-  report_.given_up += *outcome == RepairOutcome::kGivenUp ? 1 : 0;
+  report_.restored += *outcome == RepairOutcome::kRestored ? 1U : 0U;
+  report_.given_up += *outcome == RepairOutcome::kGivenUp ? 1U : 0U;
   return {};
 }
 
 // A damaged tile is built again from its keyframes.
 Status AtlasVerifier::HandleTile(const TileId& id) {
-  const auto marked = Await<std::uint32_t>(
-      [&](auto done) { store_.MarkDirty({id}, std::move(done)); });
+  const auto marked =
+      Await<std::uint32_t>([&](auto done) { store_.MarkDirty({id}, std::move(done)); });
   if (!marked) {
     return marked.error();
   }

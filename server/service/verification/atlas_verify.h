@@ -1,6 +1,6 @@
 // Reads everything back: every checksum, every blob, and if asked every tile against one rebuilt
-// from the keyframes. Damaged keyframes are listed, damaged tiles marked; with `repair` damage is put
-// right where something tells how, and given up where nothing does.
+// from the keyframes. Damaged keyframes are listed, damaged tiles marked; with `repair` damage is
+// put right where something tells how, and given up where nothing does.
 #pragma once
 
 #include <cstddef>
@@ -22,14 +22,16 @@ struct VerifyReport {
   std::uint64_t mismatched = 0;       // stored tile is not what its keyframes make
   std::vector<std::string> findings;  // the first few
   std::uint64_t revision = 0;
-  std::uint64_t restored = 0;  // of what is damaged: it is whole again, or will be with the next fusion
-  std::uint64_t given_up = 0;  // keyframes that are gone
+  // With `repair`: what was found and put right, and keyframes that are gone. What is damaged or
+  // mismatched then is what still is.
+  std::uint64_t restored = 0;
+  std::uint64_t given_up = 0;
 };
 
 struct VerifyRequest {
   bool rebuild = false;
   bool repair = false;
-  std::string author;  // of repairs
+  std::string author = {};  // of repairs
 };
 
 class AtlasVerifier {
@@ -48,7 +50,7 @@ class AtlasVerifier {
   Result<VerifyReport> Run();
 
  private:
-  Status RepairTables();
+  Status RepairTables(TableRepair what);
   Status VerifySessions();
   Status VerifyCompactions();
   Status VerifyCounters();

@@ -46,7 +46,8 @@ void Mend(Connection& writer, std::uint8_t levels) {
   writer.Execute("BEGIN IMMEDIATE");
   RestoreCounters(writer);
   for (const std::int64_t session : ListDamagedSessions(writer)) {
-    if (RestoreSession(writer, session).ok()) {  // who needs one that cannot be, is told
+    if (RestoreSession(writer, session, Vouching::kByChecksum)
+            .ok()) {  // who needs one that cannot be, is told
       AddEvent(writer, {EventKind::kTablesRepaired, kAtlasItself,
                         StrCat("session number ", session), "its row was damaged"});
     }

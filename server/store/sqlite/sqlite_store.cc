@@ -167,11 +167,13 @@ class SqliteStore final : public AtlasStore {
       return RepairKeyframeInStore(connection, r);
     });
   }
-  void RepairTables(std::string author, Done<std::uint32_t> done) override {
+  void RepairTables(TableRepair what, std::string author, Done<std::uint32_t> done) override {
     const std::uint8_t levels = identity_.profile.levels;
-    Write<std::uint32_t>(std::move(done), [levels, a = std::move(author)](Connection& connection) {
-      return RepairTablesInStore(connection, a, levels);
-    });
+    Write<std::uint32_t>(std::move(done),
+                         [what, levels, a = std::move(author)](Connection& connection) {
+                           return what == TableRepair::kRows ? RepairRowsInStore(connection, levels)
+                                                             : RepairSumsInStore(connection, a);
+                         });
   }
 
   void Probe(ProbeDepth depth, Done<bool> done) override {
@@ -384,8 +386,13 @@ Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& op
   if (!atlas) {
     return Error(atlas.error());
   }
-  return std::make_unique<SqliteStore>(options, std::move(*directory), atlas->identity,
-                                       std::move(atlas->writer));
+  const std::filesystem::path file = directory->database_file();
+  try {
+    return std::make_unique<SqliteStore>(options, std::move(*directory), atlas->identity,
+                                         std::move(atlas->writer));
+  } catch (const std::exception& error) {
+    return Error(StatusFromException(error).WithContext(file.string()));
+  }
 }
 
 }  // namespace atlas

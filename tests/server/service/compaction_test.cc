@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <sqlite3.h>
 
 #include "tests/server/service/service_fixture.h"
@@ -267,7 +268,7 @@ TEST_F(CompactionTest, VerifyFindsALostCompaction) {
   Open();
   const auto report = service_->Verify({}, Long());
   EXPECT_EQ(report->damaged, 1u);
-  EXPECT_EQ(report->findings.at(0), "store: it counts 1 compactions, and the rows say 0");
+  EXPECT_THAT(report->findings.at(0), ::testing::EndsWith(", and the rows say 0"));
 }
 
 // A fleet that drives elsewhere does not hold it up.

@@ -149,8 +149,8 @@ TEST_F(FusionRulesTest, ADamagedRowOfAFootprintStopsNothing) {
   OpenOther(1, [](const TileId&) { return std::nullopt; });
   Close();
   Execute("data",
-          "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current) "
-          "VALUES (-1, 1, 1, 1), (9223372036854775807, 1, 1, 1)");
+          "INSERT INTO keyframe_tiles (tile_key, keyframe_id, revision, is_current, checksum) "
+          "VALUES (-1, 1, 1, 1, 7), (9223372036854775807, 1, 1, 1, 7)");
   Open(1);
   const auto wait = service_->WaitUntilClean(Long());
   ASSERT_TRUE(wait) << wait.error().message();

@@ -1,6 +1,7 @@
 #include "server/store/sqlite/tables/session_table.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <utility>
 
@@ -51,6 +52,17 @@ Result<SessionRow> ReadRow(Query& row) {
                                                   r.key, ") is damaged: wrong checksum"));
   }
   return result;
+}
+
+std::int64_t ReadChecksum(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare("SELECT checksum FROM sessions WHERE id = ?");
+  row.Bind(id);
+  return row.Step() ? row.Int() : 0;
+}
+
+// The checksum was another row's where half of its bits differ; a few are its own damage.
+bool Vouches(std::int64_t stored, std::int64_t computed) {
+  return std::popcount(static_cast<std::uint64_t>(stored ^ computed)) <= 8;
 }
 
 // What its keyframes and tombstones say.
@@ -165,7 +177,7 @@ std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
   return damaged;
 }
 
-Status RestoreSession(Connection& connection, std::int64_t id) {
+Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching) {
   SessionRow row;
   row.id = id;
   SessionRecord& r = row.record;
@@ -187,6 +199,10 @@ Status RestoreSession(Connection& connection, std::int64_t id) {
   }
   r.state = *state;
   CountRows(connection, row);
+  if (vouching == Vouching::kByChecksum && !Vouches(ReadChecksum(connection, id), HashOf(row))) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("store: what the row of session ", id, " was cannot be told"));
+  }
   WithoutCounting(connection, RowKind::kSession, [&] { WriteSession(connection, row); });
   return {};
 }

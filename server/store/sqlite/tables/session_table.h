@@ -25,8 +25,10 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 // Ids of those whose rows are damaged.
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection);
 // Writes the row anew, from the index of names, the history of states and the keyframes.
-// kInvalidData when the history does not tell.
-Status RestoreSession(Connection& connection, std::int64_t id);
+// kInvalidData when the history does not tell, or the row's checksum speaks against it, unless that
+// is not to count any more.
+enum class Vouching { kByChecksum, kByNobody };
+Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching);
 // Counts what is stored of each. How many counted something else.
 int RecountSessions(Connection& connection);
 

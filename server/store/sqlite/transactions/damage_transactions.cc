@@ -55,7 +55,7 @@ bool RestoreFromOthers(Connection& connection, std::int64_t id) {
   bool is_changed = false;
   if (const auto row = ReadKeyframeRow(connection, id)) {
     if (!ReadSession(connection, row->session_id)) {
-      is_changed = RestoreSession(connection, row->session_id).ok();
+      is_changed = RestoreSession(connection, row->session_id, Vouching::kByChecksum).ok();
     }
   }
   return RestorePose(connection, id, kAtlasItself) || is_changed;
@@ -215,13 +215,11 @@ Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const Keyfra
   return RepairOutcome::kGivenUp;
 }
 
-Result<std::uint32_t> RepairTablesInStore(Connection& connection,
-                                          const std::string& author,
-                                          std::uint8_t levels) {
-  std::uint32_t repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
+Result<std::uint32_t> RepairRowsInStore(Connection& connection, std::uint8_t levels) {
+  auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
   connection.Execute("REINDEX");
   for (const std::int64_t id : ListDamagedSessions(connection)) {
-    if (Status status = RestoreSession(connection, id); !status.ok()) {
+    if (Status status = RestoreSession(connection, id, Vouching::kByNobody); !status.ok()) {
       return Error(std::move(status));
     }
     ++repaired;
@@ -230,7 +228,11 @@ Result<std::uint32_t> RepairTablesInStore(Connection& connection,
     MarkAllInStore(connection, marks.message(), levels);
     ++repaired;
   }
-  RecountSessions(connection);
+  return repaired;
+}
+
+Result<std::uint32_t> RepairSumsInStore(Connection& connection, const std::string& author) {
+  auto repaired = static_cast<std::uint32_t>(RecountSessions(connection));
   repaired += static_cast<std::uint32_t>(RecountCounters(connection));
   if (const Status sums = CheckTableSums(connection); !sums.ok()) {
     WriteTableSums(connection);

@@ -26,10 +26,8 @@ Result<std::optional<PutKeyframeResult>> HealInStore(Connection& connection,
 
 Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const KeyframeRepair& repair);
 
-// Sessions, counters and marks; then the indexes and what every table should hold are made anew
-// from the rows that are there. An event says what was not as it should be. How much that was.
-Result<std::uint32_t> RepairTablesInStore(Connection& connection,
-                                          const std::string& author,
-                                          std::uint8_t levels);
+// TableRepair, kRows and kSums. How much was not as it should be.
+Result<std::uint32_t> RepairRowsInStore(Connection& connection, std::uint8_t levels);
+Result<std::uint32_t> RepairSumsInStore(Connection& connection, const std::string& author);
 
 }  // namespace atlas

@@ -1,0 +1,198 @@
+// Rows that are not what was written, under a running service: what it goes on serving, what heals
+// by itself, by the vehicle, or by who repairs.
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace atlas {
+namespace {
+
+constexpr std::uint32_t kDrive = 8;
+
+class DamageTest : public ServiceTest {
+ protected:
+  DamageTest() { surveys_ = {0, 0}; }  // what was read once must not hide it
+
+  void Tamper(const std::string& sql) {
+    Close();
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open((directory_ / "data" / "atlas.db").c_str(), &db), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(db);
+    Open(1);
+  }
+  void Fill() {
+    Open(1);
+    UploadDrive(kDrive);
+    intact_ = Digest();
+  }
+  // As if the keyframes without `left_out` had been all.
+  AtlasDigest DigestWithout(std::uint32_t left_out) {
+    Open(1, "reference");
+    for (std::uint32_t i = 0; i < kDrive; ++i) {
+      if (i != left_out) {
+        EXPECT_TRUE(Upload(DriveUpload(i)));
+      }
+    }
+    return Digest();
+  }
+  // Has everything fused again that a keyframe touches.
+  void Touch(std::uint32_t i) {
+    const auto found = store_->FindKeyframes(std::vector{DriveUpload(i).key});
+    ASSERT_TRUE(found) << found.error().message();
+    Mark(store_->ReadKeyframe(found->at(0)->id).value().footprint);
+  }
+  void Mark(std::vector<TileId> tiles) {
+    ASSERT_TRUE(Await<std::uint32_t>(
+        [&](auto done) { store_->MarkDirty(std::move(tiles), std::move(done)); }));
+    service_->WaitUntilClean({std::chrono::milliseconds(1), {}});
+  }
+  Result<VerifyReport> Repair() {
+    return service_->Verify({.repair = true, .author = "operator"}, Long());
+  }
+  std::vector<EventKind> Events() {
+    std::vector<EventKind> kinds;
+    const auto events = store_->ListEvents(0, 1'000).value();
+    for (const Event& event : events) {
+      kinds.push_back(event.kind);
+    }
+    return kinds;
+  }
+  std::size_t Listed() { return store_->ListDamagedKeyframes()->size(); }
+
+  AtlasDigest intact_;
+};
+
+constexpr const char* kSpoilBlob =
+    "UPDATE keyframes SET blob = zeroblob(blob_bytes) WHERE sequence = 3";
+
+TEST_F(DamageTest, WhoSendsADamagedKeyframeAgainHealsIt) {
+  Fill();
+  const std::vector<TileId> footprint = store_->ReadKeyframe(4).value().footprint;
+  Tamper(kSpoilBlob);
+  EXPECT_EQ(Digest().sha256, intact_.sha256);  // nothing asks for it
+  Mark(footprint);
+  EXPECT_EQ(service_->Digest(Long()).error().code(), StatusCode::kInvalidData);
+  EXPECT_EQ(Listed(), 1U);
+  EXPECT_THAT(Events(), ::testing::ElementsAre(EventKind::kKeyframeDamaged));
+  for (const TileId& tile : footprint) {
+    EXPECT_TRUE(store_->ReadTile(tile));  // the last good content
+  }
+  const auto healed = Upload(DriveUpload(3));
+  ASSERT_TRUE(healed) << healed.error().message();
+  EXPECT_TRUE(healed->is_duplicate);
+  EXPECT_EQ(healed->tiles_marked, footprint.size());
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+  EXPECT_EQ(Listed(), 0U);
+  EXPECT_EQ(Events().back(), EventKind::kKeyframeHealed);
+  const auto report = service_->Verify({.rebuild = true}, Long());
+  EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
+}
+
+TEST_F(DamageTest, TheBytesOfABlobVouchForADamagedRow) {
+  Fill();
+  Tamper("UPDATE keyframes SET time_ms = time_ms + 1, radius_cells = 9 WHERE sequence = 3");
+  ASSERT_TRUE(Upload(DriveUpload(3)));
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+  EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0U);
+}
+
+TEST_F(DamageTest, OtherBytesHealNothing) {
+  Fill();
+  Tamper(kSpoilBlob);
+  UploadRequest other = DriveUpload(3);
+  other.blob = DriveUpload(4).blob;
+  EXPECT_EQ(Upload(std::move(other)).error().code(), StatusCode::kConflict);
+  Tamper("UPDATE keyframes SET time_ms = time_ms + 1 WHERE sequence = 3");  // nor does anything
+  EXPECT_EQ(Upload(DriveUpload(3)).error().code(), StatusCode::kInvalidData);
+}
+
+TEST_F(DamageTest, WhatIsGivenUpWasNeverThere) {
+  Fill();
+  Tamper(kSpoilBlob);
+  const auto found = service_->Verify({}, Long());
+  EXPECT_EQ(found->damaged, 1U);
+  EXPECT_EQ(Listed(), 1U);
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(repaired->given_up, 1U);
+  EXPECT_EQ(Listed(), 0U);
+  EXPECT_THAT(Events(), ::testing::Contains(EventKind::kKeyframeGivenUp));
+  const AtlasDigest without = Digest();
+  const auto report = service_->Verify({.rebuild = true}, Long());
+  EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
+  EXPECT_EQ(report->mismatched, 0U);
+  EXPECT_EQ(without.sha256, DigestWithout(3).sha256);
+  Open(1);
+  const auto again = Upload(DriveUpload(3));
+  ASSERT_TRUE(again) << again.error().message();
+  EXPECT_FALSE(again->is_duplicate);
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+}
+
+TEST_F(DamageTest, WhatIsToldElsewhereIsRestored) {
+  for (const char* damage :
+       {"UPDATE poses SET x_um = x_um + 4096 WHERE keyframe_id = 4",
+        "DELETE FROM poses WHERE keyframe_id = 4",
+        "UPDATE pose_history SET z_um = 1 WHERE keyframe_id = 4",
+        "UPDATE keyframe_tiles SET revision = revision + 1 WHERE keyframe_id = 4",
+        "DELETE FROM keyframe_tiles WHERE keyframe_id = 4",
+        "UPDATE keyframe_tiles SET tile_key = tile_key + 64 WHERE keyframe_id = 4",
+        "UPDATE tiles SET payload_hash = 1", "UPDATE tiles SET blob = zeroblob(blob_bytes)",
+        "DELETE FROM tiles WHERE key % 3 = 0", "UPDATE sessions SET state = 3",
+        "UPDATE sessions SET last_sequence = 1", "UPDATE counters SET value = value + 1",
+        "DELETE FROM counters", "UPDATE dirty_tiles SET since = 1",
+        "DROP INDEX changes_of_tile; CREATE INDEX changes_of_tile ON keyframe_tiles "
+        "(tile_key, revision, keyframe_id, is_current, checksum) WHERE keyframe_id <> 4"}) {
+    SCOPED_TRACE(damage);
+    Fill();
+    Tamper(damage);
+    auto repaired = service_->Verify({.rebuild = true, .repair = true, .author = "who"}, Long());
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    EXPECT_EQ(repaired->given_up, 0U);
+    EXPECT_EQ(Digest().sha256, intact_.sha256);
+    const auto report = service_->Verify({.rebuild = true}, Long());
+    EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
+    EXPECT_EQ(report->mismatched, 0U) << report->findings.at(0);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
+}
+
+TEST_F(DamageTest, APoseComesBackFromItsHistoryByItself) {
+  Fill();
+  Tamper("UPDATE poses SET x_um = x_um + 4096 WHERE keyframe_id = 4");
+  Mark({{0, 0, 0}});
+  std::vector<TileId> tiles;
+  ASSERT_TRUE(store_->ScanFootprintTiles({0}, [&](const TileId& id) { tiles.push_back(id); }).ok());
+  Mark(tiles);
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+  EXPECT_EQ(Listed(), 0U);
+  EXPECT_THAT(Events(), ::testing::Contains(EventKind::kKeyframeHealed));
+}
+
+TEST_F(DamageTest, NoRevisionIsGivenTwiceAfterItsCounterWasLost) {
+  Fill();
+  const std::uint64_t revision = store_->revision();
+  Tamper("UPDATE counters SET value = 1 WHERE name = 'revision'");
+  EXPECT_GT(store_->revision(), revision);
+  EXPECT_THAT(Events(), ::testing::ElementsAre(EventKind::kCountersRestored));
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+}
+
+TEST_F(DamageTest, LostMarksAreSetAgain) {
+  Open(0);
+  UploadDrive(kDrive);
+  Tamper("DELETE FROM dirty_tiles WHERE key % 2 = 0");
+  const AtlasDigest digest = Digest();
+  EXPECT_THAT(Events(), ::testing::Contains(EventKind::kMarksRestored));
+  Close();
+  std::filesystem::remove_all(directory_ / "data");
+  Fill();
+  EXPECT_EQ(digest.sha256, intact_.sha256);
+}
+
+}  // namespace
+}  // namespace atlas
