@@ -88,6 +88,31 @@ Status ValidateFusion(const MapProfile& profile) {
   return {};
 }
 
+// What the ranges of versions 1 and 2 allowed and today's do not, as near as today's come to it.
+void BringIntoRange(MapProfile& profile) {
+  profile.overlap_permille = 600;
+  profile.evidence_clamp = std::max<std::int16_t>(profile.evidence_clamp, 64);
+  profile.stretch_clamp =
+      std::clamp<std::int16_t>(profile.stretch_clamp, 64, profile.evidence_clamp);
+  profile.driven_clamp = std::clamp<std::int16_t>(profile.driven_clamp, profile.stretch_clamp, 127);
+}
+
+Status ValidateEarlier(const MapProfile& profile) {
+  if (profile.overlap_permille < 100 || profile.overlap_permille > 950) {
+    return OutOfRange("overlap threshold in permille", profile.overlap_permille, "100 to 950");
+  }
+  if (profile.stretch_clamp < 1 || profile.stretch_clamp > 127) {
+    return OutOfRange("stretch clamp", profile.stretch_clamp, "1 to 127");
+  }
+  if (profile.evidence_clamp < 1 || profile.evidence_clamp > 127) {
+    return OutOfRange("evidence clamp", profile.evidence_clamp, "1 to 127");
+  }
+  if (profile.driven_clamp < profile.stretch_clamp || profile.driven_clamp > 16'384) {
+    return OutOfRange("driven clamp", profile.driven_clamp, "the stretch clamp to 16384");
+  }
+  return {};
+}
+
 Status ValidateBounded(const MapProfile& profile) {
   if (profile.band_mm < 500) {
     return OutOfRange("height of a band in mm", profile.band_mm, "500 to 65535");
@@ -125,6 +150,58 @@ std::optional<GeodeticOrigin> DecodeOrigin(ByteReader& in) {
   return origin;
 }
 
+// Version 1 got its driven_clamp before it got a number: the bytes behind evidence_clamp tell, of
+// which the origin takes 1 or 25.
+bool HasDrivenClamp(const ByteReader& in, std::uint8_t version) {
+  return version >= 2 || in.remaining() % 24 == 3;
+}
+
+// Fields that the version lacks keep their defaults.
+MapProfile ReadFields(ByteReader& in, std::uint8_t version) {
+  MapProfile profile;
+  profile.cell_size_um = in.U32();
+  profile.tile_cells = in.U16();
+  profile.levels = in.U8();
+  profile.column_segments = in.U8();
+  profile.segment_height_mm = in.U16();
+  profile.column_base_offset_mm = in.U16();
+  profile.vehicle_clearance_mm = in.U16();
+  profile.sigma_slope_ppm = in.U32();
+  profile.sigma_base_mm = in.U16();
+  profile.sigma_interpolated_mm = in.U16();
+  profile.sigma_extrapolated_mm = in.U16();
+  profile.preset = static_cast<FusionPreset>(in.U8());
+  profile.overlap_permille = in.U16();
+  profile.same_layer_mm = in.U16();
+  profile.other_layer_mm = in.U16();
+  profile.layer_span_mm = in.U16();
+  profile.slab_margin_mm = in.U16();
+  if (version >= 2) {
+    profile.stretch_keyframes = in.U16();
+  }
+  profile.sequence_gap = in.U16();
+  if (version >= 2) {
+    profile.band_mm = in.U16();
+    profile.band_segments = in.U8();
+    profile.band_vehicle_segments = in.U8();
+  }
+  profile.hit_units = in.I16();
+  profile.miss_units = in.I16();
+  profile.stretch_clamp = in.I16();
+  profile.evidence_clamp = in.I16();
+  if (version >= 2) {
+    profile.carry_clamp = in.I16();
+  }
+  if (HasDrivenClamp(in, version)) {
+    profile.driven_clamp = in.I16();
+  }
+  if (version >= 3) {
+    profile.driven_hold_ms = in.U32();
+  }
+  profile.origin = DecodeOrigin(in);
+  return profile;
+}
+
 }  // namespace
 
 std::string_view FusionPresetName(FusionPreset preset) {
@@ -146,6 +223,9 @@ Status MapProfile::Validate() const {
 }
 
 Bytes MapProfile::Encode() const {
+  if (!earlier_encoding.empty()) {
+    return earlier_encoding;
+  }
   ByteWriter out;
   out.U8(kProfileVersion);
   out.U32(cell_size_um);
@@ -183,44 +263,23 @@ Bytes MapProfile::Encode() const {
 
 Result<MapProfile> MapProfile::Decode(ByteSpan bytes) {
   ByteReader in(bytes);
-  if (const std::uint8_t version = in.U8(); version != kProfileVersion) {
-    return Error(StatusCode::kUnsupported, StrCat("map profile: version ", int{version},
-                                                  ", this build reads ", int{kProfileVersion}));
+  const std::uint8_t version = in.U8();
+  if (version < 1 || version > kProfileVersion) {
+    return Error(StatusCode::kUnsupported,
+                 StrCat("map profile: version ", int{version}, ", this build reads 1 to ",
+                        int{kProfileVersion}));
   }
-  MapProfile profile;
-  profile.cell_size_um = in.U32();
-  profile.tile_cells = in.U16();
-  profile.levels = in.U8();
-  profile.column_segments = in.U8();
-  profile.segment_height_mm = in.U16();
-  profile.column_base_offset_mm = in.U16();
-  profile.vehicle_clearance_mm = in.U16();
-  profile.sigma_slope_ppm = in.U32();
-  profile.sigma_base_mm = in.U16();
-  profile.sigma_interpolated_mm = in.U16();
-  profile.sigma_extrapolated_mm = in.U16();
-  profile.preset = static_cast<FusionPreset>(in.U8());
-  profile.overlap_permille = in.U16();
-  profile.same_layer_mm = in.U16();
-  profile.other_layer_mm = in.U16();
-  profile.layer_span_mm = in.U16();
-  profile.slab_margin_mm = in.U16();
-  profile.stretch_keyframes = in.U16();
-  profile.sequence_gap = in.U16();
-  profile.band_mm = in.U16();
-  profile.band_segments = in.U8();
-  profile.band_vehicle_segments = in.U8();
-  profile.hit_units = in.I16();
-  profile.miss_units = in.I16();
-  profile.stretch_clamp = in.I16();
-  profile.evidence_clamp = in.I16();
-  profile.carry_clamp = in.I16();
-  profile.driven_clamp = in.I16();
-  profile.driven_hold_ms = in.U32();
-  profile.origin = DecodeOrigin(in);
+  MapProfile profile = ReadFields(in, version);
   if (!in.ok() || in.remaining() != 0) {
     return Error(StatusCode::kInvalidData,
                  "map profile: truncated, has trailing bytes or a has_origin above 1");
+  }
+  if (version < kProfileVersion) {
+    if (Status status = ValidateEarlier(profile); !status.ok()) {
+      return Error(StatusCode::kInvalidData, status.message());
+    }
+    BringIntoRange(profile);
+    profile.earlier_encoding.assign(bytes.begin(), bytes.end());
   }
   if (Status status = profile.Validate(); !status.ok()) {
     return Error(StatusCode::kInvalidData, status.message());

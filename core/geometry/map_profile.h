@@ -83,6 +83,10 @@ struct MapProfile {
 
   std::optional<GeodeticOrigin> origin;
 
+  // A profile that versions 1 or 2 encoded, as it was: blobs name the hash of these bytes. The
+  // fields say what is made of it now, and are not to be changed then. Else empty.
+  Bytes earlier_encoding;
+
   double cell_size_m() const { return cell_size_um * 1e-6; }
   double segment_height_m() const { return segment_height_mm * 1e-3; }
   double tile_size_m() const { return cell_size_m() * tile_cells; }

@@ -8,8 +8,18 @@
 namespace atlas::fuzz {
 namespace {
 
+// As version 2 had it: without the four bytes before the origin.
+Bytes InVersion2(const MapProfile& profile) {
+  Bytes bytes = profile.Encode();
+  const std::ptrdiff_t origin_bytes = profile.origin ? 25 : 1;
+  bytes.erase(bytes.end() - origin_bytes - 4, bytes.end() - origin_bytes);
+  bytes[0] = 2;
+  return bytes;
+}
+
 std::vector<Bytes> Seeds() {
-  return {MapProfile().Encode(), testing::GoldenProfile().Encode()};
+  return {MapProfile().Encode(), testing::GoldenProfile().Encode(), InVersion2(MapProfile()),
+          InVersion2(testing::GoldenProfile())};
 }
 
 bool Run(ByteSpan bytes) {

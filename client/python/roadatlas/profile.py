@@ -7,7 +7,7 @@ import xxhash
 
 from roadatlas.errors import BrokenReply
 
-_VERSION = 3
+_VERSIONS = (1, 2, 3)  # all begin alike
 _HEAD = struct.Struct("<BIHBB")
 
 
@@ -26,6 +26,6 @@ class MapProfile:
 
 
 def parse_profile(encoded: bytes) -> MapProfile:
-    if len(encoded) < _HEAD.size or encoded[0] != _VERSION:
-        raise BrokenReply(f"not a profile of version {_VERSION}")
+    if len(encoded) < _HEAD.size or encoded[0] not in _VERSIONS:
+        raise BrokenReply("not a profile of version 1, 2 or 3")
     return MapProfile(xxhash.xxh64_intdigest(encoded), *_HEAD.unpack_from(encoded)[1:])

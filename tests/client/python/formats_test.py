@@ -7,7 +7,7 @@ import unittest
 
 import xxhash
 from keyframes import Cell, Keyframe, encode_body, with_checksum
-from roadatlas.errors import BadTileBlob, UselessDelta
+from roadatlas.errors import BadTileBlob, BrokenReply, UselessDelta
 from roadatlas.profile import parse_profile
 from roadatlas.tile_blob import encode_tile_blob, merge_tile_blobs, parse_tile_blob
 from roadatlas.tile_delta import apply_delta
@@ -79,6 +79,17 @@ class GoldenFileTest(unittest.TestCase):
         profile = parse_profile(PROFILE)
         self.assertEqual(profile.hash, xxhash.xxh64_intdigest(PROFILE))
         self.assertEqual(profile.tile_side_m(1), 2 * profile.tile_side_m(0))
+
+    def test_profiles_of_earlier_versions(self):
+        expected = dataclasses.replace(parse_profile(PROFILE), hash=0)
+        for name in ("profile_v1_first.bin", "profile_v1.bin", "profile_v2_first.bin", "profile_v2.bin"):
+            encoded = (ROOT / "tests/golden" / name).read_bytes()
+            profile = parse_profile(encoded)
+            self.assertEqual(profile.hash, xxhash.xxh64_intdigest(encoded))
+            self.assertEqual(dataclasses.replace(profile, hash=0), expected)
+        for version in (0, 4):
+            with self.assertRaises(BrokenReply):
+                parse_profile(bytes([version]) + PROFILE[1:])
 
     def test_keyframe(self):
         header = KEYFRAME_HEADER.unpack_from(KEYFRAME)

@@ -1,10 +1,12 @@
 #include "core/geometry/map_profile.h"
 
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/base/hash.h"
 #include "tests/core/support/golden.h"
 #include "tests/core/support/golden_profile.h"
 
@@ -26,6 +28,57 @@ TEST(MapProfileTest, GoldenFile) {
   EXPECT_EQ(GoldenProfile().Encode(), golden);
 }
 
+// The golden profile as versions 1 and 2 had it, each before and after its last change.
+TEST(MapProfileTest, EarlierEncodingsAreReadAndStayWhatTheyAre) {
+  for (const char* name :
+       {"profile_v1_first.bin", "profile_v1.bin", "profile_v2_first.bin", "profile_v2.bin"}) {
+    SCOPED_TRACE(name);
+    const Bytes golden = testing::GoldenFile(name);
+    const auto profile = MapProfile::Decode(golden);
+    ASSERT_TRUE(profile.has_value()) << profile.error().message();
+    EXPECT_EQ(profile->Encode(), golden);
+    EXPECT_EQ(profile->Hash(), Hash64(golden));
+    MapProfile fields = *profile;
+    fields.earlier_encoding.clear();
+    MapProfile expected = GoldenProfile();
+    if (golden[0] == 1) {
+      const MapProfile defaults;
+      expected.band_segments = defaults.band_segments;
+      expected.band_vehicle_segments = defaults.band_vehicle_segments;
+    }
+    EXPECT_EQ(fields, expected);
+    EXPECT_NE(*profile, expected) << "blobs that name one do not name the other";
+  }
+}
+
+TEST(MapProfileTest, EarlierRangesAreBroughtIntoTodays) {
+  const auto decode = [](const std::vector<std::pair<std::size_t, std::int16_t>>& changes) {
+    Bytes bytes = testing::GoldenFile("profile_v1.bin");
+    for (const auto& [offset, value] : changes) {
+      bytes[offset] = static_cast<std::uint8_t>(value & 0xff);
+      bytes[offset + 1] = static_cast<std::uint8_t>(value >> 8);
+    }
+    return MapProfile::Decode(bytes);
+  };
+  constexpr std::size_t kOverlap = 26;
+  constexpr std::size_t kStretchClamp = 42;
+  constexpr std::size_t kEvidenceClamp = 44;
+  constexpr std::size_t kDrivenClamp = 46;
+  const auto profile =
+      decode({{kOverlap, 700}, {kStretchClamp, 100}, {kEvidenceClamp, 20}, {kDrivenClamp, 16'384}});
+  ASSERT_TRUE(profile.has_value()) << profile.error().message();
+  EXPECT_EQ(profile->overlap_permille, 600);
+  EXPECT_EQ(profile->stretch_clamp, 64);
+  EXPECT_EQ(profile->evidence_clamp, 64);
+  EXPECT_EQ(profile->driven_clamp, 127);
+  for (const auto& [offset, value] : {std::pair<std::size_t, std::int16_t>{kOverlap, 951},
+                                      {kStretchClamp, 0},
+                                      {kEvidenceClamp, 128},
+                                      {kDrivenClamp, 63}}) {
+    EXPECT_EQ(decode({{offset, value}}).error().code(), StatusCode::kInvalidData) << offset;
+  }
+}
+
 TEST(MapProfileTest, HashMovesWithEveryByte) {
   const std::uint64_t hash = MapProfile().Hash();
   EXPECT_NE(GoldenProfile().Hash(), hash);
@@ -34,16 +87,21 @@ TEST(MapProfileTest, HashMovesWithEveryByte) {
   EXPECT_NE(profile.Hash(), hash);
 }
 
-TEST(MapProfileTest, RefusesTruncationTrailingBytesAndNewerVersions) {
-  Bytes bytes = GoldenProfile().Encode();
-  for (std::size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_FALSE(MapProfile::Decode(ByteSpan(bytes).first(size)).has_value()) << size;
+TEST(MapProfileTest, RefusesTruncationTrailingBytesAndUnknownVersions) {
+  for (Bytes bytes :
+       {GoldenProfile().Encode(), testing::GoldenFile("profile_v2.bin"),
+        testing::GoldenFile("profile_v1.bin"), testing::GoldenFile("profile_v1_first.bin")}) {
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      EXPECT_FALSE(MapProfile::Decode(ByteSpan(bytes).first(size)).has_value()) << size;
+    }
+    bytes.push_back(0);
+    EXPECT_FALSE(MapProfile::Decode(bytes).has_value());
+    bytes.pop_back();
+    for (const int version : {0, 4}) {
+      bytes[0] = static_cast<std::uint8_t>(version);
+      EXPECT_EQ(MapProfile::Decode(bytes).error().code(), StatusCode::kUnsupported);
+    }
   }
-  bytes.push_back(0);
-  EXPECT_FALSE(MapProfile::Decode(bytes).has_value());
-  bytes.pop_back();
-  bytes[0] = 4;
-  EXPECT_EQ(MapProfile::Decode(bytes).error().code(), StatusCode::kUnsupported);
 }
 
 TEST(MapProfileTest, HasOneEncoding) {

@@ -12,16 +12,24 @@
 
 namespace atlas::testing {
 
-// The content of tests/golden/NAME. With ATLAS_WRITE_GOLDEN set in the environment `fresh` is
-// written there first: for a new format version, never for an old one.
+inline std::string GoldenPath(const std::string& name) {
+  return std::string(ATLAS_GOLDEN_DIR) + "/" + name;
+}
+
+// The content of tests/golden/NAME; empty: there is none.
+inline Bytes GoldenFile(const std::string& name) {
+  std::ifstream in(GoldenPath(name), std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// The same of today's version. With ATLAS_WRITE_GOLDEN set in the environment `fresh` is written
+// there first: for a new format version, never for an old one.
 inline Bytes GoldenFile(const std::string& name, ByteSpan fresh) {
-  const std::string path = std::string(ATLAS_GOLDEN_DIR) + "/" + name;
   if (std::getenv("ATLAS_WRITE_GOLDEN") != nullptr) {
-    std::ofstream out(path, std::ios::binary);
+    std::ofstream out(GoldenPath(name), std::ios::binary);
     std::copy(fresh.begin(), fresh.end(), std::ostreambuf_iterator<char>(out));
   }
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return GoldenFile(name);
 }
 
 }  // namespace atlas::testing
