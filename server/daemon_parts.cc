@@ -8,6 +8,8 @@
 #include <thread>
 #include <utility>
 
+#include <spdlog/spdlog.h>
+
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/sqlite_store.h"
 
@@ -44,6 +46,9 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
   options.new_profile = *profile;
   options.new_atlas_id = RandomId();
   options.on_failed_sync = std::move(on_failed_sync);
+  options.on_upgrade = [](std::int64_t from) {
+    spdlog::info("the atlas is of schema version {}: upgrading it, before anybody is served", from);
+  };
   Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
   if (store) {
     if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {

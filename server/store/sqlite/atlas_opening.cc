@@ -6,6 +6,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/migrations/migration.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
@@ -71,12 +72,15 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
   }
   try {
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
+    AddRowHash(*writer);
+    if (Status status = MigrateStore(*writer, options.on_upgrade); !status.ok()) {
+      return Error(status.WithContext(directory.database_file().string()));
+    }
     auto identity = ReadIdentity(*writer);
     if (!identity) {
       return Error(identity.error().WithContext(directory.database_file().string()));
     }
     writer->Execute("PRAGMA journal_mode = WAL");
-    AddRowHash(*writer);
     KeepTableSums(*writer);
     DropAllLeases(*writer);
     Mend(*writer, identity->profile.levels);

@@ -1,5 +1,5 @@
-// From a directory to an atlas that can be written to: made if there is none, and what every write
-// counts on put right.
+// From a directory to an atlas that can be written to: made if there is none, upgraded if it is of
+// an earlier schema, and what every write counts on put right.
 #pragma once
 
 #include <memory>

@@ -27,12 +27,14 @@ struct SqliteStoreOptions {
   // The disk failed to sync: every write is refused from then on (kUnavailable), the daemon had
   // better stop. Told once, by a thread that must not be held up.
   std::function<void(const Status&)> on_failed_sync = {};
+  // Told the schema version of an atlas of an earlier one, before it is upgraded: that may take.
+  std::function<void(std::int64_t)> on_upgrade = {};
 };
 
 // Opens the atlas in the directory, or makes one if it is missing or empty and a profile is given.
 // kNotFound: there is none and no profile. kConflict: another process has it open.
-// kUnsupported: a newer schema. kInvalidData: not an atlas. Disk errors as in atlas_store.h.
-// Closing it finishes what is queued.
+// An atlas of an earlier schema is upgraded. kUnsupported: a newer one. kInvalidData: not an atlas.
+// Disk errors as in atlas_store.h. Closing it finishes what is queued.
 Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& options);
 
 }  // namespace atlas

@@ -29,9 +29,6 @@ Status ReadFailure(const std::exception& error) {
 }
 
 std::string AdviceFor(StatusCode code, const DatabaseFiles& files) {
-  if (code == StatusCode::kUnsupported) {
-    return "; read it with the version that wrote it";
-  }
   if (code == StatusCode::kPermissionDenied && !files.is_alone()) {
     return StrCat("; it has a log beside it, which takes ", files.database.string(),
                   "-shm to read: make the folder writable, or copy the files that begin with its "

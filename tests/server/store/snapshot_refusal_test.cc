@@ -60,12 +60,14 @@ TEST_F(SnapshotRefusalTest, WhatIsNoAtlasIsInvalid) {
 
 TEST_F(SnapshotRefusalTest, AnotherSchemaVersionIsUnsupported) {
   Fill();
-  for (const std::int64_t version : {kStoreSchemaVersion - 1, kStoreSchemaVersion + 1}) {
+  for (const auto& [version, advice] :
+       {std::pair{kStoreSchemaVersion - 1, "open it once with atlasd"},
+        std::pair{kStoreSchemaVersion + 1, "use the version that wrote it"}}) {
     Tamper("PRAGMA user_version = " + std::to_string(version));
     const auto snapshot = OpenFile(Database());
     ASSERT_FALSE(snapshot);
     EXPECT_EQ(snapshot.error().code(), StatusCode::kUnsupported);
-    EXPECT_THAT(snapshot.error().message(), HasSubstr("the version that wrote it"));
+    EXPECT_THAT(snapshot.error().message(), HasSubstr(advice));
   }
 }
 

@@ -153,21 +153,6 @@ std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) 
   return RowHash(RowKind::kMeta).Raw(profile).Raw(atlas_id).Unsigned(epoch).value();
 }
 
-Status CheckVersions(Connection& connection) {
-  const std::int64_t application = connection.Ask("PRAGMA application_id");
-  if (application != kStoreApplicationId) {
-    return Status(StatusCode::kInvalidData,
-                  StrCat("store: the database belongs to another program (application id ",
-                         application, ", expected ", kStoreApplicationId, ")"));
-  }
-  const std::int64_t version = connection.Ask("PRAGMA user_version");
-  if (version != kStoreSchemaVersion) {
-    return Status(StatusCode::kUnsupported, StrCat("store: schema version ", version,
-                                                   ", this build reads ", kStoreSchemaVersion));
-  }
-  return {};
-}
-
 }  // namespace
 
 void CreateSchema(Connection& connection, const StoreIdentity& identity) {
@@ -187,10 +172,23 @@ void CreateSchema(Connection& connection, const StoreIdentity& identity) {
                          .c_str());
 }
 
-Result<StoreIdentity> ReadIdentity(Connection& connection) {
-  if (Status status = CheckVersions(connection); !status.ok()) {
-    return Error(std::move(status));
+Result<std::int64_t> ReadSchemaVersion(Connection& connection) {
+  const std::int64_t application = connection.Ask("PRAGMA application_id");
+  if (application != kStoreApplicationId) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the database belongs to another program (application id ",
+                        application, ", expected ", kStoreApplicationId, ")"));
   }
+  const std::int64_t version = connection.Ask("PRAGMA user_version");
+  if (version < 1 || version > kStoreSchemaVersion) {
+    return Error(StatusCode::kUnsupported,
+                 StrCat("store: schema version ", version, ", this build knows 1 to ",
+                        kStoreSchemaVersion, "; use the version that wrote it"));
+  }
+  return version;
+}
+
+Result<StoreIdentity> ReadMeta(Connection& connection) {
   Query row =
       connection.Prepare("SELECT profile, atlas_id, epoch, checksum FROM meta WHERE id = 1");
   if (!row.Step()) {
@@ -211,6 +209,19 @@ Result<StoreIdentity> ReadIdentity(Connection& connection) {
   }
   identity.profile = *profile;
   return identity;
+}
+
+Result<StoreIdentity> ReadIdentity(Connection& connection) {
+  const Result<std::int64_t> version = ReadSchemaVersion(connection);
+  if (!version) {
+    return Error(version.error());
+  }
+  if (*version < kStoreSchemaVersion) {
+    return Error(StatusCode::kUnsupported,
+                 StrCat("store: schema version ", *version, ", this build reads ",
+                        kStoreSchemaVersion, "; open it once with atlasd, which upgrades it"));
+  }
+  return ReadMeta(connection);
 }
 
 }  // namespace atlas

@@ -13,8 +13,12 @@ inline constexpr std::int64_t kStoreSchemaVersion = 5;
 // Makes the tables of an empty database and writes who it is, in one transaction.
 void CreateSchema(Connection& connection, const StoreIdentity& identity);
 
-// kInvalidData on a database of another program or a damaged identity, kUnsupported on another
-// schema version.
+// From 1 to kStoreSchemaVersion. kInvalidData on a database of another program, kUnsupported on
+// any other version.
+Result<std::int64_t> ReadSchemaVersion(Connection& connection);
+// Of whichever version: what all of them have. kInvalidData where it is damaged.
+Result<StoreIdentity> ReadMeta(Connection& connection);
+// The same, but kUnsupported on an earlier version, too.
 Result<StoreIdentity> ReadIdentity(Connection& connection);
 
 }  // namespace atlas
