@@ -105,6 +105,10 @@ class AtlasService {
 
   // whole_atlas.h
   Result<AtlasDigest> Digest(const Patience& patience) { return whole_.Digest(patience); }
+  // What happened beside uploads, above `after_id`; atlas_store.h.
+  Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) {
+    return store_.ListEvents(after_id, limit);
+  }
   Result<VerifyReport> Verify(const VerifyRequest& request, const Patience& patience) {
     return whole_.Verify(request, patience);
   }

@@ -20,6 +20,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeCompactCommand());
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
+  commands.push_back(MakeLogCommand());
   commands.push_back(MakeSegmentCommand());
   commands.push_back(MakeLocalizeCommand());
   commands.push_back(MakePlanCommand());

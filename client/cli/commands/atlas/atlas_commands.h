@@ -10,6 +10,7 @@ namespace atlas {
 
 std::unique_ptr<Command> MakeCompactCommand();
 std::unique_ptr<Command> MakeDigestCommand();
+std::unique_ptr<Command> MakeLogCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
 std::unique_ptr<Command> MakeSessionRestoreCommand();
 std::unique_ptr<Command> MakeSessionRetractCommand();
