@@ -116,6 +116,24 @@ Result<VerifySummary> CallVerify(RpcChannel& channel,
                        done.given_up()};
 }
 
+Result<SessionChangeSummary> CallChangeSession(RpcChannel& channel,
+                                               const SessionKey& key,
+                                               SessionAction action,
+                                               const std::string& author) {
+  wire::Envelope request;
+  wire::ChangeSession& change = *request.mutable_change_session();
+  change.set_vehicle(key.vehicle);
+  change.set_session(key.session);
+  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
+                                                      : wire::ChangeSession::RESTORE);
+  change.set_author(author);
+  const auto reply = channel.Call(request, Body::kChangeSessionReply);
+  if (!reply) return Error(reply.error());
+  const wire::ChangeSessionReply& done = reply->change_session_reply();
+  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision(),
+                              done.sessions()};
+}
+
 }  // namespace
 
 // A sync between its request and its end.
@@ -282,17 +300,20 @@ Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
                                                         SessionAction action,
                                                         const std::string& author) {
   if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
-  wire::Envelope request;
-  wire::ChangeSession& change = *request.mutable_change_session();
-  change.set_vehicle(key.vehicle);
-  change.set_session(key.session);
-  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
-                                                      : wire::ChangeSession::RESTORE);
-  change.set_author(author);
-  const auto reply = channel_->Call(request, Body::kChangeSessionReply);
-  if (!reply) return Error(reply.error());
-  const wire::ChangeSessionReply& done = reply->change_session_reply();
-  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision()};
+  return CallChangeSession(*channel_, key, action, author);
+}
+
+Result<SessionChangeSummary> AtlasClient::ChangeVehicle(const std::string& vehicle,
+                                                        SessionAction action,
+                                                        const std::string& author) {
+  if (Status status = CheckMinor(kMinorWithLog, "a change of all of a vehicle's sessions");
+      !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = ValidateName("vehicle", vehicle); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return CallChangeSession(*channel_, {vehicle, ""}, action, author);
 }
 
 Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,

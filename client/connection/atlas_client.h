@@ -83,6 +83,10 @@ class AtlasClient {
   Result<SessionChangeSummary> ChangeSession(const SessionKey& key,
                                              SessionAction action,
                                              const std::string& author);
+  // All of a vehicle's sessions in one step. kUnsupported: a daemon before 1.8.
+  Result<SessionChangeSummary> ChangeVehicle(const std::string& vehicle,
+                                             SessionAction action,
+                                             const std::string& author);
   // Waits until no tile is dirty, `timeout` long. With a revision: of the atlas as it was then,
   // which is fused again meanwhile; kUnsupported when the daemon is too old for that.
   Result<DigestSummary> Digest(std::chrono::milliseconds timeout,

@@ -121,6 +121,7 @@ struct SessionChangeSummary {
   std::string state;  // after it
   std::uint32_t tiles_marked = 0;
   std::uint64_t revision = 0;
+  std::uint32_t sessions = 0;  // that changed; 0 from a daemon before 1.8
 };
 
 struct DigestSummary {

@@ -16,6 +16,8 @@ std::unique_ptr<Command> MakeSessionRestoreCommand();
 std::unique_ptr<Command> MakeSessionRetractCommand();
 std::unique_ptr<Command> MakeSessionsCommand();
 std::unique_ptr<Command> MakeStatusCommand();
+std::unique_ptr<Command> MakeVehicleRestoreCommand();
+std::unique_ptr<Command> MakeVehicleRetractCommand();
 std::unique_ptr<Command> MakeVerifyCommand();
 std::unique_ptr<Command> MakeWaitCommand();
 
