@@ -68,6 +68,8 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.fusion.building.survey_files.directory = config.data / "surveys";
   options.fusion.building.survey_files.max_bytes = static_cast<std::size_t>(config.survey_disk_mib)
                                                    << 20;
+  options.scrub.bytes_per_s = config.scrub_kib_per_s * 1024.0;
+  options.scrub.between = std::chrono::hours(config.scrub_hours);
   options.scratch_directory = config.data;
   return options;
 }

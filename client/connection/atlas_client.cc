@@ -19,6 +19,7 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithPast = 2;
 constexpr std::uint32_t kMinorWithSync = 4;
+constexpr std::uint32_t kMinorWithLog = 8;
 
 // Of a call that is given up after this; 0: never.
 Clock::time_point EndAfter(milliseconds give_up) {
@@ -102,6 +103,37 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   return session;
 }
 
+Result<VerifySummary> CallVerify(RpcChannel& channel,
+                                 wire::Envelope& request,
+                                 milliseconds timeout) {
+  request.mutable_verify_request()->set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel.Call(request, Body::kVerifyReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::VerifyReply& done = reply->verify_reply();
+  return VerifySummary{done.checked(),    done.damaged(),
+                       done.mismatched(), {done.findings().begin(), done.findings().end()},
+                       done.revision(),   done.restored(),
+                       done.given_up()};
+}
+
+Result<SessionChangeSummary> CallChangeSession(RpcChannel& channel,
+                                               const SessionKey& key,
+                                               SessionAction action,
+                                               const std::string& author) {
+  wire::Envelope request;
+  wire::ChangeSession& change = *request.mutable_change_session();
+  change.set_vehicle(key.vehicle);
+  change.set_session(key.session);
+  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
+                                                      : wire::ChangeSession::RESTORE);
+  change.set_author(author);
+  const auto reply = channel.Call(request, Body::kChangeSessionReply);
+  if (!reply) return Error(reply.error());
+  const wire::ChangeSessionReply& done = reply->change_session_reply();
+  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision(),
+                              done.sessions()};
+}
+
 }  // namespace
 
 // A sync between its request and its end.
@@ -170,15 +202,16 @@ Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
   }
 }
 
-Status AtlasClient::CheckSync() const {
-  if (atlas_.protocol_minor >= kMinorWithSync) return {};
+Status AtlasClient::CheckMinor(std::uint32_t needed, const char* what) const {
+  if (atlas_.protocol_minor >= needed) return {};
   return {StatusCode::kUnsupported,
-          StrCat("the daemon speaks protocol ", kProtocolMajor, '.', atlas_.protocol_minor,
-                 ", a sync needs ", kProtocolMajor, '.', kMinorWithSync)};
+          StrCat("the daemon speaks protocol ", kProtocolMajor, '.', atlas_.protocol_minor, ", ",
+                 what, " needs ", kProtocolMajor, '.', needed)};
 }
 
 Result<SyncSummary> AtlasClient::Sync(const SyncQuery& query, const TileCallback& on_tile) {
-  if (Status status = CheckSync(); !status.ok()) return Error(std::move(status));
+  if (Status status = CheckMinor(kMinorWithSync, "a sync"); !status.ok())
+    return Error(std::move(status));
   Result<wire::Envelope> request = SyncRequestOf(query);
   if (!request) return Error(request.error());
   const Clock::time_point latest = EndAfter(query.give_up);
@@ -260,27 +293,27 @@ Result<std::vector<SessionSummary>> AtlasClient::ListSessions() {
 
 // A daemon that does not know the field would answer with the atlas as it is.
 Status AtlasClient::CheckPast(const std::optional<std::uint64_t>& at_revision) const {
-  if (!at_revision || atlas_.protocol_minor >= kMinorWithPast) return {};
-  return {StatusCode::kUnsupported,
-          StrCat("the daemon speaks protocol ", kProtocolMajor, '.', atlas_.protocol_minor,
-                 ", reading an earlier revision needs ", kProtocolMajor, '.', kMinorWithPast)};
+  return at_revision ? CheckMinor(kMinorWithPast, "reading an earlier revision") : Status();
 }
 
 Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
                                                         SessionAction action,
                                                         const std::string& author) {
   if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
-  wire::Envelope request;
-  wire::ChangeSession& change = *request.mutable_change_session();
-  change.set_vehicle(key.vehicle);
-  change.set_session(key.session);
-  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
-                                                      : wire::ChangeSession::RESTORE);
-  change.set_author(author);
-  const auto reply = channel_->Call(request, Body::kChangeSessionReply);
-  if (!reply) return Error(reply.error());
-  const wire::ChangeSessionReply& done = reply->change_session_reply();
-  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision()};
+  return CallChangeSession(*channel_, key, action, author);
+}
+
+Result<SessionChangeSummary> AtlasClient::ChangeVehicle(const std::string& vehicle,
+                                                        SessionAction action,
+                                                        const std::string& author) {
+  if (Status status = CheckMinor(kMinorWithLog, "a change of all of a vehicle's sessions");
+      !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = ValidateName("vehicle", vehicle); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return CallChangeSession(*channel_, {vehicle, ""}, action, author);
 }
 
 Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,
@@ -315,15 +348,36 @@ Result<CompactionSummary> AtlasClient::Compact(std::int64_t before_ms,
 Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout) {
   wire::Envelope request;
   request.mutable_verify_request()->set_rebuild(is_rebuild);
-  request.mutable_verify_request()->set_timeout_ms(TimeoutField(timeout));
-  const auto reply = channel_->Call(request, Body::kVerifyReply, timeout);
+  return CallVerify(*channel_, request, timeout);
+}
+
+Result<VerifySummary> AtlasClient::Repair(bool is_rebuild,
+                                          const std::string& author,
+                                          milliseconds timeout) {
+  if (Status status = CheckMinor(kMinorWithLog, "a repair"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  wire::Envelope request;
+  request.mutable_verify_request()->set_rebuild(is_rebuild);
+  request.mutable_verify_request()->set_repair(true);
+  request.mutable_verify_request()->set_author(author);
+  return CallVerify(*channel_, request, timeout);
+}
+
+Result<std::vector<AtlasEvent>> AtlasClient::ListEvents(std::uint64_t after_id) {
+  if (Status status = CheckMinor(kMinorWithLog, "the log"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  wire::Envelope request;
+  request.mutable_log_request()->set_after_id(after_id);
+  const auto reply = channel_->Call(request, Body::kLogReply);
   if (!reply) return Error(reply.error());
-  const wire::VerifyReply& done = reply->verify_reply();
-  return VerifySummary{done.checked(),
-                       done.damaged(),
-                       done.mismatched(),
-                       {done.findings().begin(), done.findings().end()},
-                       done.revision()};
+  std::vector<AtlasEvent> events;
+  for (const wire::LogReply::Event& event : reply->log_reply().events()) {
+    events.push_back({event.id(), event.revision(), event.time_ms(), event.kind(), event.author(),
+                      event.subject(), event.detail()});
+  }
+  return events;
 }
 
 milliseconds AtlasClient::retry_after() const {

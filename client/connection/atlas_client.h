@@ -83,6 +83,10 @@ class AtlasClient {
   Result<SessionChangeSummary> ChangeSession(const SessionKey& key,
                                              SessionAction action,
                                              const std::string& author);
+  // All of a vehicle's sessions in one step. kUnsupported: a daemon before 1.8.
+  Result<SessionChangeSummary> ChangeVehicle(const std::string& vehicle,
+                                             SessionAction action,
+                                             const std::string& author);
   // Waits until no tile is dirty, `timeout` long. With a revision: of the atlas as it was then,
   // which is fused again meanwhile; kUnsupported when the daemon is too old for that.
   Result<DigestSummary> Digest(std::chrono::milliseconds timeout,
@@ -93,6 +97,14 @@ class AtlasClient {
                                     const std::string& author,
                                     std::chrono::milliseconds timeout);
   Result<VerifySummary> Verify(bool is_rebuild, std::chrono::milliseconds timeout);
+  // The same, and what is damaged is restored where something tells how; damaged keyframes that
+  // nothing tells of are deleted. kUnsupported: a daemon before 1.8.
+  Result<VerifySummary> Repair(bool is_rebuild,
+                               const std::string& author,
+                               std::chrono::milliseconds timeout);
+  // Above `after_id`, oldest first, up to a thousand; none: there are no more. kUnsupported as
+  // above.
+  Result<std::vector<AtlasEvent>> ListEvents(std::uint64_t after_id);
 
   // How long the daemon still wants to be left alone, by what it refused for a while on this
   // connection (`retry_after_ms`); 0: it does not. Nothing here waits for it by itself.
@@ -106,7 +118,8 @@ class AtlasClient {
   AtlasClient(std::unique_ptr<RpcChannel> channel, const MapProfile& profile, AtlasIdentity atlas);
 
   Status CheckPast(const std::optional<std::uint64_t>& at_revision) const;
-  Status CheckSync() const;
+  // kUnsupported naming `what`: the daemon is older than this minor version.
+  Status CheckMinor(std::uint32_t needed, const char* what) const;
   Result<SyncSummary> Follow(std::shared_ptr<SyncRest> rest,
                              std::chrono::steady_clock::time_point latest,
                              const TileCallback& on_tile);

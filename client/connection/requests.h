@@ -121,6 +121,7 @@ struct SessionChangeSummary {
   std::string state;  // after it
   std::uint32_t tiles_marked = 0;
   std::uint64_t revision = 0;
+  std::uint32_t sessions = 0;  // that changed; 0 from a daemon before 1.8
 };
 
 struct DigestSummary {
@@ -143,6 +144,20 @@ struct VerifySummary {
   std::uint64_t mismatched = 0;
   std::vector<std::string> findings;
   std::uint64_t revision = 0;
+  // Of a repair: what was found and put right, and keyframes that are gone.
+  std::uint64_t restored = 0;
+  std::uint64_t given_up = 0;
+};
+
+// What happened to the atlas beside uploads.
+struct AtlasEvent {
+  std::uint64_t id = 0;
+  std::uint64_t revision = 0;  // of the atlas after it
+  std::int64_t time_ms = 0;
+  std::string kind;
+  std::string author;
+  std::string subject;
+  std::string detail;
 };
 
 }  // namespace atlas

@@ -35,6 +35,8 @@ struct DaemonConfig {
   int cache_mib = 512;         // decoded keyframes, all workers together
   int survey_mib = 1024;       // what tiles keep from one fusion to the next
   int survey_disk_mib = 4096;  // the same on disk; 0: nothing
+  int scrub_kib_per_s = 2048;  // that is read back to find damage; 0: nothing
+  int scrub_hours = 24;        // between two passes
   int reply_mib = 64;          // tiles ready to be sent
   int queue_mib = 16;          // replies that wait for slow readers
   int watch_mib = 64;          // areas that are watched

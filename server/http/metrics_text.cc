@@ -69,6 +69,10 @@ void AddAtlas(const ServiceStatus& status, Families& out) {
            status.damaged_tiles);
   AddGauge(out, "store_bytes", "Bytes of the atlas on disk.", counts.store_bytes);
   AddCounter(out, "fusion_tiles_total", "Tiles built.", status.tiles_built);
+  AddCounter(out, "scrub_passes_total", "Times the whole atlas was read back.",
+             status.scrub.passes);
+  AddCounter(out, "scrub_checked_total", "Keyframes and tiles read back.", status.scrub.checked);
+  AddCounter(out, "scrub_damaged_total", "What of it was damaged.", status.scrub.damaged);
   AddCounter(out, "fusion_seconds_total", "Time that all workers together spent on building.",
              status.building_s);
 }

@@ -39,7 +39,8 @@ AtlasService::AtlasService(AtlasStore& store,
           options.fusion),
       wait_(store, changes_, fusion_),
       whole_(store, changes_, wait_),
-      past_(store, options.past_cache_bytes, options.scratch_directory) {}
+      past_(store, options.past_cache_bytes, options.scratch_directory),
+      scrubber_(store, changes_, log_, options.scrub) {}
 
 AtlasService::~AtlasService() {
   Stop();
@@ -48,6 +49,7 @@ AtlasService::~AtlasService() {
 
 void AtlasService::Stop() {
   EndWaits();
+  scrubber_.Stop();
   fusion_.Stop();
 }
 
@@ -187,7 +189,8 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
                        fusion_.building_s(),
                        fusion_.kept_bytes(),
                        fusion_.kept_disk_bytes(),
-                       ResidentBytes()};
+                       ResidentBytes(),
+                       scrubber_.figures()};
 }
 
 Result<AtlasDigest> AtlasService::DigestAt(std::uint64_t revision, const Patience& patience) {

@@ -18,6 +18,7 @@
 #include "server/service/region/region_query.h"
 #include "server/service/sync/sync_plan.h"
 #include "server/service/upload_check.h"
+#include "server/service/verification/scrubber.h"
 #include "server/service/watch/watch_hub.h"
 #include "server/service/whole_atlas.h"
 #include "server/store/atlas_store.h"
@@ -42,10 +43,12 @@ struct ServiceStatus {
   std::uint64_t kept_bytes = 0;     // surveys kept for the next time, those that are compressed too
   std::uint64_t kept_disk_bytes = 0;  // and those on disk
   std::uint64_t rss_bytes = 0;
+  ScrubFigures scrub;
 };
 
 struct ServiceOptions {
   FusionOptions fusion;
+  ScrubOptions scrub;
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
@@ -105,6 +108,10 @@ class AtlasService {
 
   // whole_atlas.h
   Result<AtlasDigest> Digest(const Patience& patience) { return whole_.Digest(patience); }
+  // What happened beside uploads, above `after_id`; atlas_store.h.
+  Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) {
+    return store_.ListEvents(after_id, limit);
+  }
   Result<VerifyReport> Verify(const VerifyRequest& request, const Patience& patience) {
     return whole_.Verify(request, patience);
   }
@@ -138,6 +145,7 @@ class AtlasService {
   FusionWait wait_;
   WholeAtlas whole_;
   PastAtlas past_;
+  Scrubber scrubber_;
 };
 
 }  // namespace atlas

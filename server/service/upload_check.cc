@@ -83,7 +83,8 @@ Status CheckAuthor(const std::string& author) {
 }
 
 Status CheckSessionChange(const SessionChange& change) {
-  ATLAS_RETURN_IF_ERROR(change.key.Validate());
+  ATLAS_RETURN_IF_ERROR(change.key.session.empty() ? ValidateName("vehicle", change.key.vehicle)
+                                                   : change.key.Validate());
   ATLAS_RETURN_IF_ERROR(CheckAuthor(change.author));
   const bool is_line = std::none_of(change.reason.begin(), change.reason.end(), [](char c) {
     return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace atlas {
 
@@ -28,6 +29,45 @@ enum class EventKind : std::uint8_t {
 
 // The author of what nobody asked for.
 inline constexpr const char* kAtlasItself = "atlasd";
+
+// As logs and the protocol name it.
+constexpr std::string_view EventName(EventKind kind) {
+  switch (kind) {
+    case EventKind::kPoses:
+      return "poses";
+    case EventKind::kRetract:
+      return "retract";
+    case EventKind::kRestore:
+      return "restore";
+    case EventKind::kCompact:
+      return "compact";
+    case EventKind::kRules:
+      return "rules";
+    case EventKind::kMarksRestored:
+      return "marks_restored";
+    case EventKind::kKeyframeDamaged:
+      return "keyframe_damaged";
+    case EventKind::kKeyframeHealed:
+      return "keyframe_healed";
+    case EventKind::kKeyframeGivenUp:
+      return "keyframe_given_up";
+    case EventKind::kSessionQuarantined:
+      return "session_quarantined";
+    case EventKind::kSessionReleased:
+      return "session_released";
+    case EventKind::kSessionPurged:
+      return "session_purged";
+    case EventKind::kBackupRestored:
+      return "backup_restored";
+    case EventKind::kUpgraded:
+      return "upgraded";
+    case EventKind::kCountersRestored:
+      return "counters_restored";
+    case EventKind::kTablesRepaired:
+      return "tables_repaired";
+  }
+  return "unknown";  // of a later version
+}
 
 struct Event {
   std::uint64_t id = 0;        // 1, 2, 3, ...

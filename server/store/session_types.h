@@ -36,7 +36,7 @@ inline bool HasNoneYet(const SessionRecord& session) {
 }
 
 struct SessionChange {
-  SessionKey key;
+  SessionKey key;  // without a session: all of the vehicle's
   SessionAction action = SessionAction::kRetract;
   std::string author;
   std::string reason;
@@ -45,8 +45,9 @@ struct SessionChange {
 struct SessionChangeResult {
   SessionState state = SessionState::kLive;  // after it
   bool is_changed = false;
-  std::uint32_t tiles_marked = 0;
+  std::uint32_t tiles_marked = 0;  // of each session that changed
   std::uint64_t revision = 0;
+  std::uint32_t sessions = 0;  // that changed
 };
 
 }  // namespace atlas

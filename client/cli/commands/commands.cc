@@ -17,9 +17,12 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeSessionsCommand());
   commands.push_back(MakeSessionRetractCommand());
   commands.push_back(MakeSessionRestoreCommand());
+  commands.push_back(MakeVehicleRetractCommand());
+  commands.push_back(MakeVehicleRestoreCommand());
   commands.push_back(MakeCompactCommand());
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
+  commands.push_back(MakeLogCommand());
   commands.push_back(MakeSegmentCommand());
   commands.push_back(MakeLocalizeCommand());
   commands.push_back(MakePlanCommand());

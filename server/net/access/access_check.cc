@@ -55,7 +55,12 @@ Status CheckMayAsk(const Identity& identity, const wire::Envelope& request) {
     case wire::Envelope::kCompactRequest:
       return Deny(identity, "compact the atlas");
     case wire::Envelope::kVerifyRequest:
+      if (request.verify_request().repair()) {
+        return Deny(identity, "repair the atlas");
+      }
       return identity.role == Role::kMerge ? Status() : Deny(identity, "verify the atlas");
+    case wire::Envelope::kLogRequest:
+      return identity.role == Role::kMerge ? Status() : Deny(identity, "read the log");
     default:
       return {};
   }

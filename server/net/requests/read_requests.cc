@@ -14,6 +14,8 @@ namespace {
 
 namespace asio = boost::asio;
 
+constexpr std::uint32_t kMaxEvents = 1'000;  // of a reply
+
 void SessionsToWire(const std::vector<SessionRecord>& sessions, wire::SessionsReply& out) {
   for (const SessionRecord& record : sessions) {
     SessionToWire(record, *out.add_sessions());
@@ -64,6 +66,25 @@ asio::awaitable<Status> AnswerStatus(RequestContext& context,
   const Result<ServiceStatus> status = co_await OnPool(context.pool, read);
   co_return co_await Answer(request, status, &wire::Envelope::mutable_status_reply, StatusToWire,
                             out);
+}
+
+asio::awaitable<Status> AnswerLog(RequestContext& context,
+                                  const wire::Envelope& request,
+                                  Peer& peer) {
+  TurnOrder::Turn turn(peer.streams);
+  co_await turn.Come();
+  const bool is_open = co_await peer.out.WaitForRoom();
+  if (!is_open) {
+    co_return Status();
+  }
+  const wire::LogRequest& message = request.log_request();
+  const std::uint32_t limit = message.limit() == 0 ? kMaxEvents : message.limit();
+  const Blocking<std::vector<Event>> list = [&context, &message, limit] {
+    return context.service.ListEvents(message.after_id(), std::min(limit, kMaxEvents));
+  };
+  const Result<std::vector<Event>> events = co_await OnPool(context.pool, list);
+  co_return co_await Answer(request, events, &wire::Envelope::mutable_log_reply, EventsToWire,
+                            peer.out);
 }
 
 asio::awaitable<Status> AnswerSessions(RequestContext& context,

@@ -20,6 +20,9 @@ boost::asio::awaitable<Status> AnswerQuery(RequestContext& context,
 boost::asio::awaitable<Status> AnswerStatus(RequestContext& context,
                                             const wire::Envelope& request,
                                             ReplyWriter& out);
+boost::asio::awaitable<Status> AnswerLog(RequestContext& context,
+                                         const wire::Envelope& request,
+                                         Peer& peer);
 boost::asio::awaitable<Status> AnswerSessions(RequestContext& context,
                                               const wire::Envelope& request,
                                               Peer& peer);

@@ -133,6 +133,7 @@ void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
 
 void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out) {
   out.set_changed(result.is_changed);
+  out.set_sessions(result.sessions);
   out.set_state(StateName(result.state));
   out.set_tiles_marked(result.tiles_marked);
   out.set_revision(result.revision);
@@ -187,7 +188,26 @@ void CompactionToWire(const CompactionReport& report, wire::CompactReply& out) {
   out.set_revision(report.stored.revision);
 }
 
+void EventsToWire(const std::vector<Event>& events, wire::LogReply& out) {
+  for (const Event& event : events) {
+    wire::LogReply::Event& item = *out.add_events();
+    item.set_id(event.id);
+    item.set_revision(event.revision);
+    item.set_time_ms(event.time_ms);
+    item.set_kind(std::string(EventName(event.kind)));
+    item.set_author(event.author);
+    item.set_subject(event.subject);
+    item.set_detail(event.detail);
+  }
+}
+
+VerifyRequest VerifyFromWire(const wire::VerifyRequest& message) {
+  return {message.rebuild(), message.repair(), message.author()};
+}
+
 void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out) {
+  out.set_restored(report.restored);
+  out.set_given_up(report.given_up);
   out.set_checked(report.checked);
   out.set_damaged(report.damaged);
   out.set_mismatched(report.mismatched);

@@ -29,6 +29,12 @@ void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out);
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out);
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out);
 void CompactionToWire(const CompactionReport& report, wire::CompactReply& out);
+void EventsToWire(const std::vector<Event>& events, wire::LogReply& out);
+VerifyRequest VerifyFromWire(const wire::VerifyRequest& message);
+// Who did it: `known` by a certificate or a token, or else who it says.
+inline std::string AuthorOf(const std::string& known, std::string claimed) {
+  return known.empty() ? std::move(claimed) : known;
+}
 void VerifyToWire(const VerifyReport& report, wire::VerifyReply& out);
 
 }  // namespace atlas

@@ -136,6 +136,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& pee
       return AnswerWait(context_, request, peer.out);
     case Envelope::kDigestRequest:
       return AnswerDigest(context_, request, peer.out);
+    case Envelope::kLogRequest:
+      return AnswerLog(context_, request, peer);
     case Envelope::kVerifyRequest:
       return AnswerVerify(context_, request, peer.out);
     case Envelope::kCompactRequest:

@@ -44,6 +44,8 @@ RequestKind KindOf(const Envelope& request) {
       return RequestKind::kWatch;
     case Envelope::kCancelRequest:
       return RequestKind::kCancel;
+    case Envelope::kLogRequest:
+      return RequestKind::kLog;
     default:
       return RequestKind::kUnknown;
   }

@@ -86,17 +86,21 @@ asio::awaitable<Status> AnswerVerify(RequestContext& context,
   if (!place) {
     co_return place.error();
   }
-  const bool is_rebuild = request.verify_request().rebuild();
+  VerifyRequest verify = VerifyFromWire(request.verify_request());
+  verify.author = AuthorOf(out.peer().name, std::move(verify.author));
+  if (Status status = CheckAuthor(verify.author); !status.ok()) {
+    co_return status;
+  }
   const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
-  if (is_rebuild) {  // damage is what it is to report
+  if (verify.rebuild && !verify.repair) {  // damage is what it is to report
     const Result<WaitOutcome> settled =
         co_await RequireSettled(context.service, context.pool, patience);
     if (!settled) {
       co_return settled.error();
     }
   }
-  const Blocking<VerifyReport> check = [&context, is_rebuild, patience] {
-    return context.service.Verify(is_rebuild, patience);
+  const Blocking<VerifyReport> check = [&context, &verify, patience] {
+    return context.service.Verify(verify, patience);
   };
   const Result<VerifyReport> report = co_await OnPool(context.reading_pool, check);
   co_return co_await Answer(request, report, &wire::Envelope::mutable_verify_reply, VerifyToWire,
@@ -109,10 +113,11 @@ asio::awaitable<Status> AnswerCompact(RequestContext& context,
   const Blocking<CompactionRequest> read = [&context, &request] {
     return ReadCompaction(context.service, request.compact_request());
   };
-  const Result<CompactionRequest> compaction = co_await OnPool(context.pool, read);
+  Result<CompactionRequest> compaction = co_await OnPool(context.pool, read);
   if (!compaction) {
     co_return compaction.error();  // before any wait
   }
+  compaction->author = AuthorOf(out.peer().name, std::move(compaction->author));
   const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();

@@ -90,8 +90,12 @@ asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
                                           ReplyWriter& out) {
   const wire::Envelope& message = *request.message;
   const auto poses = request.poses;
-  const Reading<PoseBatchRequest> read = [&message, poses] {
-    return poses ? std::move(*poses) : PosesFromWire(message.update_poses());
+  const Reading<PoseBatchRequest> read = [&message, poses, &known = out.peer().name] {
+    auto batch = poses ? std::move(*poses) : PosesFromWire(message.update_poses());
+    if (batch) {
+      batch->author = AuthorOf(known, std::move(batch->author));
+    }
+    return batch;
   };
   const auto result = co_await Write(context, read, &AtlasService::UpdatePoses);
   co_return co_await Answer(message, result, &wire::Envelope::mutable_update_poses_reply,
@@ -101,8 +105,12 @@ asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
 asio::awaitable<Status> AnswerChangeSession(RequestContext& context,
                                             const wire::Envelope& request,
                                             ReplyWriter& out) {
-  const Reading<SessionChange> read = [&request] {
-    return SessionChangeFromWire(request.change_session());
+  const Reading<SessionChange> read = [&request, &known = out.peer().name] {
+    auto change = SessionChangeFromWire(request.change_session());
+    if (change) {
+      change->author = AuthorOf(known, std::move(change->author));
+    }
+    return change;
   };
   const auto result = co_await Write(context, read, &AtlasService::ChangeSession);
   co_return co_await Answer(request, result, &wire::Envelope::mutable_change_session_reply,

@@ -195,6 +195,9 @@ Status AtlasVerifier::CheckKeyframe(std::int64_t id) {
   if (!blob) {
     return blob.error().WithContext(name);
   }
+  if (options_.on_read) {
+    options_.on_read(blob->size());
+  }
   const auto keyframe = DecodeKeyframe(*blob);
   return keyframe ? Status() : keyframe.error().WithContext(name);
 }
@@ -228,6 +231,9 @@ Status AtlasVerifier::CheckTile(const TileId& id) {
   }
   if (!*tile) {
     return {};
+  }
+  if (options_.on_read) {
+    options_.on_read((*tile)->blob.size());
   }
   ATLAS_RETURN_IF_ERROR(CheckTileBlob(**tile, store_.identity().profile));
   if (!options_.request.rebuild) {

@@ -43,6 +43,8 @@ class AtlasVerifier {
     std::size_t max_findings = 20;
     // Asked between tiles; a failed status ends the verification with it.
     std::function<Status()> check_stop;
+    // Told the size of each blob that was checked, if given.
+    std::function<void(std::size_t)> on_read = {};
   };
 
   AtlasVerifier(AtlasStore& store, Options options);

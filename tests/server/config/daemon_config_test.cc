@@ -78,6 +78,8 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
   EXPECT_EQ(config.cache_mib, 512);
   EXPECT_EQ(config.survey_mib, 1024);
   EXPECT_EQ(config.survey_disk_mib, 4096);
+  EXPECT_EQ(config.scrub_kib_per_s, 2048);
+  EXPECT_EQ(config.scrub_hours, 24);
   EXPECT_EQ(config.log_level, "info");
   EXPECT_EQ(config.NewProfile().value(), MapProfile());
   EXPECT_THAT(Refusal({}), HasSubstr("--data"));
@@ -370,6 +372,8 @@ TEST_F(DaemonConfigTest, HelpNamesTheDefaultsThatCount) {
   EXPECT_EQ(DefaultInHelp(help, "--cache-mib MIB"), std::to_string(config.cache_mib));
   EXPECT_EQ(DefaultInHelp(help, "--survey-mib MIB"), std::to_string(config.survey_mib));
   EXPECT_EQ(DefaultInHelp(help, "--queue-mib MIB"), std::to_string(config.queue_mib));
+  EXPECT_EQ(DefaultInHelp(help, "--scrub-kib-per-s KIB"), std::to_string(config.scrub_kib_per_s));
+  EXPECT_EQ(DefaultInHelp(help, "--scrub-hours H"), std::to_string(config.scrub_hours));
   EXPECT_EQ(DefaultInHelp(help, "--survey-disk-mib MIB"), std::to_string(config.survey_disk_mib));
   EXPECT_EQ(DefaultInHelp(help, "--log-level LEVEL"), config.log_level);
   EXPECT_DOUBLE_EQ(std::stod(DefaultInHelp(help, "--cell-size M")), map.cell_size_m());

@@ -285,6 +285,41 @@ TEST_F(HistoryTest, WhatIsKeptSavesWorkAndChangesNothing) {
   EXPECT_GT(looks[0], 3 * looks[2]);  // each level-0 tile once instead of once a level
 }
 
+// All sessions of a vehicle in one step: the atlas never saw it.
+TEST_F(HistoryTest, AVehicleIsRetractedAndRestored) {
+  const auto fill = [this](const std::vector<std::string>& vehicles) {
+    Open();
+    for (std::uint32_t i = 0; i < 6; ++i) {
+      for (const std::string& vehicle : vehicles) {
+        UploadRequest upload = DriveUpload(i, i % 2 == 0 ? "day" : "night");
+        upload.key.session.vehicle = vehicle;
+        ASSERT_TRUE(Upload(std::move(upload)));
+      }
+    }
+  };
+  const auto change = [this](SessionAction action, const std::string& vehicle) {
+    return Await<SessionChangeResult>([&](auto done) {
+      service_->ChangeSession({{vehicle, ""}, action, "tester", ""}, std::move(done));
+    });
+  };
+  fill({"bus"});
+  const AtlasDigest without = Digest();
+  Close();
+  std::filesystem::remove_all(directory_ / "data");
+  fill({"bus", "truck"});
+  const AtlasDigest with = Digest();
+  EXPECT_NE(with.sha256, without.sha256);
+  const auto retracted = change(SessionAction::kRetract, "truck");
+  ASSERT_TRUE(retracted) << retracted.error().message();
+  EXPECT_EQ(retracted->sessions, 2u);
+  EXPECT_TRUE(retracted->is_changed);
+  EXPECT_EQ(Digest().sha256, without.sha256);
+  EXPECT_FALSE(change(SessionAction::kRetract, "truck")->is_changed);
+  EXPECT_EQ(change(SessionAction::kRestore, "truck")->sessions, 2u);
+  EXPECT_EQ(Digest().sha256, with.sha256);
+  EXPECT_EQ(change(SessionAction::kRetract, "tram").error().code(), StatusCode::kNotFound);
+}
+
 TEST_F(HistoryTest, RevisionsThatAreNotThereAreRefused) {
   Open();
   UploadDrive(1);

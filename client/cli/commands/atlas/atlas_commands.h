@@ -10,11 +10,14 @@ namespace atlas {
 
 std::unique_ptr<Command> MakeCompactCommand();
 std::unique_ptr<Command> MakeDigestCommand();
+std::unique_ptr<Command> MakeLogCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
 std::unique_ptr<Command> MakeSessionRestoreCommand();
 std::unique_ptr<Command> MakeSessionRetractCommand();
 std::unique_ptr<Command> MakeSessionsCommand();
 std::unique_ptr<Command> MakeStatusCommand();
+std::unique_ptr<Command> MakeVehicleRestoreCommand();
+std::unique_ptr<Command> MakeVehicleRetractCommand();
 std::unique_ptr<Command> MakeVerifyCommand();
 std::unique_ptr<Command> MakeWaitCommand();
 

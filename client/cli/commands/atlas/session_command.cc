@@ -1,4 +1,5 @@
 // `atlas session retract V/S` and `atlas session restore V/S`: a drive out of the map and back.
+// `atlas vehicle retract V` and `restore V`: all its drives.
 #include "client/cli/commands/atlas/atlas_commands.h"
 #include "core/base/str_cat.h"
 
@@ -63,6 +64,44 @@ class SessionCommand : public Command {
   std::string session_;
 };
 
+class VehicleCommand : public Command {
+ public:
+  VehicleCommand(std::string word, std::string summary, SessionAction action)
+      : word_(std::move(word)), summary_(std::move(summary)), action_(action) {}
+
+  std::string Name() const override { return "vehicle " + word_; }
+  std::string Summary() const override { return summary_; }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Required("VEHICLE", "VEHICLE", vehicle_, "As `atlas sessions` lists it");
+  }
+
+  Status Run(CommandContext& context) override {
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    const auto done = client->ChangeVehicle(vehicle_, action_, "atlas-vehicle-" + word_);
+    if (!done) return done.error();
+    if (context.is_json) {
+      context.PrintJson({{"vehicle", vehicle_},
+                         {"sessions", done->sessions},
+                         {"changed", done->is_changed},
+                         {"tiles_marked", done->tiles_marked},
+                         {"revision", done->revision}});
+    } else {
+      context.out << done->sessions << " sessions of " << vehicle_ << " changed, "
+                  << done->tiles_marked << " tiles to be fused again, revision " << done->revision
+                  << '\n';
+    }
+    return {};
+  }
+
+ private:
+  std::string word_;
+  std::string summary_;
+  SessionAction action_;
+  std::string vehicle_;
+};
+
 }  // namespace
 
 std::unique_ptr<Command> MakeSessionRetractCommand() {
@@ -72,6 +111,16 @@ std::unique_ptr<Command> MakeSessionRetractCommand() {
 
 std::unique_ptr<Command> MakeSessionRestoreCommand() {
   return std::make_unique<SessionCommand>("restore", "Put a retracted session back into the map",
+                                          SessionAction::kRestore);
+}
+
+std::unique_ptr<Command> MakeVehicleRetractCommand() {
+  return std::make_unique<VehicleCommand>(
+      "retract", "Take all sessions of a vehicle out of the map", SessionAction::kRetract);
+}
+
+std::unique_ptr<Command> MakeVehicleRestoreCommand() {
+  return std::make_unique<VehicleCommand>("restore", "Put a vehicle's retracted sessions back",
                                           SessionAction::kRestore);
 }
 

@@ -8,14 +8,17 @@ namespace {
 
 boost::json::object VerifyJson(const VerifySummary& found) {
   boost::json::array findings(found.findings.begin(), found.findings.end());
-  return {{"checked", found.checked},
-          {"damaged", found.damaged},
-          {"mismatched", found.mismatched},
-          {"findings", std::move(findings)},
+  return {{"checked", found.checked},       {"damaged", found.damaged},
+          {"mismatched", found.mismatched}, {"findings", std::move(findings)},
+          {"restored", found.restored},     {"given_up", found.given_up},
           {"revision", found.revision}};
 }
 
-void PrintVerify(const VerifySummary& found, std::ostream& out) {
+void PrintVerify(const VerifySummary& found, bool is_repair, std::ostream& out) {
+  if (is_repair) {
+    out << "repaired: " << found.restored << " restored, " << found.given_up
+        << " keyframes given up; now ";
+  }
   out << found.checked << " checked, " << found.damaged << " damaged, " << found.mismatched
       << " mismatched\n";
   for (const std::string& finding : found.findings) {
@@ -31,18 +34,22 @@ class VerifyCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     arguments.Flag("--rebuild", is_rebuild_,
                    "Also fuse every tile again from its keyframes and compare");
+    arguments.Flag("--repair", is_repair_,
+                   "Restore what is damaged; delete keyframes that nothing can restore");
     DeclareTimeout(arguments, timeout_);
   }
 
   Status Run(CommandContext& context) override {
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const Result<VerifySummary> found = client->Verify(is_rebuild_, timeout_);
+    const Result<VerifySummary> found = is_repair_
+                                            ? client->Repair(is_rebuild_, "atlas-verify", timeout_)
+                                            : client->Verify(is_rebuild_, timeout_);
     if (!found) return found.error();
     if (context.is_json) {
       context.PrintJson(VerifyJson(*found));
     } else {
-      PrintVerify(*found, context.out);
+      PrintVerify(*found, is_repair_, context.out);
     }
     if (found->damaged == 0 && found->mismatched == 0) return {};
     return {StatusCode::kInvalidData, StrCat("verify: ", found->damaged, " damaged and ",
@@ -51,6 +58,7 @@ class VerifyCommand : public Command {
 
  private:
   bool is_rebuild_ = false;
+  bool is_repair_ = false;
   std::chrono::milliseconds timeout_{3'600'000};
 };
 

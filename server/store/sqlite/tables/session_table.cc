@@ -103,6 +103,22 @@ Result<std::optional<SessionRow>> FindSession(Connection& connection, const Sess
   return std::move(*session);
 }
 
+Result<std::vector<SessionRow>> FindSessions(Connection& connection, const std::string& vehicle) {
+  Query row = connection.Prepare(
+      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? ORDER BY session");
+  row.Bind(std::string_view(vehicle));
+  std::vector<SessionRow> sessions;
+  while (row.Step()) {
+    auto session = ReadRow(row);
+    if (!session) {
+      return Error(session.error());
+    }
+    sessions.push_back(std::move(*session));
+  }
+  return sessions;
+}
+
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id) {
   Query row = connection.Prepare(
       "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "

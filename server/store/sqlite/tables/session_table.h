@@ -17,6 +17,8 @@ struct SessionRow {
 
 // nullopt: unknown. kInvalidData: its row is damaged.
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
+// All of a vehicle. kInvalidData: a row is damaged.
+Result<std::vector<SessionRow>> FindSessions(Connection& connection, const std::string& vehicle);
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
 Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
 // kInvalidData when its row, a line of its history or a tombstone of its keyframes is damaged.

@@ -32,6 +32,16 @@ std::int64_t NowMs() {
   return std::chrono::duration_cast<milliseconds>(now).count();
 }
 
+// Dropped by a compaction, say, since somebody saw it: nothing is left of it.
+bool IsGone(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT EXISTS (SELECT 1 FROM keyframes WHERE id = ?1) "
+      "OR EXISTS (SELECT 1 FROM poses WHERE keyframe_id = ?1) "
+      "OR EXISTS (SELECT 1 FROM keyframe_tiles WHERE keyframe_id = ?1)");
+  row.Bind(id);
+  return row.Step() && row.Int() == 0;
+}
+
 // For people: its key where the rows still tell it.
 std::string NameOf(Connection& connection, std::int64_t id) {
   const auto row = ReadKeyframeRow(connection, id);
@@ -132,7 +142,7 @@ std::uint32_t NoteDamageInStore(Connection& connection, std::span<const std::int
   std::uint32_t noted = 0;
   for (const std::int64_t id : keyframes) {
     Status status = CheckKeyframe(connection, id);
-    if (status.ok()) {
+    if (status.ok() || IsGone(connection, id)) {
       continue;
     }
     if (RestoreFromOthers(connection, id) && CheckKeyframe(connection, id).ok()) {
@@ -191,7 +201,7 @@ Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const Keyfra
     });
   };
   const Status damage = check();
-  if (damage.ok()) {
+  if (damage.ok() || IsGone(connection, repair.id)) {
     return DeleteDamagedKeyframe(connection, repair.id) ? RepairOutcome::kRestored
                                                         : RepairOutcome::kIntact;
   }

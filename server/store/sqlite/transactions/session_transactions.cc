@@ -42,6 +42,7 @@ SessionChangeResult EnterState(Connection& connection,
                                const SessionChange& change) {
   const bool was_in_map = IsInMap(session.record.state);
   SessionChangeResult result{state, true};
+  result.sessions = 1;
   result.revision = NextRevision(connection);
   session.record.state = state;
   WriteSession(connection, session);
@@ -53,10 +54,52 @@ SessionChangeResult EnterState(Connection& connection,
   return result;
 }
 
+Result<SessionChangeResult> ChangeOne(Connection& connection,
+                                      const SessionRow& session,
+                                      const SessionChange& change) {
+  const auto state = StateAfter(connection, session, change.action);
+  if (!state) {
+    return Error(state.error());
+  }
+  if (*state == session.record.state) {
+    return SessionChangeResult{*state, false, 0, ReadCounter(connection, Counter::kRevision)};
+  }
+  return EnterState(connection, session, *state, change);
+}
+
+Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionChange& change) {
+  const auto sessions = FindSessions(connection, change.key.vehicle);
+  if (!sessions) {
+    return Error(sessions.error());
+  }
+  if (sessions->empty()) {
+    return Error(StatusCode::kNotFound,
+                 StrCat("vehicle ", change.key.vehicle, " is not in the atlas"));
+  }
+  SessionChangeResult all;
+  for (const SessionRow& session : *sessions) {
+    SessionChange one = change;
+    one.key = session.record.key;
+    const auto result = ChangeOne(connection, session, one);
+    if (!result) {
+      return result;
+    }
+    all.state = result->state;
+    all.is_changed = all.is_changed || result->is_changed;
+    all.tiles_marked += result->tiles_marked;
+    all.revision = result->revision;
+    all.sessions += result->sessions;
+  }
+  return all;
+}
+
 }  // namespace
 
 Result<SessionChangeResult> ChangeSessionInStore(Connection& connection,
                                                  const SessionChange& change) {
+  if (change.key.session.empty()) {
+    return ChangeVehicle(connection, change);
+  }
   const auto session = FindSession(connection, change.key);
   if (!session) {
     return Error(session.error());
@@ -64,14 +107,7 @@ Result<SessionChangeResult> ChangeSessionInStore(Connection& connection,
   if (!*session) {
     return Error(StatusCode::kNotFound, StrCat("session ", change.key, " is not in the atlas"));
   }
-  const auto state = StateAfter(connection, **session, change.action);
-  if (!state) {
-    return Error(state.error());
-  }
-  if (*state == (*session)->record.state) {
-    return SessionChangeResult{*state, false, 0, ReadCounter(connection, Counter::kRevision)};
-  }
-  return EnterState(connection, **session, *state, change);
+  return ChangeOne(connection, **session, change);
 }
 
 }  // namespace atlas

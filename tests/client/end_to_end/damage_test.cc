@@ -1,0 +1,80 @@
+// Keyframes that are damaged on disk, through the real programs: named, healed by a second ingest,
+// or given up by `atlas verify --repair`; `atlas log` tells all of it.
+#include <csignal>
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include "tests/client/end_to_end/end_to_end_fixture.h"
+
+namespace atlas {
+namespace {
+
+class DamageEndToEndTest : public EndToEndTest {
+ protected:
+  static void Spoil(const fs::path& data) {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open((data / "atlas.db").c_str(), &db), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db,
+                           "UPDATE keyframes SET blob = zeroblob(blob_bytes) WHERE id IN "
+                           "(SELECT id FROM keyframes ORDER BY id LIMIT 2)",
+                           nullptr, nullptr, &message),
+              SQLITE_OK)
+        << message;
+    sqlite3_close(db);
+  }
+  static std::vector<std::string> Kinds(const DaemonProcess& daemon) {
+    const CommandRun log = RunAtlas(daemon.address(), {"log"});
+    EXPECT_EQ(log.exit_code, 0) << log.err;
+    std::vector<std::string> kinds;
+    for (const auto& event : log.json().at("events").as_array()) {
+      kinds.emplace_back(event.at("kind").as_string());
+    }
+    return kinds;
+  }
+};
+
+TEST_F(DamageEndToEndTest, ASecondIngestHealsAndARepairGivesUp) {
+  const fs::path data = NewData();
+  std::string intact;
+  {
+    DaemonProcess daemon(data, kSmall);
+    ASSERT_EQ(Ingest(daemon).exit_code, 0);
+    intact = Digest(daemon);
+    EXPECT_THAT(Kinds(daemon), ::testing::IsEmpty());
+    EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+  }
+  Spoil(data);
+  {
+    DaemonProcess daemon(data, {});
+    const CommandRun verify = RunAtlas(daemon.address(), {"verify"});
+    EXPECT_EQ(verify.exit_code, 4) << verify.err;
+    EXPECT_EQ(verify.Get<int>("damaged"), 2);
+    EXPECT_THAT(Kinds(daemon), ::testing::ElementsAre("keyframe_damaged", "keyframe_damaged"));
+    EXPECT_EQ(Digest(daemon), intact);  // nothing is fused without them
+    const CommandRun again = Ingest(daemon);
+    EXPECT_EQ(again.exit_code, 0) << again.err;
+    EXPECT_EQ(Digest(daemon), intact);
+    EXPECT_EQ(RunAtlas(daemon.address(), {"verify", "--rebuild"}).exit_code, 0);
+    EXPECT_THAT(Kinds(daemon), ::testing::ElementsAre("keyframe_damaged", "keyframe_damaged",
+                                                      "keyframe_healed", "keyframe_healed"));
+    EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+  }
+  Spoil(data);
+  DaemonProcess daemon(data, {});
+  const CommandRun repair = RunAtlas(daemon.address(), {"verify", "--repair"});
+  EXPECT_EQ(repair.exit_code, 0) << repair.err;
+  EXPECT_EQ(repair.Get<int>("given_up"), 2);
+  EXPECT_EQ(repair.Get<int>("damaged"), 0);
+  EXPECT_NE(Digest(daemon), intact);
+  EXPECT_EQ(RunAtlas(daemon.address(), {"verify", "--rebuild"}).exit_code, 0);
+  const CommandRun tail = RunAtlas(daemon.address(), {"log", "--after", "4"});
+  EXPECT_EQ(tail.json().at("events").as_array().at(0).at("author").as_string(), "atlas-verify");
+  const CommandRun sent = Ingest(daemon);
+  EXPECT_EQ(sent.exit_code, 0) << sent.err;
+  EXPECT_EQ(Digest(daemon), intact);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,75 @@
+// What was done to the atlas, as peers are told.
+#include "tests/server/net/tls_fixture.h"
+
+namespace atlas {
+namespace {
+
+using LogRequestTest = NetTest;
+
+wire::Envelope LogOf(std::uint64_t after_id, std::uint32_t limit = 0) {
+  wire::Envelope envelope;
+  envelope.set_request_id(3);
+  envelope.mutable_log_request()->set_after_id(after_id);
+  envelope.mutable_log_request()->set_limit(limit);
+  return envelope;
+}
+
+TEST_F(LogRequestTest, EventsComeInOrderAndInPages) {
+  Serve();
+  UploadDrive(2);
+  Digest();
+  ASSERT_TRUE(Change("day", SessionAction::kRetract));
+  ASSERT_TRUE(Change("day", SessionAction::kRestore));
+  ASSERT_TRUE(Change("day", SessionAction::kRestore));  // changes nothing
+  const auto peer = Connect();
+  peer->Send(LogOf(0));
+  const auto all = peer->Receive();
+  ASSERT_TRUE(all->has_log_reply()) << all->ShortDebugString();
+  ASSERT_EQ(all->log_reply().events_size(), 2);
+  const wire::LogReply::Event& first = all->log_reply().events(0);
+  EXPECT_EQ(first.id(), 1u);
+  EXPECT_EQ(first.kind(), "retract");
+  EXPECT_EQ(first.author(), "tester");
+  EXPECT_EQ(first.subject(), "bus/day");
+  EXPECT_GT(first.time_ms(), kTestNow_ms);
+  EXPECT_EQ(all->log_reply().events(1).kind(), "restore");
+  EXPECT_GT(all->log_reply().events(1).revision(), first.revision());
+  peer->Send(LogOf(0, 1));
+  EXPECT_EQ(peer->Receive()->log_reply().events_size(), 1);
+  peer->Send(LogOf(1));
+  EXPECT_EQ(peer->Receive()->log_reply().events(0).id(), 2u);
+  peer->Send(LogOf(2));
+  EXPECT_EQ(peer->Receive()->log_reply().events_size(), 0);
+}
+
+// Whoever is known by a name cannot take another's.
+TEST_F(TlsTest, TheLogNamesWhoeverIsKnown) {
+  ServeTls("admin");
+  ASSERT_TRUE(Upload(DriveUpload(0)));
+  BlockingPeer alice(port_, Anonymous());
+  alice.Greet(kProtocolMajor, "", "open sesame");
+  wire::Envelope retraction = Retraction();
+  retraction.mutable_change_session()->set_vehicle("bus");
+  retraction.mutable_change_session()->set_session("day");
+  retraction.mutable_change_session()->set_author("bob");
+  ASSERT_EQ(Ask(alice, retraction), StatusCode::kOk);
+  ASSERT_TRUE(alice.Send(LogOf(0)));
+  EXPECT_EQ(alice.Receive()->log_reply().events(0).author(), "alice");
+}
+
+TEST_F(TlsTest, TheLogAndRepairsAreNotForAll) {
+  ServeTls("reader");
+  wire::Envelope repair = Verification();
+  repair.mutable_verify_request()->set_repair(true);
+  BlockingPeer alice(port_, Anonymous());
+  alice.Greet(kProtocolMajor, "", "open sesame");
+  EXPECT_EQ(Ask(alice, LogOf(0)), StatusCode::kPermissionDenied);
+  EXPECT_EQ(Ask(alice, repair), StatusCode::kPermissionDenied);
+  BlockingPeer merge(port_, As("aligner", "merge"));
+  merge.Greet();
+  EXPECT_EQ(Ask(merge, LogOf(0)), StatusCode::kOk);
+  EXPECT_EQ(Ask(merge, repair), StatusCode::kPermissionDenied);
+}
+
+}  // namespace
+}  // namespace atlas
