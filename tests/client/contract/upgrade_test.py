@@ -52,6 +52,9 @@ def upgrade_cases(report, bin_dir, golden, name, drive, work):
         report.equal(f"{name}: verified", (sound["damaged"], sound["mismatched"]), (0, 0))
         report.check(f"{name}: tiles", cases.run("status")["tiles"] > 10, cases.run("status"))
         report.check(f"{name}: the map", cases.run("point", *PLACE)["layers"], cases.run("point", *PLACE))
+        event = cases.run("log")["events"][0]
+        report.equal(f"{name}: event", (event["kind"], event["author"], event["detail"]),
+                     ("upgraded", "atlasd", f"from version {name[7]}"))
         vehicle_cases(cases, name, drive)
         report.equal(f"{name}: exit code", daemon.stop(), 0)
     shown = point(bin_dir, data)
