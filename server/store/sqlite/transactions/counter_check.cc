@@ -19,7 +19,9 @@ struct Recount {
   const char* sql;
 };
 
-// Cells: of level 0, the keys of which begin with 0 (tile_id.h).
+// The number of sessions gives them their ids: it is the highest. Cells are those of level 0, whose
+// keys begin with 0 (tile_id.h). Sums leave out what no blob and no tile has: damaged rows must not
+// overflow them.
 constexpr Recount kRecounts[] = {
     {Counter::kRevision, "revision", Told::kAtLeast,
      "SELECT max(coalesce((SELECT max(revision) FROM pose_history), 0), "
@@ -33,15 +35,17 @@ constexpr Recount kRecounts[] = {
      "SELECT coalesce(max(id), 0) FROM keyframes"},
     {Counter::kKeyframes, "keyframes", Told::kExactly, "SELECT count(*) FROM keyframes"},
     {Counter::kKeyframeBytes, "keyframe_bytes", Told::kExactly,
-     "SELECT coalesce(sum(blob_bytes), 0) FROM keyframes"},
+     "SELECT coalesce(sum(blob_bytes & 0xFFFFFFFF), 0) FROM keyframes"},
     {Counter::kTiles, "tiles", Told::kExactly, "SELECT count(*) FROM tiles"},
     {Counter::kTileBytes, "tile_bytes", Told::kExactly,
-     "SELECT coalesce(sum(blob_bytes), 0) FROM tiles"},
+     "SELECT coalesce(sum(blob_bytes & 0xFFFFFFFF), 0) FROM tiles"},
     {Counter::kCells, "cells", Told::kExactly,
-     "SELECT coalesce(sum(cells), 0) FROM tiles WHERE key BETWEEN 0 AND (1 << 58) - 1"},
+     "SELECT coalesce(sum(cells & 0xFFFFFFFF), 0) FROM tiles WHERE key BETWEEN 0 AND (1 << 58) - "
+     "1"},
     {Counter::kMultilayerCells, "multilayer_cells", Told::kExactly,
-     "SELECT coalesce(sum(multilayer_cells), 0) FROM tiles WHERE key BETWEEN 0 AND (1 << 58) - 1"},
-    {Counter::kSessions, "sessions", Told::kExactly, "SELECT count(*) FROM sessions"},
+     "SELECT coalesce(sum(multilayer_cells & 0xFFFFFFFF), 0) FROM tiles "
+     "WHERE key BETWEEN 0 AND (1 << 58) - 1"},
+    {Counter::kSessions, "sessions", Told::kExactly, "SELECT coalesce(max(id), 0) FROM sessions"},
     {Counter::kHistoryHorizon, "history_horizon", Told::kExactly,
      "SELECT coalesce(max(revision), 0) FROM compactions"},
     {Counter::kCompactions, "compactions", Told::kExactly, "SELECT count(*) FROM compactions"},
