@@ -336,9 +336,13 @@ TEST_P(MigrationTest, ASessionThatWasLostIsMissed) {
   Make();
   Tamper("DELETE FROM sessions WHERE id = 1");
   Open();
-  const Status status = store_->CheckCounters();
-  EXPECT_EQ(status.code(), StatusCode::kInvalidData);
-  EXPECT_THAT(status.message(), HasSubstr("sessions"));
+  EXPECT_THAT(Detail(), HasSubstr("rows of 1 sessions are lost"));
+  EXPECT_EQ(store_->ReadKeyframe(2).error().code(), StatusCode::kInvalidData) << "it was of it";
+  const std::size_t left = store_->ListSessions().value().size();
+  NewKeyframe keyframe = MakeKeyframe(0, {{0, 0, 0}});
+  keyframe.key.session.session = "new";
+  EXPECT_TRUE(Put(keyframe).has_value());
+  EXPECT_EQ(store_->ListSessions().value().size(), left + 1) << "in the place of another";
 }
 
 }  // namespace

@@ -83,9 +83,8 @@ struct Recount {
   bool is_least = false;  // the counter may be higher: of what is gone no row tells
 };
 
-// An id is not given twice, and the number of sessions gives theirs: it is the highest, and where
-// rows are lost verification finds that it is not how many there are. Sums leave out what no blob
-// and no tile has: damaged rows must not overflow them.
+// An id is not given twice, and the number of sessions gives theirs: it is the highest. Sums leave
+// out what no blob and no tile has: damaged rows must not overflow them.
 constexpr Recount kRecounts[] = {
     {Counter::kRevision, "revisions",
      "SELECT max((SELECT coalesce(max(revision), 0) FROM pose_history), "
@@ -125,6 +124,12 @@ std::string CountAgain(Connection& connection, const Recount& recount) {
   return StrCat("; it counted ", counted, " ", recount.what, ", and the rows say ", found);
 }
 
+// No version up to this one deleted sessions.
+std::string MissSessions(Connection& connection) {
+  const std::int64_t lost = connection.Ask("SELECT coalesce(max(id), 0) - count(*) FROM sessions");
+  return lost == 0 ? std::string() : StrCat("; rows of ", lost, " sessions are lost");
+}
+
 }  // namespace
 
 std::string MigrateFromVersion4(Connection& connection) {
@@ -133,7 +138,7 @@ std::string MigrateFromVersion4(Connection& connection) {
   for (const Recount& recount : kRecounts) {
     noticed += CountAgain(connection, recount);
   }
-  return noticed;
+  return noticed + MissSessions(connection);
 }
 
 }  // namespace atlas

@@ -8,8 +8,8 @@
 namespace atlas {
 
 // Inside of a transaction. Also adds the counters that earlier versions lack. Numbers that rows
-// tell, too, are counted again; which of them were others is returned, for people: "; it counted
-// ...", empty if none was.
+// tell, too, are counted again; which of them were others, and that sessions are lost, is returned,
+// for people: "; it counted ...", empty if all is well.
 std::string MigrateFromVersion4(Connection& connection);
 
 }  // namespace atlas
