@@ -109,6 +109,7 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
 }
 
 asio::awaitable<Status> PeerConnection::TakeRequests() {
+  AnsweringTurn turn(stream_);
   while (!is_refused_ && !is_draining_ && !writer_.is_closed()) {
     Status status;
     std::optional<LargeFrame> large;
@@ -133,6 +134,8 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
     frame_clock_.Expect(Clock::now(), 0);
     if (!HasRoom()) {
       co_await WaitForRoom();
+    } else if (turn.IsOver()) {
+      co_await turn.Pass();
     }
   }
   if (is_greeted_) {
