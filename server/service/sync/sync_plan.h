@@ -62,14 +62,14 @@ struct SyncPlan {
   std::vector<bool> is_tile_seen;
   std::vector<bool> is_block_seen;
 
-  // Of what is held; the items stay.
+  // Of what is held, with its memory, which assigning `{}` would keep; the items stay.
   void DropHoldings() {
-    current_tiles = {};
-    current_blocks = {};
-    removed = {};
-    differing = {};
-    is_tile_seen = {};
-    is_block_seen = {};
+    current_tiles = Bytes();
+    current_blocks = Bytes();
+    removed = std::vector<std::uint64_t>();
+    differing = std::vector<std::uint64_t>();
+    is_tile_seen = std::vector<bool>();
+    is_block_seen = std::vector<bool>();
   }
   std::size_t item_bytes() const { return items.capacity() * sizeof(SyncItem); }
 };

@@ -61,6 +61,20 @@ HeldTiles SomeOf(const KnownTiles& tiles, std::uint32_t seed) {
   return HeldTiles::Create(std::move(held), std::move(blocks)).value();
 }
 
+TEST(SyncPlanTest, WhatIsDroppedTakesNoMemory) {
+  Streets tiles(1);
+  SyncRequest request = Ask(DiscArea{{0.0, 0.0}, 1e6});
+  request.held = SomeOf(tiles, 1);
+  SyncPlan plan = Plan(request, tiles);
+  ASSERT_FALSE(plan.removed.empty() || plan.differing.empty());
+  plan.DropHoldings();
+  for (const std::size_t capacity :
+       {plan.current_tiles.capacity(), plan.current_blocks.capacity(), plan.removed.capacity(),
+        plan.differing.capacity(), plan.is_tile_seen.capacity(), plan.is_block_seen.capacity()}) {
+    EXPECT_EQ(capacity, 0u);
+  }
+}
+
 TEST(SyncPlanTest, GoesOnAlikeWithoutWhatIsHeldOfNothing) {
   for (std::uint32_t seed = 0; seed < 30; ++seed) {
     Streets tiles(seed);
