@@ -17,6 +17,7 @@ import bench_load
 import bench_memory
 import bench_nginx
 import bench_serving
+import bench_unread
 import bench_updates
 from bench_daemon import Atlas
 
@@ -206,7 +207,7 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
-                                   **bench_memory.BENCHMARKS}.items()}}
+                                   **bench_memory.BENCHMARKS, **bench_unread.BENCHMARKS}.items()}}
 
 
 def main():

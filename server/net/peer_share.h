@@ -1,5 +1,5 @@
 // What one name, or one address without one, may take of what all share: places of those who wait,
-// watches and their areas. Thread-safe.
+// watches and their areas, bytes of replies a second. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +9,7 @@
 #include "server/net/byte_budget.h"
 #include "server/net/net_options.h"
 #include "server/net/places.h"
+#include "server/net/served_rate.h"
 
 namespace atlas {
 
@@ -17,12 +18,14 @@ struct PeerShare {
       : whose(std::move(name)),
         waits(limits.waits),
         watches(limits.watches),
-        watched(limits.watched_bytes) {}
+        watched(limits.watched_bytes),
+        served(limits.served_bytes_per_s) {}
 
   const std::string whose;  // for messages
   Places waits;
   Places watches;
   ByteBudget watched;
+  ServedRate served;
 };
 
 }  // namespace atlas

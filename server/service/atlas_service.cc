@@ -144,8 +144,12 @@ Result<std::optional<StoredTile>> AtlasService::NextTile(RegionQuery& query) {
   return tile;
 }
 
-Result<std::optional<SyncPlan>> AtlasService::PlanSync(const SyncRequest& request, bool may_block) {
-  return atlas::PlanSync(request, store_, store_.identity().profile, may_block);
+Result<std::optional<SyncPlan>> AtlasService::PlanSync(const SyncRequest& request,
+                                                       bool may_block,
+                                                       std::size_t max_items) {
+  SyncLimits limits;
+  limits.max_items = max_items;
+  return atlas::PlanSync(request, store_, store_.identity().profile, may_block, limits);
 }
 
 Result<std::shared_ptr<TileWatch>> AtlasService::Watch(TileWatch::Scope scope,

@@ -88,9 +88,11 @@ class AtlasService {
   // The query's next tile; one that turns out damaged is marked to be built again.
   Result<std::optional<StoredTile>> NextTile(RegionQuery& query);
 
-  // What is to be sent (sync_plan.h); nullopt: that takes the disk or long, and `may_block` is
-  // false.
-  Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request, bool may_block);
+  // What is to be sent (sync_plan.h), `max_items` of it; nullopt: that takes the disk or long, and
+  // `may_block` is false.
+  Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request,
+                                           bool may_block,
+                                           std::size_t max_items = SyncLimits().max_items);
   // Hears of every tile there that changes from now on. kInvalidArgument: levels that the atlas has
   // not.
   Result<std::shared_ptr<TileWatch>> Watch(TileWatch::Scope scope, std::function<void()> wake);

@@ -27,7 +27,6 @@ class IdentityAllowance {
         connections_(limits.connections),
         requests_(limits.requests_per_s),
         bytes_(limits.bytes_per_s),
-        served_(limits.served_bytes_per_s),
         held_(limits.held_bytes) {}
 
   const std::string& whose() const { return share_->whose; }
@@ -37,29 +36,25 @@ class IdentityAllowance {
   std::size_t max_connections() const { return connections_.max_places(); }
   // Of requests that are under way.
   ByteBudget& held() { return held_; }
-  // It sent so much, and was sent so many bytes; how long nothing more is read from it.
-  TokenBucket::Duration Charge(std::size_t requests,
-                               std::size_t bytes,
-                               std::size_t served_bytes,
-                               TokenBucket::Time now) {
+  // It sent so much; how long nothing more is read from it.
+  TokenBucket::Duration Charge(std::size_t requests, std::size_t bytes, TokenBucket::Time now) {
     const std::lock_guard lock(mutex_);
-    return std::max({requests_.Take(static_cast<double>(requests), now),
-                     bytes_.Take(static_cast<double>(bytes), now),
-                     served_.Take(static_cast<double>(served_bytes), now)});
+    return std::max(requests_.Take(static_cast<double>(requests), now),
+                    bytes_.Take(static_cast<double>(bytes), now));
   }
   // Nothing of that counts any more.
   bool IsRested(TokenBucket::Time now) {
     const std::lock_guard lock(mutex_);
-    return requests_.IsFull(now) && bytes_.IsFull(now) && served_.IsFull(now);
+    return requests_.IsFull(now) && bytes_.IsFull(now) && share_->served.IsRested(now);
   }
-  // From now on; what it has already it keeps, and its share.
+  // From now on; what it has already it keeps, and of its share all but the rate.
   void Change(const NameLimits& limits) {
     connections_.set_max_places(limits.connections);
     held_.set_max_bytes(limits.held_bytes);
+    share_->served.set_rate(limits.served_bytes_per_s);
     const std::lock_guard lock(mutex_);
     requests_.set_rate(limits.requests_per_s);
     bytes_.set_rate(limits.bytes_per_s);
-    served_.set_rate(limits.served_bytes_per_s);
   }
 
  private:
@@ -68,7 +63,6 @@ class IdentityAllowance {
   std::mutex mutex_;
   TokenBucket requests_;
   TokenBucket bytes_;
-  TokenBucket served_;
   ByteBudget held_;
 };
 

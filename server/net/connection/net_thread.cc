@@ -83,6 +83,11 @@ void NetThread::Stop() {
   if (thread_.joinable()) {
     thread_.join();
   }
+  for (const auto& weak : connections_) {
+    if (const auto connection = weak.lock()) {
+      connection->CloseNow();  // what it has queued may hold it
+    }
+  }
 }
 
 asio::awaitable<void> NetThread::CheckDeadlines() {

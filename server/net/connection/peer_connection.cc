@@ -1,6 +1,5 @@
 #include "server/net/connection/peer_connection.h"
 
-#include <optional>
 #include <utility>
 
 #include <boost/asio/co_spawn.hpp>
@@ -48,6 +47,7 @@ void PeerConnection::Start() {
 
 void PeerConnection::Drain() {
   is_draining_ = true;
+  writer_.EndPauses();
   stop_reading_.emit(asio::cancellation_type::terminal);
   rate_pause_.cancel();
 }
@@ -109,6 +109,7 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
 }
 
 asio::awaitable<Status> PeerConnection::TakeRequests() {
+  AnsweringTurn turn(stream_);
   while (!is_refused_ && !is_draining_ && !writer_.is_closed()) {
     Status status;
     std::optional<LargeFrame> large;
@@ -133,6 +134,8 @@ asio::awaitable<Status> PeerConnection::TakeRequests() {
     frame_clock_.Expect(Clock::now(), 0);
     if (!HasRoom()) {
       co_await WaitForRoom();
+    } else if (turn.IsOver()) {
+      co_await turn.Pass();
     }
   }
   if (is_greeted_) {
@@ -182,8 +185,7 @@ Status PeerConnection::TakeRequest(ByteSpan payload) {
   const std::size_t unfolded_bytes = UnfoldedBytes(*envelope, payload.size());
   if (denied.ok() && unfolded_bytes > 0) {
     denied = held_.TakeLarge(unfolded_bytes);
-    const auto more = denied.ok() ? HoldRequest(unfolded_bytes) : nullptr;
-    held = std::make_shared<std::pair<std::shared_ptr<const void>, decltype(more)>>(held, more);
+    held = Places::Both(held, denied.ok() ? HoldRequest(unfolded_bytes) : nullptr);
   }
   Begin(Answer({std::make_shared<wire::Envelope>(*std::move(envelope)), std::move(held)}, denied));
   return {};
@@ -204,10 +206,11 @@ asio::awaitable<Status> PeerConnection::TakeLargeRequest(LargeFrame frame) {
     co_return read.error();
   }
   held.reset();  // the frame is gone; now it counts as what was made of it
-  if (Status full = held_.TakeLarge(read->bytes); !full.ok()) {
+  if (Status full = held_.TakeLarge(read->bytes + read->reply_bytes); !full.ok()) {
     read->denied = std::move(full);
   } else {
     read->request.held = HoldRequest(read->bytes);
+    read->request.held_reply = HoldRequest(read->reply_bytes);
   }
   if (!writer_.is_closed()) {
     Begin(Answer(std::move(read->request), read->denied));
@@ -250,10 +253,8 @@ Status PeerConnection::ComeIn(const wire::Envelope& hello) {
 }
 
 asio::awaitable<void> PeerConnection::KeepToRate(std::size_t bytes) {
-  const std::size_t written_bytes = writer_.written_bytes();
-  const std::size_t served_bytes = written_bytes - std::exchange(paid_bytes_, written_bytes);
-  const auto pause = access_.allowance()->Charge(std::exchange(unpaid_requests_, 0), bytes,
-                                                 served_bytes, Clock::now());
+  const auto pause =
+      access_.allowance()->Charge(std::exchange(unpaid_requests_, 0), bytes, Clock::now());
   if (pause == Clock::duration::zero() || is_draining_ || writer_.is_closed()) {
     co_return;
   }
@@ -286,8 +287,7 @@ void PeerConnection::ChangeSecurity(const ServerSecurity& security) {
 
 void PeerConnection::CheckIdentity() {
   if (const Status now = access_.IdentifyAgain(handler_.NowMs()); !now.ok()) {
-    const std::string what = StrCat(access_.identity().name, ", no longer: ", now.message());
-    peer_.Warn(what);
+    peer_.Warn(StrCat(access_.identity().name, ", no longer: ", now.message()));
     CloseNow();
   }
 }

@@ -141,7 +141,6 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   PeerAccess access_;
   boost::asio::steady_timer rate_pause_;
   std::size_t unpaid_requests_ = 0;  // that came since the last pause
-  std::size_t paid_bytes_ = 0;       // of those that it was sent
   std::size_t requests_ = 0;
   std::size_t request_bytes_ = 0;
   Phase phase_ = Phase::kOpen;

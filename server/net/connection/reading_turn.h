@@ -2,6 +2,7 @@
 // when that comes without a pause.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 
 #include <boost/asio/awaitable.hpp>
@@ -41,6 +42,27 @@ class ReadingTurn {
   PeerStream& stream_;
   std::size_t bytes_ = 0;  // in this turn
   int reads_ = 0;          // likewise
+};
+
+// How long the requests of one peer, of which many came at once, are answered before it is the
+// others' turn.
+class AnsweringTurn {
+ public:
+  explicit AnsweringTurn(PeerStream& stream) : stream_(stream) {}
+
+  bool IsOver() const { return Clock::now() - began_ >= kLength; }
+  boost::asio::awaitable<void> Pass() {
+    co_await boost::asio::post(stream_.executor(), boost::asio::use_awaitable);
+    began_ = Clock::now();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static constexpr std::chrono::microseconds kLength{250};
+
+  PeerStream& stream_;
+  Clock::time_point began_ = Clock::now();
 };
 
 }  // namespace atlas

@@ -1,5 +1,6 @@
 #include "server/net/requests/large_requests.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "server/net/access/access_check.h"
 #include "server/net/requests/on_pool.h"
 #include "server/net/requests/request_conversion.h"
+#include "server/net/requests/sync_conversion.h"
 
 namespace atlas {
 namespace {
@@ -82,6 +84,11 @@ Result<LargeRequests::Outcome> LargeRequests::ReadNow(const LargeFrame& frame,
     outcome.bytes = BytesOf(*outcome.request.poses);
   }
   outcome.bytes += message->SpaceUsedLong();
+  if (message->has_sync_request()) {
+    const SyncBytes sync = BytesOf(message->sync_request());
+    outcome.bytes = std::max(outcome.bytes, sync.request);
+    outcome.reply_bytes = sync.first_manifest;
+  }
   outcome.request.message = DestroyedHere(*std::move(message), frame.size());
   return outcome;
 }

@@ -24,9 +24,10 @@ std::size_t UnfoldedBytes(const wire::Envelope& request, std::size_t frame_bytes
 class LargeRequests {
  public:
   struct Outcome {
-    Request request;        // without what is held for it
-    Status denied;          // not ok: its peer may not ask for that
-    std::size_t bytes = 0;  // that it occupies
+    Request request;              // without what is held for it
+    Status denied;                // not ok: its peer may not ask for that
+    std::size_t bytes = 0;        // that it occupies
+    std::size_t reply_bytes = 0;  // that the part of the reply may take that grows with it
   };
 
   // `freed` outlives this.

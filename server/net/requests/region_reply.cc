@@ -1,5 +1,6 @@
 #include "server/net/requests/region_reply.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -15,8 +16,9 @@ namespace {
 
 namespace asio = boost::asio;
 
-// Kept by a query that waits for its peer: 512 KiB.
-constexpr std::size_t kMaxCandidates = 16'384;
+// Kept by a query that waits for its peer, from 16 to 512 KiB: the less, the more the others have.
+constexpr std::size_t kLeastCandidates = 512;
+constexpr std::size_t kMostCandidates = 16'384;
 // More than any frame of a reply has besides its tile's blob.
 constexpr std::size_t kFrameOverheadBytes = kFrameHeaderBytes + 52;
 
@@ -69,7 +71,7 @@ Result<std::shared_ptr<Cursor>> OpenCursor(AtlasService& service,
                                            const Patience& patience) {
   const std::uint64_t current = service.revision();
   RegionQuery::Options options;
-  options.max_candidates = kMaxCandidates;
+  options.max_candidates = kMostCandidates;
   options.end_bytes = kFrameOverheadBytes;
   options.tile_cost = &TileCost;
   Result<RegionQuery> query = service.Query(region, std::move(options), patience);
@@ -91,10 +93,9 @@ Status SendBatch(std::uint64_t request_id, const TileBatch& batch, Sent& sent, R
     if (!bytes) {
       return bytes.error();
     }
-    const ReplyFrame frame(*std::move(bytes));
     ++sent.tiles;
-    sent.bytes += frame.size();
-    out.Push(frame);
+    sent.bytes += bytes->size();
+    out.Push(ReplyFrame(*std::move(bytes)));
   }
   out.Flush();
   return {};
@@ -158,10 +159,17 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
   }
   const std::shared_ptr<Cursor>& cursor = *opened;
   Sent sent;
+  ReplyWriter::Kept kept(out);
   for (bool is_last = false; !is_last;) {
     const ReplyWriter::Room room = co_await out.TakeRoom(batch_bytes);
     if (!room) {
       co_return Status();
+    }
+    if (!region.at_revision) {  // those are few, and looking for candidates again takes them long
+      const std::size_t candidates = std::clamp(out.share_bytes() / RegionQuery::kCandidateBytes,
+                                                kLeastCandidates, kMostCandidates);
+      cursor->query.set_max_candidates(candidates);
+      kept.Set(cursor->query.kept_bytes() + candidates * RegionQuery::kCandidateBytes);
     }
     const Blocking<TileBatch> read = [&service, cursor, bytes = room.bytes()] {
       return NextBatch(service, cursor->query, bytes);
@@ -174,6 +182,7 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
       co_return status;
     }
     is_last = batch->is_last;
+    kept.Set(cursor->query.kept_bytes());
   }
   Result<Bytes> end = EndFrame(request_id, sent, cursor->query.is_truncated(), cursor->revision);
   if (!end) {

@@ -31,16 +31,16 @@ Result<std::optional<Body>> ReplyTiles::Find(const SyncRequest& request,
                                              bool may_block) {
   const std::uint64_t key = item.tile.id.Key();
   TileFrames::Content content{key, item.tile.payload_hash, item.sections};
-  const HeldTile* held = takes_deltas && item.held_hash != 0 ? request.held.Find(key) : nullptr;
-  if (held != nullptr) {
-    content.base_hash = held->payload_hash;
-    content.base_sections = held->sections;
+  const bool is_for_delta = takes_deltas && item.held_hash != 0;
+  if (is_for_delta) {
+    content.base_hash = item.held_hash;
+    content.base_sections = item.held_sections;
     if (Body best = FindReady(content, item.tile.revision)) {
       return best;
     }
   }
   Body whole = FindReady({key, item.tile.payload_hash, item.sections}, item.tile.revision);
-  const Body base = held == nullptr ? nullptr : FindBase(key, *held, request.sections);
+  const Body base = is_for_delta ? FindBase(item, request.sections) : nullptr;
   if (!may_block && (whole == nullptr || base != nullptr)) {
     return std::nullopt;
   }
@@ -68,9 +68,9 @@ Body ReplyTiles::FindReady(const TileFrames::Content& content, std::uint64_t rev
 }
 
 // With whatever sections it was sent.
-Body ReplyTiles::FindBase(std::uint64_t key, const HeldTile& held, SectionMask wanted) {
-  for (const SectionMask sections : {wanted, held.sections, kAllSections}) {
-    if (Body base = frames_.Find({key, held.payload_hash, sections})) {
+Body ReplyTiles::FindBase(const SyncItem& item, SectionMask wanted) {
+  for (const SectionMask sections : {wanted, item.held_sections, kAllSections}) {
+    if (Body base = frames_.Find({item.tile.id.Key(), item.held_hash, sections})) {
       return base;
     }
   }

@@ -29,7 +29,7 @@ class ReplyTiles {
 
  private:
   Body FindReady(const TileFrames::Content& content, std::uint64_t revision);
-  Body FindBase(std::uint64_t key, const HeldTile& held, SectionMask wanted);
+  Body FindBase(const SyncItem& item, SectionMask wanted);
   Result<Body> Read(const SyncRequest& request, const SyncItem& item);
   Result<Body> MakeBest(const TileFrames::Content& content,
                         const TileBody& base,

@@ -81,8 +81,8 @@ std::optional<asio::awaitable<void>> RequestHandler::Handle(Request request, Pee
     return Await(std::move(request), peer);
   }
   RequestRecord record(peer.out.peer(), message, request.began);
-  auto reply = std::make_shared<SyncReply>(context_.service, frames_, std::move(request.message),
-                                           request.is_large);
+  auto reply = std::make_shared<SyncReply>(context_.service, frames_, request);
+  request.message.reset();
   std::unique_ptr<TurnOrder::Turn> turn;
   if (reply->message().wait_revision() == 0) {
     if (peer.streams.is_empty() && SyncAtOnce(*reply, record, peer.out)) {
@@ -90,7 +90,8 @@ std::optional<asio::awaitable<void>> RequestHandler::Handle(Request request, Pee
     }
     turn = std::make_unique<TurnOrder::Turn>(peer.streams);
   }
-  return Sync(std::move(reply), std::move(request.held), std::move(record), std::move(turn), peer);
+  return Sync(std::move(reply), {std::move(request.held), std::move(request.held_reply)},
+              std::move(record), std::move(turn), peer);
 }
 
 void RequestHandler::ReturnFreed(FreedMemory::Clock::time_point now) {
@@ -165,15 +166,15 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWr
     if (room_bytes == 0) {
       return false;
     }
-    const Result<SyncReply::Step> step = reply.Next(false, frames, room_bytes);
+    const Result<SyncReply::Step> step = reply.Next(false, frames, {room_bytes, out.share_bytes()});
     if (!step) {
       out.PushError(reply.request_id(), step.error());
       record.End(step.error());
       return true;
     }
-    for (const ReplyFrame& frame : frames) {
-      out.Push(frame);
+    for (ReplyFrame& frame : frames) {
       bytes += frame.size();
+      out.Push(std::move(frame));
     }
     frames.clear();
     if (*step == SyncReply::Step::kDone) {
@@ -188,11 +189,11 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWr
 }
 
 asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
-                                           std::shared_ptr<const void> /*held*/,
+                                           SyncHold hold,
                                            RequestRecord record,
                                            std::unique_ptr<TurnOrder::Turn> turn,
                                            Peer& peer) {
-  Status status = co_await WaitAndSync(reply, std::move(turn), peer);
+  Status status = co_await WaitAndSync(reply, std::move(hold), std::move(turn), peer);
   record.End(status);
   if (!status.ok()) {
     co_await peer.out.SendError(reply->request_id(), std::move(status));
@@ -200,6 +201,7 @@ asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
 }
 
 asio::awaitable<Status> RequestHandler::WaitAndSync(std::shared_ptr<SyncReply> reply,
+                                                    SyncHold hold,
                                                     std::unique_ptr<TurnOrder::Turn> turn,
                                                     Peer& peer) {
   if (turn == nullptr) {
@@ -212,7 +214,7 @@ asio::awaitable<Status> RequestHandler::WaitAndSync(std::shared_ptr<SyncReply> r
     turn = std::make_unique<TurnOrder::Turn>(peer.streams);
   }
   co_await turn->Come();
-  co_return co_await SendSync(std::move(reply), context_.pool, peer.out);
+  co_return co_await SendSync(std::move(reply), std::move(hold), context_.pool, peer.out);
 }
 
 }  // namespace atlas

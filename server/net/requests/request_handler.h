@@ -83,12 +83,13 @@ class RequestHandler {
   // False: what is left takes long, or the disk, or the peer does not take it.
   static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);
   boost::asio::awaitable<void> Sync(std::shared_ptr<SyncReply> reply,
-                                    std::shared_ptr<const void> held,
+                                    SyncHold hold,
                                     RequestRecord record,
                                     std::unique_ptr<TurnOrder::Turn> turn,
                                     Peer& peer);
   // Without a turn it waits for the revision that it asks for first.
   boost::asio::awaitable<Status> WaitAndSync(std::shared_ptr<SyncReply> reply,
+                                             SyncHold hold,
                                              std::unique_ptr<TurnOrder::Turn> turn,
                                              Peer& peer);
 

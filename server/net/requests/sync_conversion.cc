@@ -57,9 +57,19 @@ Result<SectionMask> SectionsFromWire(const Numbers& numbers) {
   return sections == 0 ? kAllSections : sections;
 }
 
+std::size_t CountOf(const wire::SyncRequest& message, int (wire::Held::*size)() const) {
+  std::size_t count = 0;
+  for (const wire::Held& held : message.held()) {
+    count += static_cast<std::size_t>((held.*size)());
+  }
+  return count;
+}
+
 Result<HeldTiles> HeldFromWire(const wire::SyncRequest& message) {
   std::vector<HeldTile> tiles;
   std::vector<HeldBlock> blocks;
+  tiles.reserve(CountOf(message, &wire::Held::keys_size));
+  blocks.reserve(CountOf(message, &wire::Held::blocks_size));
   for (const wire::Held& held : message.held()) {
     const Result<SectionMask> sections = SectionsFromWire(held.sections());
     if (!sections) {
@@ -145,13 +155,37 @@ Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProf
                      *sections,        *std::move(held),       *cursor};
 }
 
-std::string CursorToWire(const SyncCursor& cursor, const wire::SyncRequest& message) {
+Result<SyncOrder> TakeSync(wire::SyncRequest& message, const MapProfile& profile) {
+  wire::SyncRequest taken;  // cleared, fields that are repeated would keep their memory
+  taken.Swap(&message);
+  message.set_budget_bytes(taken.budget_bytes());
+  message.set_timeout_ms(taken.timeout_ms());
+  message.set_wait_revision(taken.wait_revision());
+  message.set_takes_deltas(taken.takes_deltas());
+  Result<SyncRequest> request = SyncFromWire(taken, profile);
+  if (!request) {
+    return Error(request.error());
+  }
+  return SyncOrder{*std::move(request), HashOfOrder(taken)};
+}
+
+std::string CursorToWire(const SyncCursor& cursor, std::uint64_t order_hash) {
   ByteWriter out;
   out.U64(cursor.revision);
   out.U64(std::bit_cast<std::uint64_t>(cursor.priority));
   out.U64(cursor.key);
-  out.U64(HashOfOrder(message));
+  out.U64(order_hash);
   return BytesToWire(out.bytes());
+}
+
+SyncBytes BytesOf(const wire::SyncRequest& message) {
+  constexpr std::size_t kOtherFields = 64;  // of a manifest: numbers and lengths
+  const std::size_t tiles = CountOf(message, &wire::Held::keys_size);
+  const std::size_t blocks = CountOf(message, &wire::Held::blocks_size);
+  const auto area = static_cast<std::size_t>(message.area().tiles().keys_size());
+  constexpr std::size_t kKeyBytes = sizeof(std::uint64_t);
+  return {area * kKeyBytes + tiles * sizeof(HeldTile) + blocks * sizeof(HeldBlock),
+          kOtherFields + (tiles + blocks) * kKeyBytes + (tiles + blocks) / 8};
 }
 
 void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out) {

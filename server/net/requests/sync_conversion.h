@@ -14,8 +14,23 @@ Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profi
 // cursor of another request.
 Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile);
 
-// To go on from: what SyncFromWire reads with the same message.
-std::string CursorToWire(const SyncCursor& cursor, const wire::SyncRequest& message);
+// The same without its message, for which cursors are.
+struct SyncOrder {
+  SyncRequest request;
+  std::uint64_t hash = 0;  // of all that decides on the order of tiles
+};
+// `message` is left with its numbers alone.
+Result<SyncOrder> TakeSync(wire::SyncRequest& message, const MapProfile& profile);
+
+// To go on from: what SyncFromWire reads with a message of the same order.
+std::string CursorToWire(const SyncCursor& cursor, std::uint64_t order_hash);
+
+// That a sync takes when it is read, at most, besides its message.
+struct SyncBytes {
+  std::size_t request = 0;         // the area, if it is made of tiles, and what is held
+  std::size_t first_manifest = 0;  // without tiles
+};
+SyncBytes BytesOf(const wire::SyncRequest& message);
 
 // What became of what is held.
 void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out);

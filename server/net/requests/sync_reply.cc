@@ -1,5 +1,6 @@
 #include "server/net/requests/sync_reply.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -25,17 +26,16 @@ constexpr std::size_t kManifestBytes = kFrameHeaderBytes + 64;
 constexpr std::size_t kAnnouncementBytes = 40;
 constexpr std::size_t kEndBytes = kFrameHeaderBytes + 96;
 constexpr std::size_t kTileFrameBytes = kFrameHeaderBytes + 11;  // besides its body
+// Of a plan, however little room there is: 18 KiB. It is made again after these.
+constexpr std::size_t kLeastItems = 256;
 
 }  // namespace
 
-SyncReply::SyncReply(AtlasService& service,
-                     TileFrames& frames,
-                     std::shared_ptr<const wire::Envelope> request,
-                     bool is_large)
+SyncReply::SyncReply(AtlasService& service, TileFrames& frames, const Request& request)
     : service_(service),
       tiles_(service, frames),
-      envelope_(std::move(request)),
-      is_large_(is_large) {
+      envelope_(request.message),
+      is_large_(request.is_large) {
   if (message().timeout_ms() > 0) {
     deadline_ = Clock::now() + TimeoutFromWire(message().timeout_ms());
   }
@@ -43,12 +43,12 @@ SyncReply::SyncReply(AtlasService& service,
 
 Result<SyncReply::Step> SyncReply::Next(bool may_block,
                                         std::vector<ReplyFrame>& out,
-                                        std::size_t max_bytes) {
+                                        const Room& room) {
   if (is_large_ && !may_block) {
     return Step::kBlocked;
   }
   if (!has_begun_) {
-    Result<Step> begun = Begin(may_block);
+    Result<Step> begun = Begin(may_block, room);
     if (!begun || *begun == Step::kBlocked) {
       return begun;
     }
@@ -59,7 +59,7 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block,
   if (is_first) {
     *batch.manifest.mutable_sync_manifest() = holdings_;
   }
-  Result<Step> filled = Fill(may_block, max_bytes, batch);
+  Result<Step> filled = Fill(may_block, room, batch);
   if (!filled) {
     return filled;
   }
@@ -69,30 +69,43 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block,
   if (Status status = Emit(batch, out); !status.ok()) {
     return Error(std::move(status));
   }
+  if (is_first) {
+    holdings_ = wire::SyncManifest();
+  }
   return batch.end ? Step::kDone : Step::kMore;
 }
 
-Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
-  if (!request_) {
-    Result<SyncRequest> request = SyncFromWire(message(), profile());
-    if (!request) {
-      return Error(request.error());
-    }
-    const std::uint64_t now = service_.revision();
-    if (request->after && request->after->revision > now) {
-      return Error(StatusCode::kInvalidArgument,
-                   StrCat("sync: the cursor is of revision ", request->after->revision,
-                          " and the atlas at ", now, ", an earlier copy: ask without it"));
-    }
-    request_ = *std::move(request);
-    last_ = request_->after.value_or(
-        SyncCursor{now, std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
+// What was asked for, without its message.
+Status SyncReply::TakeOrder() {
+  Result<SyncOrder> order = TakeSync(*envelope_->mutable_sync_request(), profile());
+  if (!order) {
+    return order.error();
   }
-  Result<Step> planned = Plan(may_block);
+  const std::uint64_t now = service_.revision();
+  if (order->request.after && order->request.after->revision > now) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("sync: the cursor is of revision ", order->request.after->revision,
+                   " and the atlas at ", now, ", an earlier copy: ask without it")};
+  }
+  order_hash_ = order->hash;
+  request_ = std::move(order->request);
+  last_ = request_->after.value_or(
+      SyncCursor{now, std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
+  return {};
+}
+
+Result<SyncReply::Step> SyncReply::Begin(bool may_block, const Room& room) {
+  if (!request_) {
+    if (Status status = TakeOrder(); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  Result<Step> planned = Plan(may_block, room);
   if (!planned || *planned == Step::kBlocked) {
     return planned;
   }
   HoldingsToWire(plan_, holdings_);
+  plan_.DropHoldings();
   const std::uint64_t least = kManifestBytes + holdings_.ByteSizeLong() + kEndBytes;
   if (!Fits(least)) {
     return Error(
@@ -104,11 +117,12 @@ Result<SyncReply::Step> SyncReply::Begin(bool may_block) {
   return Step::kMore;
 }
 
-Result<SyncReply::Step> SyncReply::Plan(bool may_block) {
+Result<SyncReply::Step> SyncReply::Plan(bool may_block, const Room& room) {
   if (is_for_pool_ && !may_block) {
     return Step::kBlocked;
   }
-  auto plan = service_.PlanSync(*request_, may_block);
+  const std::size_t items = std::max(kLeastItems, room.plan_bytes / sizeof(SyncItem));
+  auto plan = service_.PlanSync(*request_, may_block, std::min(items, SyncLimits().max_items));
   if (!plan) {
     return Error(plan.error());
   }
@@ -118,22 +132,28 @@ Result<SyncReply::Step> SyncReply::Plan(bool may_block) {
   }
   plan_ = **std::move(plan);
   next_ = 0;
+  if (plan_.is_cut) {
+    request_->held.KeepOnly(plan_.is_tile_seen, plan_.is_block_seen);
+  } else {
+    request_->held = HeldTiles();
+  }
   return Step::kMore;
 }
 
 // With tiles, and the end, if that is reached.
-Result<SyncReply::Step> SyncReply::Fill(bool may_block, std::size_t max_bytes, Batch& batch) {
+Result<SyncReply::Step> SyncReply::Fill(bool may_block, const Room& room, Batch& batch) {
   wire::SyncManifest& manifest = *batch.manifest.mutable_sync_manifest();
   std::uint64_t bytes = sent_bytes_ + kManifestBytes + manifest.ByteSizeLong();
   const std::size_t max_tiles = sent_bytes_ == 0 ? kFirstTiles : kTilesPerBatch;
   // One tile in any case: a reply that makes no step would be asked for the next one for ever.
-  while (batch.tiles.empty() || (batch.tiles.size() < max_tiles && batch.tile_bytes < max_bytes)) {
+  while (batch.tiles.empty() || (batch.tiles.size() < max_tiles && batch.tile_bytes < room.bytes)) {
     if (next_ == plan_.items.size() && plan_.is_cut) {
       request_->after = last_;
-      Result<Step> planned = Plan(may_block);
+      Result<Step> planned = Plan(may_block, room);
       if (!planned || *planned == Step::kBlocked) {
         return planned;
       }
+      plan_.DropHoldings();
     }
     if (next_ == plan_.items.size()) {
       batch.end = End::kWhole;
@@ -202,7 +222,7 @@ Result<Bytes> SyncReply::EndFrame(End how) const {
   end.set_tiles(sent_tiles_);
   end.set_revision(last_.revision);
   if (how == End::kCut) {
-    end.set_cursor(CursorToWire(last_, message()));
+    end.set_cursor(CursorToWire(last_, order_hash_));
   }
   end.set_bytes(sent_bytes_);
   for (int pass = 0; pass < 2; ++pass) {
@@ -212,28 +232,36 @@ Result<Bytes> SyncReply::EndFrame(End how) const {
 }
 
 asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
+                                 SyncHold hold,
                                  asio::thread_pool& pool,
                                  ReplyWriter& out) {
   const auto executor = co_await asio::this_coro::executor;
   const auto frames = std::make_shared<std::vector<ReplyFrame>>();
+  ReplyWriter::Kept kept(out);
   while (true) {
+    kept.Set(reply->kept_bytes());
     const ReplyWriter::Room room = co_await out.TakeRoom(kReplyBatchBytes);
     if (!room) {
       break;
     }
-    frames->clear();
-    Result<SyncReply::Step> step = reply->Next(false, *frames, room.bytes());
+    const SyncReply::Room next{room.bytes(), out.share_bytes()};
+    Result<SyncReply::Step> step = reply->Next(false, *frames, next);
     if (step && *step == SyncReply::Step::kBlocked) {
-      const Blocking<SyncReply::Step> read = [reply, frames, bytes = room.bytes()] {
-        return reply->Next(true, *frames, bytes);
+      const Blocking<SyncReply::Step> read = [reply, frames, next] {
+        return reply->Next(true, *frames, next);
       };
+      kept.Set(reply->kept_bytes() + std::min(next.plan_bytes, SyncReply::kMaxPlanBytes));
       step = co_await OnPool(pool, read);
     }
     if (!step) {
       co_return step.error();
     }
-    for (const ReplyFrame& frame : *frames) {
-      out.Push(frame);
+    for (ReplyFrame& frame : *frames) {
+      out.Push(std::move(frame), std::exchange(hold.reply, nullptr));
+    }
+    frames->clear();
+    if (!reply->is_held()) {
+      hold.request.reset();
     }
     out.Flush();
     if (*step == SyncReply::Step::kDone) {

@@ -13,6 +13,7 @@
 
 #include "proto/wire/envelope.h"
 #include "server/net/requests/reply_tiles.h"
+#include "server/net/requests/request.h"
 #include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
@@ -27,23 +28,36 @@ class SyncReply {
     kBlocked,  // nothing was done: the next frames take the disk, or long
   };
 
-  // Its time runs from now on. `is_large`: every step takes long. `service` and `frames` outlive
-  // this.
-  SyncReply(AtlasService& service,
-            TileFrames& frames,
-            std::shared_ptr<const wire::Envelope> request,
-            bool is_large = false);
+  // Of the next frames: tiles of so many bytes and up to one more, and of the plan for them.
+  struct Room {
+    std::size_t bytes = kReplyBatchBytes;
+    std::size_t plan_bytes = kMaxPlanBytes;
+  };
+  static constexpr std::size_t kMaxPlanBytes = SyncLimits().max_items * sizeof(SyncItem);
+
+  // Its time runs from now on. Of a large request every step takes long. `service` and `frames`
+  // outlive this.
+  SyncReply(AtlasService& service, TileFrames& frames, const Request& request);
 
   const wire::SyncRequest& message() const { return envelope_->sync_request(); }
   std::uint64_t request_id() const { return envelope_->request_id(); }
 
-  // Appends the next frames, tiles of `max_bytes` and up to one more. An error ends the reply;
-  // kInvalidArgument: a request that makes no sense.
-  Result<Step> Next(bool may_block,
-                    std::vector<ReplyFrame>& out,
-                    std::size_t max_bytes = kReplyBatchBytes);
+  // What it keeps until it goes on.
+  std::size_t kept_bytes() const { return plan_.item_bytes(); }
+  // What was asked is still there, and takes more than a small request does.
+  bool is_held() const {
+    return !has_begun_ || request_->held.bytes() + request_->area.bytes() > kSmallBytes;
+  }
+
+  // Appends the next frames; the first one of all is as large as what is held makes it. An error
+  // ends the reply; kInvalidArgument: a request that makes no sense.
+  Result<Step> Next(bool may_block, std::vector<ReplyFrame>& out, const Room& room);
+  Result<Step> Next(bool may_block, std::vector<ReplyFrame>& out) {
+    return Next(may_block, out, Room());
+  }
 
  private:
+  static constexpr std::size_t kSmallBytes = 16u << 10;
   using Clock = std::chrono::steady_clock;
   using Body = ReplyTiles::Body;
   enum class End { kWhole, kCut };
@@ -54,9 +68,10 @@ class SyncReply {
     std::optional<End> end;
   };
 
-  Result<Step> Begin(bool may_block);
-  Result<Step> Plan(bool may_block);
-  Result<Step> Fill(bool may_block, std::size_t max_bytes, Batch& batch);
+  Status TakeOrder();
+  Result<Step> Begin(bool may_block, const Room& room);
+  Result<Step> Plan(bool may_block, const Room& room);
+  Result<Step> Fill(bool may_block, const Room& room, Batch& batch);
   Status Emit(const Batch& batch, std::vector<ReplyFrame>& out);
   // The end counts itself: its own length depends on the number it carries.
   Result<Bytes> EndFrame(End how) const;
@@ -68,22 +83,31 @@ class SyncReply {
 
   AtlasService& service_;
   ReplyTiles tiles_;
-  const std::shared_ptr<const wire::Envelope> envelope_;
+  const std::shared_ptr<wire::Envelope> envelope_;
   const bool is_large_;
   std::optional<SyncRequest> request_;  // from Begin() on
+  std::uint64_t order_hash_ = 0;        // likewise
   std::optional<Clock::time_point> deadline_;
   SyncPlan plan_;
-  std::size_t next_ = 0;  // item of the plan
-  SyncCursor last_;       // of the items so far
-  wire::SyncManifest holdings_;
+  std::size_t next_ = 0;         // item of the plan
+  SyncCursor last_;              // of the items so far
+  wire::SyncManifest holdings_;  // until they are told
   bool has_begun_ = false;
   bool is_for_pool_ = false;  // the plan takes the disk, or long: known from trying
   std::uint32_t sent_tiles_ = 0;
   std::uint64_t sent_bytes_ = 0;
 };
 
+// What the daemon holds for a request: `request` until all that it holds has been looked at,
+// `reply` until the peer has taken what became of that.
+struct SyncHold {
+  std::shared_ptr<const void> request;
+  std::shared_ptr<const void> reply;
+};
+
 // What is left of it. What takes long, or the disk, runs on `pool`.
 boost::asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
+                                        SyncHold hold,
                                         boost::asio::thread_pool& pool,
                                         ReplyWriter& out);
 

@@ -24,6 +24,8 @@ class ReplyFrame {
   ByteSpan head() const { return tile_ ? ByteSpan(own_).first(kFrameHeaderBytes) : own_; }
   const std::shared_ptr<const TileBody>& tile() const { return tile_; }
   ByteSpan tail() const { return tile_ ? ByteSpan(own_).subspan(kFrameHeaderBytes) : ByteSpan(); }
+  // All of it, where there is no tile.
+  Bytes TakeWhole() && { return std::move(own_); }
 
  private:
   Bytes own_;

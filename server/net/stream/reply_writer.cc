@@ -17,6 +17,8 @@ namespace asio = boost::asio;
 using boost::system::error_code;
 
 constexpr std::size_t kGatheredBytes = 4u << 10;  // small pieces become one up to here
+// Who pauses looks again: the connection may be gone, or the rate another one.
+constexpr std::chrono::milliseconds kLongestPause{100};
 
 }  // namespace
 
@@ -31,15 +33,22 @@ ReplyWriter::ReplyWriter(PeerStream& stream,
       changed_(stream.executor(), asio::steady_timer::time_point::max()),
       pace_(options) {}
 
-void ReplyWriter::Push(const ReplyFrame& frame) {
+void ReplyWriter::Push(ReplyFrame frame, std::shared_ptr<const void> held) {
   if (is_closed_) {
     return;
   }
-  PushBytes(frame.head());
+  unpaid_bytes_ += frame.size();
   if (frame.tile()) {
+    PushBytes(frame.head());
     queued_bytes_ += frame.tile()->bytes().size();
-    queue_.push_back({{}, frame.tile()});
+    queue_.push_back({{}, frame.tile(), nullptr});
     PushBytes(frame.tail());
+  } else if (frame.size() > kGatheredBytes) {
+    queued_bytes_ += frame.size();
+    held_bytes_ += held ? frame.size() : 0;
+    queue_.push_back({std::move(frame).TakeWhole(), nullptr, std::move(held)});
+  } else {
+    PushBytes(frame.head());
   }
 }
 
@@ -61,7 +70,7 @@ void ReplyWriter::PushError(std::uint64_t request_id, const Status& status) {
 
 void ReplyWriter::PushBytes(ByteSpan bytes) {
   queued_bytes_ += bytes.size();
-  if (queue_.empty() || queue_.back().tile ||
+  if (queue_.empty() || queue_.back().tile || queue_.back().held ||
       queue_.back().own.size() + bytes.size() > kGatheredBytes) {
     queue_.emplace_back();
   }
@@ -95,31 +104,57 @@ void ReplyWriter::Flush() {
     pace_.End();
   }
   Count();
+  Pay();
 }
 
 void ReplyWriter::TakeAway(std::size_t bytes) {
   queued_bytes_ -= bytes;
   sent_bytes_ += bytes;
   while (!queue_.empty() && sent_bytes_ >= queue_.front().bytes().size()) {
-    sent_bytes_ -= queue_.front().bytes().size();
+    const Piece& sent = queue_.front();
+    sent_bytes_ -= sent.bytes().size();
+    held_bytes_ -= sent.held ? sent.own.size() : 0;
     queue_.pop_front();
   }
 }
 
 void ReplyWriter::Reserve(std::size_t bytes) {
   reserved_bytes_ += bytes;
+  unpaid_bytes_ += bytes;
   Count();
+  Pay();
 }
 
 void ReplyWriter::GiveBack(std::size_t bytes) {
   reserved_bytes_ -= bytes;
   Count();
+  Pay();
+  if (peer_.share != nullptr) {
+    peer_.share->served.Refund(bytes, Clock::now());
+  }
   Wake();
+}
+
+void ReplyWriter::Pay() {
+  const std::size_t bytes = std::exchange(unpaid_bytes_, 0);
+  if (bytes > 0 && peer_.share != nullptr) {
+    peer_.share->served.Charge(bytes, Clock::now());
+  }
+}
+
+ReplyWriter::Clock::duration ReplyWriter::Pause() {
+  if (peer_.share == nullptr || !has_pauses_) {
+    return Clock::duration::zero();
+  }
+  Pay();
+  return std::min<Clock::duration>(peer_.share->served.Pause(Clock::now()), kLongestPause);
 }
 
 // What leaves at once is never counted: that would cost the threads a shared number a reply.
 void ReplyWriter::Count() {
-  const std::size_t bytes = queued_bytes_ + reserved_bytes_;
+  const std::size_t sent_of_held = !queue_.empty() && queue_.front().held ? sent_bytes_ : 0;
+  const std::size_t queued_bytes = queued_bytes_ - (held_bytes_ - sent_of_held);
+  const std::size_t bytes = queued_bytes + reserved_bytes_ + kept_bytes_;
   if (bytes > counted_bytes_) {
     all_.Add(bytes - counted_bytes_);
   } else if (bytes < counted_bytes_) {
@@ -128,10 +163,18 @@ void ReplyWriter::Count() {
   counted_bytes_ = bytes;
 }
 
+std::size_t ReplyWriter::BatchBytes(std::size_t wanted_bytes) const {
+  const std::size_t bytes = std::min(wanted_bytes, max_bytes());
+  return peer_.share == nullptr ? bytes : std::min(bytes, peer_.share->served.batch_bytes());
+}
+
 std::size_t ReplyWriter::RoomNow() {
   const auto batch = [this] {
-    return std::max<std::size_t>(1, std::min(kReplyBatchBytes, max_bytes()));
+    return std::max<std::size_t>(1, BatchBytes(kReplyBatchBytes));
   };
+  if (Pause() > Clock::duration::zero()) {
+    return 0;
+  }
   if (!Fits(batch())) {
     Flush();
   }
@@ -139,8 +182,14 @@ std::size_t ReplyWriter::RoomNow() {
 }
 
 asio::awaitable<ReplyWriter::Room> ReplyWriter::TakeRoom(std::size_t wanted_bytes) {
+  asio::steady_timer paid(stream_.executor());
   while (!is_closed_) {
-    const std::size_t bytes = std::min(wanted_bytes, max_bytes());
+    if (const Clock::duration pause = Pause(); pause > Clock::duration::zero()) {
+      paid.expires_after(pause);
+      co_await paid.async_wait(asio::use_awaitable);
+      continue;
+    }
+    const std::size_t bytes = BatchBytes(wanted_bytes);
     if (Fits(bytes)) {
       co_return Room(*this, bytes);
     }
@@ -222,8 +271,10 @@ void ReplyWriter::CloseNow() {
   is_closed_ = true;
   NotePeerLeft();
   stream_.Close();
-  queue_.clear();
+  const auto unsent = std::exchange(queue_, {});
   queued_bytes_ = 0;
+  held_bytes_ = 0;
+  sent_bytes_ = 0;
   Count();
   Wake();
 }

@@ -58,6 +58,25 @@ class ReplyWriter {
     std::size_t bytes_ = 0;
   };
 
+  // Memory of a reply under way besides its frames: counts as if it were queued, for all and not
+  // for this connection, until it is destroyed. The writer outlives it.
+  class Kept {
+   public:
+    explicit Kept(ReplyWriter& writer) : writer_(writer) {}
+    Kept(const Kept&) = delete;
+    Kept& operator=(const Kept&) = delete;
+    ~Kept() { Set(0); }
+
+    void Set(std::size_t bytes) {
+      writer_.kept_bytes_ += bytes - std::exchange(bytes_, bytes);
+      writer_.Count();
+    }
+
+   private:
+    ReplyWriter& writer_;
+    std::size_t bytes_ = 0;
+  };
+
   // All outlive this; `all`: what is queued on all connections.
   ReplyWriter(PeerStream& stream,
               const PeerRecord& peer,
@@ -71,19 +90,21 @@ class ReplyWriter {
   const PeerRecord& peer() const { return peer_; }
 
   // Queues, whether there is room or not, until the next Flush(). Once closed nothing is queued.
-  void Push(const ReplyFrame& frame);
+  // `held`: a large frame without a tile counts elsewhere, until this is dropped with it, and not
+  // among what all queue.
+  void Push(ReplyFrame frame, std::shared_ptr<const void> held = nullptr);
   // The envelope as a frame; one too large for a frame becomes an error reply.
   void Push(const wire::Envelope& envelope);
   void PushError(std::uint64_t request_id, const Status& status);
   // Writes what the peer takes now; the rest leaves as it takes it.
   void Flush();
-  // Of frames, by now: the system took them, or TLS.
-  std::size_t written_bytes() const { return static_cast<std::size_t>(written_bytes_); }
   // The peer takes what there is, as far as is known.
   bool has_room() const { return queued_bytes_ == 0 || queued_bytes_ <= max_bytes(); }
   // As many bytes as the next frames of a reply may have now, and one frame more; 0: it has to
   // wait.
   std::size_t RoomNow();
+  // What a reply may keep besides its frames: the less, the more the others have.
+  std::size_t share_bytes() const { return all_.share_bytes(); }
 
   // Waits for room, queues and flushes. False when the connection is gone: stop replying.
   boost::asio::awaitable<bool> Send(wire::Envelope envelope);
@@ -91,15 +112,18 @@ class ReplyWriter {
   boost::asio::awaitable<bool> SendWithOthers(wire::Envelope envelope);
   boost::asio::awaitable<bool> SendError(std::uint64_t request_id, Status status);
   boost::asio::awaitable<bool> WaitForRoom();
-  // Waits for room and sets it aside, up to `wanted_bytes`, of which there may be less; none where
-  // all have taken everything: then whoever has nothing queued makes one frame at a time. Made
-  // before they have room, frames would be bounded by nothing.
+  // Waits for room, and until its name has paid for what it was sent, and sets it aside, up to
+  // `wanted_bytes`, of which there may be less; none where all have taken everything: then whoever
+  // has nothing queued makes one frame at a time. Made before they have room, frames would be
+  // bounded by nothing.
   boost::asio::awaitable<Room> TakeRoom(std::size_t wanted_bytes);
 
   // The one coroutine that waits for the peer to take more. Returns after CloseWhenEmpty() when
   // everything queued has left, and when the connection is closed.
   boost::asio::awaitable<void> Run();
   void CloseWhenEmpty();
+  // From now on its name may owe: what is left is to be sent soon.
+  void EndPauses() { has_pauses_ = false; }
   void CloseNow();
   bool is_closed() const { return is_closed_; }
   // The peer has taken too little of what there is for so long.
@@ -113,15 +137,21 @@ class ReplyWriter {
   struct Piece {
     Bytes own;
     std::shared_ptr<const TileBody> tile;  // instead of these
+    std::shared_ptr<const void> held;      // these count elsewhere
 
     ByteSpan bytes() const { return tile ? tile->bytes() : own; }
   };
 
   void PushBytes(ByteSpan bytes);
+  void Pay();
+  // That its name has to wait, or to be asked again then.
+  Clock::duration Pause();
   void TakeAway(std::size_t bytes);
   void Wake() { changed_.cancel(); }
   // That may be queued now: the less, the more the others have.
   std::size_t max_bytes() const { return std::min(options_.max_queued_bytes, all_.share_bytes()); }
+  // Of frames that are made at a time.
+  std::size_t BatchBytes(std::size_t wanted_bytes) const;
   bool Fits(std::size_t bytes) const {
     const std::size_t taken_bytes = queued_bytes_ + reserved_bytes_;
     return taken_bytes == 0 || taken_bytes + bytes <= max_bytes();
@@ -141,10 +171,14 @@ class ReplyWriter {
   std::size_t sent_bytes_ = 0;  // of the first one
   std::size_t queued_bytes_ = 0;
   std::size_t reserved_bytes_ = 0;
+  std::size_t kept_bytes_ = 0;
+  std::size_t held_bytes_ = 0;     // of those queued: in pieces that count elsewhere
   std::size_t counted_bytes_ = 0;  // of these among all's
+  std::size_t unpaid_bytes_ = 0;   // that were queued
   std::int64_t written_bytes_ = 0;
   bool is_blocked_ = false;  // by the peer: Run() waits for it
   WritePace pace_;           // of the peer, while something waits
+  bool has_pauses_ = true;
   bool is_finishing_ = false;
   bool is_closed_ = false;
   std::stop_source peer_left_;

@@ -46,6 +46,11 @@ class RegionQuery {
   bool is_truncated() const { return is_truncated_; }
   bool is_of_the_past() const { return request_.at_revision.has_value(); }
   const std::optional<TileId>& last_tried() const { return last_tried_; }
+  // From the next ones on that are looked for.
+  void set_max_candidates(std::size_t count) { options_.max_candidates = count; }
+  // Of candidates that are kept until it goes on.
+  std::size_t kept_bytes() const { return candidates_.size() * kCandidateBytes; }
+  static constexpr std::size_t kCandidateBytes = 32;
 
  private:
   // Order within a level: squared distance of the tile's centre, then key.
@@ -56,6 +61,8 @@ class RegionQuery {
     // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 sees a null pointer in <=>
     friend auto operator<=>(const Candidate&, const Candidate&) = default;
   };
+
+  static_assert(sizeof(Candidate) == kCandidateBytes);
 
   RegionQuery(std::shared_ptr<TileView> tiles, const RegionRequest& request, Options options);
   bool NextLevel();

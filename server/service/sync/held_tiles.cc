@@ -34,6 +34,19 @@ bool Sort(std::vector<T>& held, std::uint64_t T::*field) {
          }) == held.end();
 }
 
+template <typename T>
+void Keep(std::vector<T>& held, const std::vector<bool>& is_kept) {
+  std::vector<T> kept;
+  kept.reserve(static_cast<std::size_t>(std::count(is_kept.begin(), is_kept.end(), true)));
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    if (is_kept[i]) {
+      kept.push_back(held[i]);
+      kept.back().number = kept.size() - 1;
+    }
+  }
+  held = std::move(kept);
+}
+
 }  // namespace
 
 void HeldDigest::Add(std::uint64_t key, std::uint64_t payload_hash) {
@@ -75,6 +88,11 @@ Result<HeldTiles> HeldTiles::Create(std::vector<HeldTile> tiles, std::vector<Hel
     }
   }
   return held;
+}
+
+void HeldTiles::KeepOnly(const std::vector<bool>& tiles, const std::vector<bool>& blocks) {
+  Keep(tiles_, tiles);
+  Keep(blocks_, blocks);
 }
 
 const HeldTile* HeldTiles::Find(std::uint64_t key) const {

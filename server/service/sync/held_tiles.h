@@ -53,6 +53,12 @@ class HeldTiles {
   // Null: not held, or as part of a block.
   const HeldTile* Find(std::uint64_t key) const;
   const HeldBlock* FindBlock(std::uint64_t block) const;
+  // Drops the others; numbers anew.
+  void KeepOnly(const std::vector<bool>& tiles, const std::vector<bool>& blocks);
+  // That it occupies.
+  std::size_t bytes() const {
+    return tiles_.capacity() * sizeof(HeldTile) + blocks_.capacity() * sizeof(HeldBlock);
+  }
 
  private:
   std::vector<HeldTile> tiles_;

@@ -48,9 +48,9 @@ class Planner {
         profile_(profile),
         may_block_(may_block),
         limits_(limits),
-        work_(may_block ? std::numeric_limits<std::size_t>::max() : limits.max_work_at_once),
-        is_tile_seen_(request.held.tiles().size(), false),
-        is_block_seen_(request.held.blocks().size(), false) {
+        work_(may_block ? std::numeric_limits<std::size_t>::max() : limits.max_work_at_once) {
+    plan_.is_tile_seen.resize(request.held.tiles().size());
+    plan_.is_block_seen.resize(request.held.blocks().size());
     plan_.current_tiles.resize((request.held.tiles().size() + 7) / 8);
     plan_.current_blocks.resize((request.held.blocks().size() + 7) / 8);
   }
@@ -169,7 +169,7 @@ class Planner {
     const bool is_same = held != nullptr && IsSame(*held, tiles);
     if (held != nullptr) {
       const auto index = static_cast<std::size_t>(held - request_.held.blocks().data());
-      is_block_seen_[index] = true;
+      plan_.is_block_seen[index] = true;
       if (is_same && (request_.sections & ~held->sections) == 0) {
         SetBit(plan_.current_blocks, held->number);
       } else if (!is_same) {
@@ -225,7 +225,11 @@ class Planner {
       ++plan_.not_modified;
       return;
     }
-    SyncItem item{tile, missing, held != nullptr && !is_same ? held->payload_hash : 0, 0.0};
+    SyncItem item{tile, missing};
+    if (held != nullptr && !is_same) {
+      item.held_hash = held->payload_hash;
+      item.held_sections = held->sections;
+    }
     const double worth = WorthOf(tile.id);
     if (request_.after && tile.revision > request_.after->revision) {
       // Where it stood before is not known any more, but not behind the last place that it can
@@ -251,7 +255,7 @@ class Planner {
       return;  // none, or one of a block
     }
     const auto index = static_cast<std::size_t>(held - tiles.data());
-    is_tile_seen_[index] = true;
+    plan_.is_tile_seen[index] = true;
     if (is_current) {
       SetBit(plan_.current_tiles, held->number);
     }
@@ -305,19 +309,20 @@ class Planner {
   void Sort() {
     Cut();
     std::sort(plan_.items.begin(), plan_.items.end(), &ComesBefore);
+    plan_.items.shrink_to_fit();  // kept for as long as the reply takes
   }
 
   void NoteRemoved() {
     const auto& tiles = request_.held.tiles();
     for (std::size_t i = 0; i < tiles.size(); ++i) {
-      if (!is_tile_seen_[i] && IsAsked(TileId::FromKey(tiles[i].key).value(), 0)) {
+      if (!plan_.is_tile_seen[i] && IsAsked(TileId::FromKey(tiles[i].key).value(), 0)) {
         plan_.removed.push_back(tiles[i].key);
       }
     }
     const auto& blocks = request_.held.blocks();
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       const TileId corner = TileId::FromKey(FirstKeyOf(blocks[i].block)).value();
-      if (!is_block_seen_[i] && IsAsked(corner, kTileBlockSideBits)) {
+      if (!plan_.is_block_seen[i] && IsAsked(corner, kTileBlockSideBits)) {
         plan_.differing.push_back(blocks[i].block);
       }
     }
@@ -337,8 +342,6 @@ class Planner {
   std::uint32_t coarsest_ = 0;
   std::uint8_t level_ = 0;
   std::vector<KnownDistance> distances_;  // by level
-  std::vector<bool> is_tile_seen_;        // of those that are held
-  std::vector<bool> is_block_seen_;
   std::size_t tiles_ = 0;
   SyncPlan plan_;
 };

@@ -42,6 +42,7 @@ struct SyncItem {
   TileSummary tile;
   SectionMask sections = kAllSections;  // those that are wanted and not held
   std::uint64_t held_hash = 0;          // of what is held of it and is not like that any more; or 0
+  SectionMask held_sections = 0;        // of that
   double priority = 0.0;
 };
 
@@ -56,6 +57,21 @@ struct SyncPlan {
   std::uint64_t not_modified = 0;        // tiles, in blocks or by themselves
   std::vector<std::uint64_t> removed;    // keys of those that are held and are no more
   std::vector<std::uint64_t> differing;  // blocks: which of their tiles differ must be asked for
+  // Of HeldTiles, in their order, those of which there is something in the area. To the plan that
+  // goes on from here the others are nothing.
+  std::vector<bool> is_tile_seen;
+  std::vector<bool> is_block_seen;
+
+  // Of what is held, with its memory, which assigning `{}` would keep; the items stay.
+  void DropHoldings() {
+    current_tiles = Bytes();
+    current_blocks = Bytes();
+    removed = std::vector<std::uint64_t>();
+    differing = std::vector<std::uint64_t>();
+    is_tile_seen = std::vector<bool>();
+    is_block_seen = std::vector<bool>();
+  }
+  std::size_t item_bytes() const { return items.capacity() * sizeof(SyncItem); }
 };
 
 struct SyncLimits {

@@ -1,5 +1,5 @@
 // A crowd of connections to a daemon, beside which a good client is measured.
-// Usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much|never_reads [tls]
+// Usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much|never_reads|holds_unread [tls]
 // Says {"open": N} when those that keep to the rules are connected, then lets the hostile ones go
 // until its standard input ends, and checks that the others have lost nothing.
 #include <csignal>
@@ -32,13 +32,17 @@ Hostility HostilityOf(const std::string& name) {
   if (name == "asks_much") {
     return Hostility::kAskMuch;
   }
+  if (name == "holds_unread") {
+    return Hostility::kHoldUnread;
+  }
   return name == "never_reads" ? Hostility::kNeverRead : Hostility::kBreakRules;
 }
 
 Status Run(int argc, char** argv) {
   if (argc != 6 && argc != 7) {
     return {StatusCode::kInvalidArgument,
-            "usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much|never_reads [tls]"};
+            "usage: crowd_bench PORT IDLE SLOW HOSTILE "
+            "breaks_rules|asks_much|never_reads|holds_unread [tls]"};
   }
   const Hostility how = HostilityOf(argv[5]);
   const auto port = static_cast<std::uint16_t>(std::atoi(argv[1]));

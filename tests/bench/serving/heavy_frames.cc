@@ -14,6 +14,23 @@ std::uint64_t FarOff() {
   return TileId{0, 1 << 20, 1 << 20}.Key();
 }
 
+Bytes HoldingMany(std::uint64_t request_id, std::uint64_t radius_um) {
+  wire::Envelope request;
+  request.set_request_id(request_id);
+  wire::SyncRequest& sync = *request.mutable_sync_request();
+  sync.mutable_area()->mutable_disc()->set_radius_um(radius_um);
+  wire::Held& held = *sync.add_held();
+  const std::uint64_t first = FarOff();
+  for (std::uint64_t i = 0; i < kTiles; ++i) {
+    held.add_keys(first + i);
+    held.add_payload_hashes(i);
+    held.add_blocks((first >> 6) - 1 - i);
+    held.add_masks(1);
+    held.add_digests(i);
+  }
+  return EncodeEnvelopeFrame(request).value();
+}
+
 }  // namespace
 
 Bytes ManyPosesFrame(std::uint64_t request_id) {
@@ -35,20 +52,11 @@ Bytes ManyPosesFrame(std::uint64_t request_id) {
 }
 
 Bytes ManyHeldFrame(std::uint64_t request_id) {
-  wire::Envelope request;
-  request.set_request_id(request_id);
-  wire::SyncRequest& sync = *request.mutable_sync_request();
-  sync.mutable_area()->mutable_disc()->set_radius_um(1'000'000);
-  wire::Held& held = *sync.add_held();
-  const std::uint64_t first = FarOff();
-  for (std::uint64_t i = 0; i < kTiles; ++i) {
-    held.add_keys(first + i);
-    held.add_payload_hashes(i);
-    held.add_blocks((first >> 6) - 1 - i);
-    held.add_masks(1);
-    held.add_digests(i);
-  }
-  return EncodeEnvelopeFrame(request).value();
+  return HoldingMany(request_id, 1'000'000);
+}
+
+Bytes ManyHeldInAreaFrame(std::uint64_t request_id) {
+  return HoldingMany(request_id, 90'000'000'000'000);
 }
 
 Bytes ManyWatchedFrame(std::uint64_t request_id) {

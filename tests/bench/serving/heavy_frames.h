@@ -12,6 +12,8 @@ namespace atlas::testing {
 Bytes ManyPosesFrame(std::uint64_t request_id);
 // A sync of little, by somebody who holds as many tiles and blocks as there may be.
 Bytes ManyHeldFrame(std::uint64_t request_id);
+// The same of an area that has what is held: the reply says of all of it that it is no more.
+Bytes ManyHeldInAreaFrame(std::uint64_t request_id);
 // A watch of as many tiles as there may be.
 Bytes ManyWatchedFrame(std::uint64_t request_id);
 

@@ -178,6 +178,14 @@ void WatchesManyTiles(Visit& visit) {
   visit.WaitForAReply();
 }
 
+void HoldsManyAndNeverReads(Visit& visit) {
+  static const Bytes kFrame = ManyHeldInAreaFrame(2);
+  visit.Greet();
+  visit.Say(kFrame);
+  visit.Idle(kLongPatience);
+  visit.socket.ResetAtClose();
+}
+
 using Behaviour = void (*)(Visit&);
 constexpr Behaviour kBreakRules[] = {&RandomBytes,     &ClaimsMoreThanThereMayBe,
                                      &ClaimsAndStalls, &LeavesWithinAFrame,
@@ -185,8 +193,8 @@ constexpr Behaviour kBreakRules[] = {&RandomBytes,     &ClaimsMoreThanThereMayBe
                                      &SaysNothing,     &LeavesAtOnce,
                                      &NeverReads,      &SendsNoMessage};
 constexpr Behaviour kAskMuch[] = {&CorrectsManyPoses, &HoldsManyTiles, &WatchesManyTiles};
-
 constexpr Behaviour kNeverRead[] = {&NeverReadsQueries, &NeverReadsSyncs};
+constexpr Behaviour kHoldUnread[] = {&HoldsManyAndNeverReads};
 
 std::span<const Behaviour> BehavioursOf(Hostility how) {
   switch (how) {
@@ -194,6 +202,8 @@ std::span<const Behaviour> BehavioursOf(Hostility how) {
       return kAskMuch;
     case Hostility::kNeverRead:
       return kNeverRead;
+    case Hostility::kHoldUnread:
+      return kHoldUnread;
     case Hostility::kBreakRules:
       break;
   }

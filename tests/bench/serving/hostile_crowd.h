@@ -1,6 +1,6 @@
 // Connections that break every rule there is, or keep to all of them and cost as much as they can,
-// or read nothing of what they ask for, each on a thread of its own: when the daemon has done with
-// one, or it gave up, it comes again at once.
+// or read nothing of what they ask for, be it much of the atlas or much about what they hold, each
+// on a thread of its own: when the daemon has done with one, or it gave up, it comes again at once.
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,7 @@
 
 namespace atlas::testing {
 
-enum class Hostility { kBreakRules, kAskMuch, kNeverRead };
+enum class Hostility { kBreakRules, kAskMuch, kNeverRead, kHoldUnread };
 
 class HostileCrowd {
  public:

@@ -1,4 +1,7 @@
 // Peers that stall, flood or come in crowds: each within its limits, the others served.
+#include <algorithm>
+#include <chrono>
+#include <future>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -20,6 +23,54 @@ class LimitTest : public NetTest {
  protected:
   static constexpr milliseconds kSoon{1'000};
 };
+
+// As many as are read in a turn, 60 ms of work together.
+TEST_F(LimitTest, RequestsAnsweredAtOnceLeaveOthersOfTheirThreadTheirTurn) {
+  net_.threads = 1;
+  net_.tile_frame_bytes = 0;
+  Serve();
+  wire::Envelope sync;
+  sync.set_request_id(1);
+  auto& disc = *sync.mutable_sync_request()->mutable_area()->mutable_disc();
+  disc.mutable_center()->set_x_um(100'000'000'000);  // where nothing is
+  disc.set_radius_um(170'000'000);
+  const auto peer = Connect();
+  const auto other = Connect();
+  const auto replies_end = [&] {
+    for (auto reply = peer->Receive(); reply && !reply->has_sync_end();) {
+      EXPECT_FALSE(reply->has_error());
+      reply = peer->Receive();
+    }
+  };
+  peer->Send(sync);  // from the disk, and in memory then
+  replies_end();
+  constexpr int kRequests = 4'000;
+  const Bytes frame = EncodeEnvelopeFrame(sync).value();
+  Bytes frames;
+  for (int i = 0; i < kRequests; ++i) {
+    frames.insert(frames.end(), frame.begin(), frame.end());
+  }
+  ASSERT_LT(frames.size(), 256u << 10);
+  const auto begin = std::chrono::steady_clock::now();
+  auto all = std::async(std::launch::async, [&] {
+    peer->SendBytes(frames);
+    for (int i = 0; i < kRequests; ++i) {
+      replies_end();
+    }
+    return std::chrono::steady_clock::now() - begin;
+  });
+  std::chrono::steady_clock::duration longest{};
+  wire::Envelope cancel;
+  cancel.set_request_id(5);
+  cancel.mutable_cancel_request()->set_request_id(99);
+  while (all.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    const auto asked = std::chrono::steady_clock::now();
+    other->Send(cancel);
+    EXPECT_TRUE(other->Receive().has_value());
+    longest = std::max(longest, std::chrono::steady_clock::now() - asked);
+  }
+  EXPECT_LT(longest, all.get() / 3);
+}
 
 // Looked at again every 50 ms, said once a second.
 TEST_F(LimitTest, WithoutDescriptorsTheLogHasFewLinesAndWhoWaitsIsServedLater) {

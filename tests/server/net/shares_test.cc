@@ -1,9 +1,13 @@
 // What one peer takes of what all share leaves the others theirs: of a name, of an address.
 #include <chrono>
+#include <memory>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 
+#include "core/base/str_cat.h"
 #include "server/net/connection/peer_access.h"
 #include "tests/server/net/net_fixture.h"
 
@@ -19,6 +23,10 @@ constexpr const char* kTokens =  // "alice", "bob"
 
 class SharesTest : public NetTest {
  protected:
+  using Clock = std::chrono::steady_clock;
+  // A batch of each of a few connections, what is made of the atlas here being small.
+  static constexpr double kSlackBytes = 200e3;
+
   void ServeAliceAndBob(unsigned workers) {
     security_.access = std::make_shared<const AccessControl>(
         TokenList::Parse(kTokens, "tokens").value(), Role::kAdmin);
@@ -34,6 +42,28 @@ class SharesTest : public NetTest {
     envelope.set_request_id(id);
     envelope.mutable_watch_request()->mutable_area()->mutable_disc()->set_radius_um(1'000'000);
     return envelope;
+  }
+  static wire::Envelope SyncOf(std::uint64_t id) {
+    wire::Envelope envelope;
+    envelope.set_request_id(id);
+    envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(1'000'000'000);
+    return envelope;
+  }
+  // Looks until then; says when more was sent than a second's worth, what the time since `begin`
+  // is worth, and what is made at a time.
+  std::string MostSentUntil(Clock::time_point end, double bytes_per_s, Clock::time_point begin) {
+    double sent = 0;
+    double most = 0;
+    while (Clock::now() < end) {
+      const std::chrono::duration<double> passed = Clock::now() - begin;
+      most = bytes_per_s * (1.0 + passed.count()) + kSlackBytes;
+      sent = static_cast<double>(server_->ReadFigures().sent_bytes);
+      if (sent > most) {
+        return StrCat(sent, " bytes after ", passed.count(), " s, expected at most ", most);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return sent > most / 2 ? "" : StrCat("only ", sent, " bytes");
   }
   static std::string ErrorOf(const std::optional<wire::Envelope>& reply) {
     EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
@@ -118,6 +148,61 @@ TEST_F(SharesTest, WhatANameIsSentHasARateAndOthersDoNotWaitForIt) {
   bob->Send(StatusOf(1));
   EXPECT_TRUE(bob->Receive()->has_status_reply());
   EXPECT_LT(std::chrono::steady_clock::now() - bobs, std::chrono::milliseconds(300));
+}
+
+// The most that one may have under way, on all connections; she reads none of it, so that nothing
+// but the rate counts.
+TEST_F(SharesTest, RepliesUnderWayKeepToTheRateOfTheirName) {
+  constexpr double kBytesPerS = 200e3;
+  Serve();
+  UploadDrive(12);
+  Digest();
+  StopServer();
+  net_.of_name.served_bytes_per_s = kBytesPerS;
+  net_.of_name.requests_per_s = 0;
+  ServeAliceAndBob(1);
+  std::vector<std::unique_ptr<BlockingPeer>> peers;
+  const auto begin = Clock::now();
+  for (int i = 0; i < 4; ++i) {
+    peers.push_back(ConnectAs("alice"));
+    for (std::uint64_t id = 1; id <= 60; ++id) {
+      peers.back()->Send(id % 2 == 0 ? QueryOf(id) : SyncOf(id));
+    }
+  }
+  EXPECT_EQ(MostSentUntil(begin + std::chrono::seconds(2), kBytesPerS, begin), "");
+  // What is no such reply does not wait, on the same connection either, nor do others.
+  const auto bob = ConnectAs("bob");
+  const auto asked = Clock::now();
+  bob->Send(SyncOf(1));
+  peers[0]->Send(StatusOf(99));
+  for (auto reply = bob->Receive(); !reply->has_sync_end(); reply = bob->Receive()) {
+  }
+  for (auto reply = peers[0]->Receive(); !reply->has_status_reply(); reply = peers[0]->Receive()) {
+  }
+  EXPECT_LT(Clock::now() - asked, std::chrono::milliseconds(500));
+}
+
+// What a name owes is no reason to be late then.
+TEST_F(SharesTest, NobodyPausesWhileTheServerStops) {
+  Serve();
+  UploadDrive(12);
+  Digest();
+  StopServer();
+  net_.of_name.served_bytes_per_s = 20e3;
+  ServeAliceAndBob(1);
+  const auto alice = ConnectAs("alice");
+  alice->Send(SyncOf(1));
+  alice->Send(SyncOf(2));
+  ASSERT_TRUE(alice->Receive()->has_sync_manifest());
+  const auto begin = Clock::now();
+  server_->Stop();
+  int ends = 0;
+  while (const auto reply = alice->Receive()) {
+    ends += reply->has_sync_end() ? 1 : 0;
+  }
+  EXPECT_EQ(ends, 2);
+  EXPECT_LT(Clock::now() - begin, std::chrono::seconds(2));
+  EXPECT_TRUE(HasDrained());
 }
 
 TEST_F(SharesTest, OnThisMachineNobodyIsLimitedByHisAddress) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/net/stream/write_pace.h"
+#include "server/store/tile_block.h"
 #include "tests/server/net/net_fixture.h"
 
 namespace atlas {
@@ -16,6 +17,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr std::uint64_t kRequests = 64;
+constexpr std::size_t kPlanBytes = 512u << 10;  // set aside while one is made
 constexpr std::size_t kFrameBytes = 64u << 10;  // of the tiles here none is as large
 
 class SlowReadersTest : public NetTest {
@@ -31,6 +33,35 @@ class SlowReadersTest : public NetTest {
     envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(1'000'000'000);
     return envelope;
   }
+  // Hundreds of tiles, far from each other, so that a plan of all of them is more than frames may
+  // take.
+  void ServeManyTiles() {
+    net_.max_queued_bytes = 4'096;
+    Serve();
+    for (std::uint32_t i = 0; i < 48; ++i) {
+      UploadRequest upload = DriveUpload(i);
+      upload.pose = PoseOf({100.0 * i, 0.0, 1.8, 0.0});
+      ASSERT_TRUE(Upload(std::move(upload)));
+    }
+    Digest();
+  }
+  // By somebody who holds as many tiles and blocks as there may be, all of them in the area, none
+  // of which is there.
+  static wire::Envelope ManyHeldSync(std::uint64_t id) {
+    wire::Envelope envelope = SyncOf(id);
+    wire::SyncRequest& sync = *envelope.mutable_sync_request();
+    sync.mutable_area()->mutable_disc()->set_radius_um(90'000'000'000'000);
+    wire::Held& held = *sync.add_held();
+    const std::uint64_t first = TileId{0, 1 << 20, 1 << 20}.Key();
+    for (std::uint64_t i = 0; i < HeldTiles::kMaxTiles; ++i) {
+      held.add_keys(first + i);
+      held.add_payload_hashes(i);
+      held.add_blocks(TileBlockOf(first) - 1 - i);
+      held.add_masks(1);
+      held.add_digests(i);
+    }
+    return envelope;
+  }
   // Of everything, again and again, as queries or as syncs.
   static Bytes RequestsFor(bool is_sync) {
     Bytes bytes;
@@ -40,8 +71,12 @@ class SlowReadersTest : public NetTest {
     }
     return bytes;
   }
-  // The most that was queued until nothing changes any more.
-  std::uint64_t MostQueued() const {
+  // What was queued until nothing changes any more, and is then.
+  struct Queued {
+    std::uint64_t most = 0;
+    std::uint64_t at_rest = 0;
+  };
+  Queued WaitUntilAtRest() const {
     std::uint64_t most = 0;
     NetFigures last;
     for (int unchanged = 0; unchanged < 50;) {
@@ -52,7 +87,7 @@ class SlowReadersTest : public NetTest {
           now.sent_bytes == last.sent_bytes && now.in_flight == last.in_flight ? unchanged + 1 : 0;
       last = now;
     }
-    return most;
+    return {most, last.queued_bytes};
   }
 };
 
@@ -62,9 +97,10 @@ TEST_F(SlowReadersTest, OneQueuesNoMoreThanItMay) {
   for (const bool is_sync : {false, true}) {
     const auto peer = Connect(4'096);
     peer->SendBytes(RequestsFor(is_sync));
-    const std::uint64_t most = MostQueued();
-    EXPECT_GT(most, 0u);
-    EXPECT_LE(most, net_.max_queued_bytes + kFrameBytes);
+    const Queued queued = WaitUntilAtRest();
+    EXPECT_GT(queued.at_rest, 0u);
+    EXPECT_LE(queued.at_rest, net_.max_queued_bytes + kFrameBytes);
+    EXPECT_LE(queued.most, net_.max_queued_bytes + kFrameBytes + kPlanBytes);
   }
 }
 
@@ -77,7 +113,7 @@ TEST_F(SlowReadersTest, AllTogetherQueueNoMoreThanTheyMay) {
     peers.push_back(Connect(4'096));
     peers.back()->SendBytes(RequestsFor(i % 2 == 0));
   }
-  const std::uint64_t most = MostQueued();
+  const std::uint64_t most = WaitUntilAtRest().most;
   EXPECT_GT(most, net_.max_all_queued_bytes / 2);
   EXPECT_LE(most, net_.max_all_queued_bytes + 4 * kFrameBytes);
   // Another one gets all it asks for.
@@ -96,6 +132,55 @@ TEST_F(SlowReadersTest, AllTogetherQueueNoMoreThanTheyMay) {
     std::this_thread::sleep_for(milliseconds(1));
   }
   EXPECT_EQ(server_->ReadFigures().queued_bytes, 0u);
+}
+
+// What is still to be sent is known, and that takes memory, too.
+TEST_F(SlowReadersTest, WhatRepliesKeepCountsAsQueued) {
+  ServeManyTiles();
+  const std::uint64_t tiles = service_->ReadStatus()->counts.tiles;
+  ASSERT_GT(tiles, 300u);
+  for (const bool is_sync : {false, true}) {
+    const auto peer = Connect(4'096);
+    peer->SendBytes(RequestsFor(is_sync));
+    const std::uint64_t queued = WaitUntilAtRest().at_rest;
+    // A query knows the tiles of one level.
+    EXPECT_GT(queued, is_sync ? 256 * sizeof(SyncItem) : tiles / 4 * 32);
+    EXPECT_LE(queued, net_.max_queued_bytes + kFrameBytes + tiles * sizeof(SyncItem));
+  }
+}
+
+// It grows with the request, not with the room for it.
+TEST_F(SlowReadersTest, WhatBecameOfWhatIsHeldCountsForTheRequest) {
+  constexpr std::uint64_t kTold = 2 * sizeof(std::uint64_t) * HeldTiles::kMaxTiles;
+  ServeTiles();
+  std::vector<std::unique_ptr<BlockingPeer>> peers;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    peers.push_back(Connect(4'096));
+    peers.back()->Send(ManyHeldSync(i + 1));
+  }
+  EXPECT_LT(WaitUntilAtRest().at_rest, kTold / 2) << "not among replies";
+  const std::uint64_t held = server_->ReadFigures().held_bytes;
+  EXPECT_GE(held, 3 * kTold);
+  EXPECT_LT(held, 4 * kTold) << "what was asked is gone";
+  for (const auto& peer : peers) {
+    const auto manifest = peer->Receive();
+    ASSERT_TRUE(manifest && manifest->has_sync_manifest());
+    EXPECT_EQ(manifest->sync_manifest().removed_size(), int{HeldTiles::kMaxTiles});
+    EXPECT_EQ(manifest->sync_manifest().differing_blocks_size(), int{HeldTiles::kMaxBlocks});
+  }
+  ExpectHoldsNothing();
+}
+
+TEST_F(SlowReadersTest, WhatIsLeftOfARequestGoesWithItsPeer) {
+  net_.drain = milliseconds(100);
+  ServeTiles();
+  Connect(4'096)->Send(ManyHeldSync(1));
+  ExpectHoldsNothing();
+  const auto stays = Connect(4'096);
+  stays->Send(ManyHeldSync(2));
+  WaitUntilAtRest();
+  EXPECT_GT(server_->ReadFigures().held_bytes, 0u);
+  StopServer();
 }
 
 // As when so many others read nothing that nothing is left to be shared.

@@ -1,5 +1,6 @@
 #include "server/net/requests/sync_reply.h"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <vector>
@@ -25,7 +26,7 @@ class SyncReplyTest : public ServiceTest {
     auto& disc = *envelope.mutable_sync_request()->mutable_area()->mutable_disc();
     disc.set_radius_um(100'000'000);
     envelope.mutable_sync_request()->set_budget_bytes(budget_bytes);
-    return {*service_, frames_, std::make_shared<wire::Envelope>(envelope)};
+    return {*service_, frames_, Request{std::make_shared<wire::Envelope>(envelope)}};
   }
   static Bytes BytesOf(const std::vector<ReplyFrame>& frames) {
     ByteWriter out;
@@ -86,7 +87,7 @@ TEST_F(SyncReplyTest, ALongWayIsNotPlannedWithoutThePool) {
     point.set_x_um(i % 2 * 25'000'000);
     point.set_y_um(i * 100'000);
   }
-  SyncReply reply(*service_, frames_, std::make_shared<wire::Envelope>(envelope));
+  SyncReply reply(*service_, frames_, Request{std::make_shared<wire::Envelope>(envelope)});
   std::vector<ReplyFrame> frames;
   for (int i = 0; i < 2; ++i) {
     const auto step = reply.Next(false, frames);
@@ -105,7 +106,7 @@ TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
   wire::Envelope envelope;
   envelope.set_request_id(9);
   envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(100'000'000);
-  SyncReply reply(*service_, few, std::make_shared<wire::Envelope>(envelope));
+  SyncReply reply(*service_, few, Request{std::make_shared<wire::Envelope>(envelope)});
   std::uint64_t tiles = 0;
   std::uint64_t ends = 0;
   std::vector<ReplyFrame> frames;
@@ -120,6 +121,37 @@ TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
     ends += *step == SyncReply::Step::kDone ? 1u : 0u;
   }
   EXPECT_EQ(tiles, static_cast<std::uint64_t>(service_->ReadStatus()->counts.tiles));
+}
+
+// As when many others read slowly.
+TEST_F(SyncReplyTest, WithLittleRoomItPlansAFewTilesAtATime) {
+  for (std::uint32_t i = 0; i < 48; ++i) {
+    UploadRequest upload = DriveUpload(i, "far");
+    upload.pose = PoseOf({100.0 + 20.0 * i, 0.0, 1.8, 0.0});
+    ASSERT_TRUE(Upload(std::move(upload)));
+  }
+  Digest();
+  const std::uint64_t expected = service_->ReadStatus()->counts.tiles;
+  ASSERT_GT(expected, 300u);
+  wire::Envelope envelope;
+  envelope.mutable_sync_request()->mutable_area()->mutable_disc()->set_radius_um(10'000'000'000);
+  SyncReply reply(*service_, frames_, Request{std::make_shared<wire::Envelope>(envelope)});
+  std::map<std::uint64_t, int> tiles;
+  std::size_t most_bytes = 0;
+  Result<SyncReply::Step> step = SyncReply::Step::kMore;
+  while (step && *step == SyncReply::Step::kMore) {
+    std::vector<ReplyFrame> frames;
+    step = reply.Next(true, frames, {1, 0});
+    most_bytes = std::max(most_bytes, reply.kept_bytes());
+    for (const ReplyFrame& frame : frames) {
+      if (frame.tile()) {
+        ++tiles[frame.tile()->id().key];
+      }
+    }
+  }
+  EXPECT_EQ(step.value(), SyncReply::Step::kDone);
+  EXPECT_EQ(tiles.size(), expected);
+  EXPECT_LE(most_bytes, 256 * sizeof(SyncItem));
 }
 
 // Tiles by key, of which contents.
@@ -139,7 +171,7 @@ class SyncDeltaTest : public SyncReplyTest {
       group.add_keys(key);
       group.add_payload_hashes(tile->id().payload_hash);
     }
-    SyncReply reply(*service_, frames, std::make_shared<wire::Envelope>(envelope));
+    SyncReply reply(*service_, frames, Request{std::make_shared<wire::Envelope>(envelope)});
     std::vector<ReplyFrame> out;
     Result<SyncReply::Step> step = SyncReply::Step::kMore;
     while (step && *step == SyncReply::Step::kMore) {

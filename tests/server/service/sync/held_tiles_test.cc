@@ -23,6 +23,22 @@ TEST(HeldTilesTest, AreFoundByTheirKeys) {
   EXPECT_EQ(held->FindBlock(0), nullptr);
 }
 
+TEST(HeldTilesTest, ThoseThatAreKeptAreNumberedAnew) {
+  const TileId a{0, 3, 4};
+  const TileId b{2, -5, 1};
+  HeldTiles held =
+      HeldTiles::Create({Tile(a), Tile(b)}, {{TileBlockOf(TileId{1, 8, 8}.Key()), 1, 2}}).value();
+  const std::size_t all_bytes = held.bytes();
+  std::vector<bool> is_kept(2);
+  is_kept[static_cast<std::size_t>(held.Find(b.Key()) - held.tiles().data())] = true;
+  held.KeepOnly(is_kept, {false});
+  EXPECT_EQ(held.Find(a.Key()), nullptr);
+  ASSERT_NE(held.Find(b.Key()), nullptr);
+  EXPECT_EQ(held.Find(b.Key())->number, 0u);
+  EXPECT_TRUE(held.blocks().empty());
+  EXPECT_LT(held.bytes(), all_bytes / 2);
+}
+
 TEST(HeldTilesTest, AreNumberedAsTheyWereTold) {
   const TileId a{0, 3, 4};
   const TileId b{0, 4, 4};

@@ -38,6 +38,67 @@ std::vector<HeldBlock> BlocksOf(const KnownTiles& tiles) {
   return result;
 }
 
+// Half of the tiles by themselves or in blocks, some of them changed, and others that are not
+// there.
+HeldTiles SomeOf(const KnownTiles& tiles, std::uint32_t seed) {
+  std::vector<HeldTile> held;
+  for (const HeldTile& tile : AllOf(tiles)) {
+    if (TileBlockOf(tile.key) % 4 == 0) {
+      held.push_back({tile.key, tile.payload_hash + (tile.key % 5 == seed % 5 ? 1 : 0)});
+    }
+  }
+  std::vector<HeldBlock> blocks;
+  for (HeldBlock block : BlocksOf(tiles)) {
+    if (block.block % 4 == 1) {
+      block.digest += block.block % 3 == seed % 3 ? 1 : 0;
+      blocks.push_back(block);
+    }
+  }
+  for (std::int32_t i = 0; i < 20; ++i) {
+    held.push_back({TileId{0, 1'000 + 8 * i, 0}.Key(), 1});
+    blocks.push_back({TileBlockOf(TileId{0, 1'000 + 8 * i, 80}.Key()), 1, 1});
+  }
+  return HeldTiles::Create(std::move(held), std::move(blocks)).value();
+}
+
+TEST(SyncPlanTest, WhatIsDroppedTakesNoMemory) {
+  Streets tiles(1);
+  SyncRequest request = Ask(DiscArea{{0.0, 0.0}, 1e6});
+  request.held = SomeOf(tiles, 1);
+  SyncPlan plan = Plan(request, tiles);
+  ASSERT_FALSE(plan.removed.empty() || plan.differing.empty());
+  plan.DropHoldings();
+  for (const std::size_t capacity :
+       {plan.current_tiles.capacity(), plan.current_blocks.capacity(), plan.removed.capacity(),
+        plan.differing.capacity(), plan.is_tile_seen.capacity(), plan.is_block_seen.capacity()}) {
+    EXPECT_EQ(capacity, 0u);
+  }
+}
+
+TEST(SyncPlanTest, GoesOnAlikeWithoutWhatIsHeldOfNothing) {
+  for (std::uint32_t seed = 0; seed < 30; ++seed) {
+    Streets tiles(seed);
+    SyncRequest request = Ask(AnyShape(seed));
+    request.held = SomeOf(tiles, seed);
+    const std::vector<std::uint64_t> whole = KeysOf(Plan(request, tiles).items);
+    std::vector<std::uint64_t> pieces;
+    for (bool is_cut = true; is_cut;) {
+      const SyncPlan plan = Plan(request, tiles, {7});
+      EXPECT_LE(plan.items.capacity(), 7u);
+      is_cut = plan.is_cut;
+      for (const SyncItem& item : plan.items) {
+        pieces.push_back(item.tile.id.Key());
+        request.after = SyncCursor{tiles.revision(), item.priority, item.tile.id.Key()};
+      }
+      request.held.KeepOnly(plan.is_tile_seen, plan.is_block_seen);
+      for (const HeldTile& tile : request.held.tiles()) {
+        EXPECT_TRUE(tiles.tiles().contains(tile.key));
+      }
+    }
+    EXPECT_EQ(pieces, whole) << seed;
+  }
+}
+
 TEST(SyncPlanTest, EverythingOfTheAreaOnceParentsFirst) {
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
     Streets tiles(seed);

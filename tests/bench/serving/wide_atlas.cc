@@ -1,0 +1,58 @@
+// Fills the atlas of a daemon with many small tiles, so that it knows of far more tiles than a
+// reply has room for. Usage: wide_atlas PORT SIDE: keyframes on a grid, SIDE along each side, each
+// in a tile of its own.
+#include <cstdint>
+#include <cstdlib>
+#include <iostream>
+
+#include "client/connection/atlas_client.h"
+#include "client/connection/keyframe_uploader.h"
+#include "core/keyframe/keyframe_codec.h"
+#include "tests/core/support/keyframe_worlds.h"
+
+namespace atlas::testing {
+namespace {
+
+constexpr std::int32_t kRadius_cells = 8;
+constexpr std::int64_t kTime_ms = 1'700'000'000'000;
+
+Status Run(std::uint16_t port, int side) {
+  ConnectionOptions connection;
+  connection.endpoint.port = port;
+  connection.client_name = "wide_atlas";
+  auto client = AtlasClient::Connect(connection);
+  if (!client) {
+    return client.error();
+  }
+  const MapProfile profile = client->profile();
+  const Bytes blob = EncodeKeyframe(StreetKeyframe(profile, kRadius_cells, 1));
+  KeyframeUploader uploader(*client);
+  for (int i = 0; i < side * side; ++i) {
+    Pose pose = Pose::Identity();
+    pose.translation() = Eigen::Vector3d((i % side + 0.5) * profile.tile_size_m(),
+                                         (i / side + 0.5) * profile.tile_size_m(), 1.8);
+    KeyframeUpload upload;
+    upload.key = {{"wide", "grid"}, static_cast<std::uint32_t>(i)};
+    upload.time_ms = kTime_ms + i;
+    upload.T_world_sensor = QuantizedPose::FromPose(pose);
+    upload.blob = blob;
+    ATLAS_RETURN_IF_ERROR(uploader.Upload(upload));
+  }
+  return uploader.Finish();
+}
+
+}  // namespace
+}  // namespace atlas::testing
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::cerr << "usage: wide_atlas PORT SIDE\n";
+    return 2;
+  }
+  const atlas::Status status =
+      atlas::testing::Run(static_cast<std::uint16_t>(std::atoi(argv[1])), std::atoi(argv[2]));
+  if (!status.ok()) {
+    std::cerr << "wide_atlas: " << status.message() << "\n";
+  }
+  return status.ok() ? 0 : 1;
+}
