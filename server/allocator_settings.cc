@@ -4,7 +4,9 @@
 // Two arenas for all threads: with one of its own each, what the caches gave up in one is no use to
 // the others. What is free goes back to the system after two seconds, also when nobody asks for
 // memory meanwhile.
-extern "C" const char* malloc_conf;
-extern "C" const char* malloc_conf =
+extern "C" {
+extern const char* malloc_conf;
+const char* malloc_conf =
     "narenas:2,dirty_decay_ms:2000,muzzy_decay_ms:0,background_thread:true,max_background_threads:"
     "1";
+}
