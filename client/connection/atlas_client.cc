@@ -19,6 +19,7 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithPast = 2;
 constexpr std::uint32_t kMinorWithSync = 4;
+constexpr std::uint32_t kMinorWithWatch = 5;
 
 // Of a call that is given up after this; 0: never.
 Clock::time_point EndAfter(milliseconds give_up) {
@@ -165,7 +166,7 @@ Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
     if (!reply) return Error(reply.error());
     if (reply->has_query_end()) return SummaryFromWire(reply->query_end());
     Result<TileBlob> tile = TileFromWire(*reply->mutable_tile());
-    if (!tile) return Error(tile.error());
+    if (!tile) return Error(channel_->Break(tile.error()));
     if (Status status = on_tile(*std::move(tile)); !status.ok()) return Error(std::move(status));
   }
 }
@@ -190,7 +191,7 @@ Result<SyncSummary> AtlasClient::Sync(const SyncQuery& query, const TileCallback
 Result<SyncSummary> AtlasClient::Continue(std::shared_ptr<SyncRest> rest,
                                           milliseconds give_up,
                                           const TileCallback& on_tile) {
-  if (rest == nullptr || rest->channel.lock() != channel_ || rest->id != channel_->last_id()) {
+  if (rest == nullptr || rest->channel.lock() != channel_ || rest->id != channel_->last_call()) {
     return Error(StatusCode::kNotFound, "sync: nothing of it is on its way here any more");
   }
   return Follow(std::move(rest), EndAfter(give_up), on_tile);
@@ -210,8 +211,12 @@ Result<SyncSummary> AtlasClient::Follow(std::shared_ptr<SyncRest> rest,
     }
     const wire::Envelope& frame = **reply;
     const std::uint64_t frame_bytes = channel_->last_frame_bytes();
-    if (frame.has_sync_end()) return exchange.OnEnd(frame.sync_end(), frame_bytes);
     Status status;
+    if (frame.has_sync_end()) {
+      Result<SyncSummary> summary = exchange.OnEnd(frame.sync_end(), frame_bytes);
+      if (!summary) return Error(channel_->Break(summary.error()));
+      return summary;
+    }
     if (frame.has_sync_manifest()) {
       status = exchange.OnManifest(frame.sync_manifest(), frame_bytes);
     } else if (frame.has_tile()) {
@@ -220,8 +225,21 @@ Result<SyncSummary> AtlasClient::Follow(std::shared_ptr<SyncRest> rest,
     } else {
       status = channel_->Unexpected(frame);
     }
+    if (status.code() == StatusCode::kInvalidData) return Error(channel_->Break(std::move(status)));
     if (!status.ok()) return Error(std::move(status));
   }
+}
+
+Status AtlasClient::CheckWatch() const {
+  if (atlas_.protocol_minor >= kMinorWithWatch) return {};
+  return {StatusCode::kUnsupported,
+          StrCat("the daemon speaks protocol ", kProtocolMajor, '.', atlas_.protocol_minor,
+                 ", a watch needs ", kProtocolMajor, '.', kMinorWithWatch)};
+}
+
+Result<AtlasWatch> AtlasClient::Watch(const WatchQuery& query, milliseconds timeout) {
+  if (Status status = CheckWatch(); !status.ok()) return Error(std::move(status));
+  return AtlasWatch::Begin(channel_, query, Clock::now() + timeout);
 }
 
 Result<AtlasStatus> AtlasClient::ReadStatus() {
@@ -324,6 +342,10 @@ Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout)
                        done.mismatched(),
                        {done.findings().begin(), done.findings().end()},
                        done.revision()};
+}
+
+bool AtlasClient::is_broken() const {
+  return channel_->is_broken();
 }
 
 milliseconds AtlasClient::retry_after() const {
