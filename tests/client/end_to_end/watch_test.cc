@@ -29,6 +29,14 @@ class WatchTest : public VehicleTest {
     if (!first || !*first) throw std::runtime_error("no first event");
     return *std::move(watch);
   }
+  static void RetractAll(AtlasClient& client) {
+    const auto sessions = client.ListSessions();
+    ASSERT_TRUE(sessions);
+    for (const SessionSummary& session : *sessions) {
+      ASSERT_TRUE(client.ChangeSession(session.key, SessionAction::kRetract, "me"));
+    }
+    ASSERT_TRUE(client.WaitUntilFused(kPatience));
+  }
   // Until what was told is all that is expected.
   static AreaChanges AllOf(AtlasWatch& watch,
                            const std::function<bool(const AreaChanges&)>& is_all) {
@@ -61,8 +69,7 @@ TEST_F(WatchTest, TellsEveryTileThatCameAndASyncBesideItGetsThem) {
   }
   ASSERT_TRUE(SyncStore(client, store, Everywhere()));
   EXPECT_EQ(Held(store), now);
-  ASSERT_EQ(RunAtlas(daemon.address(), {"session", "retract", "vehicle/overpass"}).exit_code, 0);
-  ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+  RetractAll(other);
   const AreaChanges gone =
       AllOf(watch, [&now](const AreaChanges& told) { return told.removed.size() >= now.size(); });
   EXPECT_EQ(gone.removed.size(), now.size());
@@ -77,8 +84,7 @@ TEST_F(WatchTest, ASlowWatcherIsToldEachTileOnceAsItIsNow) {
   Fill(daemon);
   AtlasClient other = Connect(daemon);
   const HashById there = AtlasNow(other);
-  ASSERT_EQ(RunAtlas(daemon.address(), {"session", "retract", "vehicle/overpass"}).exit_code, 0);
-  ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+  RetractAll(other);
   ASSERT_TRUE(client.ReadStatus());  // reads what was told so far
   const AreaChanges all = AllOf(
       watch, [&there](const AreaChanges& told) { return told.removed.size() >= there.size(); });
