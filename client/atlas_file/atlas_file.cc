@@ -77,9 +77,8 @@ Status AtlasFile::ReadLevel(std::uint8_t level,
   const BoxArea box = disc ? BoxAround(*disc) : Everywhere();
   return List(level, box, [&](const TileFacts& facts) -> Status {
     if (disc && !Touches(*disc, facts.id, profile())) return {};
-    const Result<std::optional<TileBlob>> tile = Read(facts.id);
-    if (!tile) return tile.error();
-    return *tile ? on_tile(**tile) : Status();
+    const Result<TileBlob> tile = ReadListed(facts.id);
+    return tile ? on_tile(*tile) : tile.error();
   });
 }
 
@@ -89,6 +88,14 @@ Result<std::optional<TileBlob>> AtlasFile::Read(const TileId& id) {
   if (!*stored) return std::nullopt;
   StoredTile& tile = **stored;
   return TileBlob{tile.id, tile.revision, tile.payload_hash, std::move(tile.blob)};
+}
+
+Result<TileBlob> AtlasFile::ReadListed(const TileId& id) {
+  Result<std::optional<TileBlob>> tile = Read(id);
+  if (!tile) return Error(tile.error());
+  if (*tile) return **std::move(tile);
+  return Error(StatusCode::kInvalidData,
+               StrCat("atlas file: tile ", id, ": listed and not there; an index is damaged"));
 }
 
 Status AtlasFile::List(std::uint8_t level,

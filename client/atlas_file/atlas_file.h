@@ -45,6 +45,8 @@ class AtlasFile final : public MapSource {
                    const OnTile& on_tile) override;
   // nullopt: there is no such tile. kInvalidData: it is damaged; others may be read all the same.
   Result<std::optional<TileBlob>> Read(const TileId& id);
+  // One that List told: that it is not there is kInvalidData, too, for the file is one state.
+  Result<TileBlob> ReadListed(const TileId& id);
   // Calls back for every tile of `level` that the box touches, in the order of their keys. A
   // failing callback, which may read tiles, ends it with its status.
   Status List(std::uint8_t level,

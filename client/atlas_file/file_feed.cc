@@ -60,9 +60,8 @@ class Filling {
       is_cut_ = true;
       return {};
     }
-    Result<std::optional<TileBlob>> tile = file_.Read(id);
-    if (tile && !*tile) return {};  // listed and not there: the file's index is damaged
-    Status status = tile ? Put(**tile) : tile.error();
+    const Result<TileBlob> tile = file_.ReadListed(id);
+    Status status = tile ? Put(*tile) : tile.error();
     if (status.code() != StatusCode::kInvalidData) return status;
     if (damage_.ok()) damage_ = std::move(status);
     return {};

@@ -19,16 +19,11 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithPast = 2;
 constexpr std::uint32_t kMinorWithSync = 4;
-constexpr std::uint32_t kMinorWithLog = 8;
+constexpr std::uint32_t kMinorWithWatch = 5;
 
 // Of a call that is given up after this; 0: never.
 Clock::time_point EndAfter(milliseconds give_up) {
   return give_up.count() > 0 ? Clock::now() + give_up : Clock::time_point::max();
-}
-
-std::uint32_t TimeoutField(milliseconds timeout) {
-  return static_cast<std::uint32_t>(
-      std::clamp<std::int64_t>(timeout.count(), 0, INT64_C(0xFFFFFFFF)));
 }
 
 wire::Envelope RegionRequest(const RegionQuery& query) {
@@ -103,37 +98,6 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   return session;
 }
 
-Result<VerifySummary> CallVerify(RpcChannel& channel,
-                                 wire::Envelope& request,
-                                 milliseconds timeout) {
-  request.mutable_verify_request()->set_timeout_ms(TimeoutField(timeout));
-  const auto reply = channel.Call(request, Body::kVerifyReply, timeout);
-  if (!reply) return Error(reply.error());
-  const wire::VerifyReply& done = reply->verify_reply();
-  return VerifySummary{done.checked(),    done.damaged(),
-                       done.mismatched(), {done.findings().begin(), done.findings().end()},
-                       done.revision(),   done.restored(),
-                       done.given_up()};
-}
-
-Result<SessionChangeSummary> CallChangeSession(RpcChannel& channel,
-                                               const SessionKey& key,
-                                               SessionAction action,
-                                               const std::string& author) {
-  wire::Envelope request;
-  wire::ChangeSession& change = *request.mutable_change_session();
-  change.set_vehicle(key.vehicle);
-  change.set_session(key.session);
-  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
-                                                      : wire::ChangeSession::RESTORE);
-  change.set_author(author);
-  const auto reply = channel.Call(request, Body::kChangeSessionReply);
-  if (!reply) return Error(reply.error());
-  const wire::ChangeSessionReply& done = reply->change_session_reply();
-  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision(),
-                              done.sessions()};
-}
-
 }  // namespace
 
 // A sync between its request and its end.
@@ -197,7 +161,7 @@ Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
     if (!reply) return Error(reply.error());
     if (reply->has_query_end()) return SummaryFromWire(reply->query_end());
     Result<TileBlob> tile = TileFromWire(*reply->mutable_tile());
-    if (!tile) return Error(tile.error());
+    if (!tile) return Error(channel_->Break(tile.error()));
     if (Status status = on_tile(*std::move(tile)); !status.ok()) return Error(std::move(status));
   }
 }
@@ -223,7 +187,7 @@ Result<SyncSummary> AtlasClient::Sync(const SyncQuery& query, const TileCallback
 Result<SyncSummary> AtlasClient::Continue(std::shared_ptr<SyncRest> rest,
                                           milliseconds give_up,
                                           const TileCallback& on_tile) {
-  if (rest == nullptr || rest->channel.lock() != channel_ || rest->id != channel_->last_id()) {
+  if (rest == nullptr || rest->channel.lock() != channel_ || rest->id != channel_->last_call()) {
     return Error(StatusCode::kNotFound, "sync: nothing of it is on its way here any more");
   }
   return Follow(std::move(rest), EndAfter(give_up), on_tile);
@@ -243,8 +207,12 @@ Result<SyncSummary> AtlasClient::Follow(std::shared_ptr<SyncRest> rest,
     }
     const wire::Envelope& frame = **reply;
     const std::uint64_t frame_bytes = channel_->last_frame_bytes();
-    if (frame.has_sync_end()) return exchange.OnEnd(frame.sync_end(), frame_bytes);
     Status status;
+    if (frame.has_sync_end()) {
+      Result<SyncSummary> summary = exchange.OnEnd(frame.sync_end(), frame_bytes);
+      if (!summary) return Error(channel_->Break(summary.error()));
+      return summary;
+    }
     if (frame.has_sync_manifest()) {
       status = exchange.OnManifest(frame.sync_manifest(), frame_bytes);
     } else if (frame.has_tile()) {
@@ -253,8 +221,15 @@ Result<SyncSummary> AtlasClient::Follow(std::shared_ptr<SyncRest> rest,
     } else {
       status = channel_->Unexpected(frame);
     }
+    if (status.code() == StatusCode::kInvalidData) return Error(channel_->Break(std::move(status)));
     if (!status.ok()) return Error(std::move(status));
   }
+}
+
+Result<AtlasWatch> AtlasClient::Watch(const WatchQuery& query, milliseconds timeout) {
+  if (Status status = CheckMinor(kMinorWithWatch, "a watch"); !status.ok())
+    return Error(std::move(status));
+  return AtlasWatch::Begin(channel_, query, Clock::now() + timeout);
 }
 
 Result<AtlasStatus> AtlasClient::ReadStatus() {
@@ -263,20 +238,6 @@ Result<AtlasStatus> AtlasClient::ReadStatus() {
   const auto reply = channel_->Call(request, Body::kStatusReply);
   if (!reply) return Error(reply.error());
   return StatusFromWire(reply->status_reply());
-}
-
-Result<WaitSummary> AtlasClient::WaitUntilFused(milliseconds timeout) {
-  wire::Envelope request;
-  request.mutable_wait_request()->set_timeout_ms(TimeoutField(timeout));
-  const auto reply = channel_->Call(request, Body::kWaitReply, timeout);
-  if (!reply) return Error(reply.error());
-  const wire::WaitReply& done = reply->wait_reply();
-  if (done.timed_out()) {
-    return Error(StatusCode::kTimeout,
-                 StrCat(done.dirty_tiles(), " tiles are still to be fused after ",
-                        static_cast<double>(timeout.count()) * 1e-3, " s"));
-  }
-  return WaitSummary{done.revision(), done.dirty_tiles()};
 }
 
 Result<std::vector<SessionSummary>> AtlasClient::ListSessions() {
@@ -296,88 +257,8 @@ Status AtlasClient::CheckPast(const std::optional<std::uint64_t>& at_revision) c
   return at_revision ? CheckMinor(kMinorWithPast, "reading an earlier revision") : Status();
 }
 
-Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
-                                                        SessionAction action,
-                                                        const std::string& author) {
-  if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
-  return CallChangeSession(*channel_, key, action, author);
-}
-
-Result<SessionChangeSummary> AtlasClient::ChangeVehicle(const std::string& vehicle,
-                                                        SessionAction action,
-                                                        const std::string& author) {
-  if (Status status = CheckMinor(kMinorWithLog, "a change of all of a vehicle's sessions");
-      !status.ok()) {
-    return Error(std::move(status));
-  }
-  if (Status status = ValidateName("vehicle", vehicle); !status.ok()) {
-    return Error(std::move(status));
-  }
-  return CallChangeSession(*channel_, {vehicle, ""}, action, author);
-}
-
-Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,
-                                          std::optional<std::uint64_t> at_revision) {
-  if (Status status = CheckPast(at_revision); !status.ok()) return Error(std::move(status));
-  wire::Envelope request;
-  wire::DigestRequest& digest = *request.mutable_digest_request();
-  digest.set_timeout_ms(TimeoutField(timeout));
-  if (at_revision) digest.set_at_revision(*at_revision);
-  const auto reply = channel_->Call(request, Body::kDigestReply, timeout);
-  if (!reply) return Error(reply.error());
-  const wire::DigestReply& done = reply->digest_reply();
-  const ByteSpan sha256 = BytesFromWire(done.sha256());
-  return DigestSummary{Bytes(sha256.begin(), sha256.end()), done.tiles(), done.revision()};
-}
-
-Result<CompactionSummary> AtlasClient::Compact(std::int64_t before_ms,
-                                               const std::string& author,
-                                               milliseconds timeout) {
-  wire::Envelope request;
-  wire::CompactRequest& compact = *request.mutable_compact_request();
-  compact.set_before_ms(before_ms);
-  compact.set_author(author);
-  compact.set_timeout_ms(TimeoutField(timeout));
-  const auto reply = channel_->Call(request, Body::kCompactReply, timeout);
-  if (!reply) return Error(reply.error());
-  const wire::CompactReply& done = reply->compact_reply();
-  return CompactionSummary{done.dropped(), done.bytes(), done.tiles_checked(), done.horizon(),
-                           done.revision()};
-}
-
-Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout) {
-  wire::Envelope request;
-  request.mutable_verify_request()->set_rebuild(is_rebuild);
-  return CallVerify(*channel_, request, timeout);
-}
-
-Result<VerifySummary> AtlasClient::Repair(bool is_rebuild,
-                                          const std::string& author,
-                                          milliseconds timeout) {
-  if (Status status = CheckMinor(kMinorWithLog, "a repair"); !status.ok()) {
-    return Error(std::move(status));
-  }
-  wire::Envelope request;
-  request.mutable_verify_request()->set_rebuild(is_rebuild);
-  request.mutable_verify_request()->set_repair(true);
-  request.mutable_verify_request()->set_author(author);
-  return CallVerify(*channel_, request, timeout);
-}
-
-Result<std::vector<AtlasEvent>> AtlasClient::ListEvents(std::uint64_t after_id) {
-  if (Status status = CheckMinor(kMinorWithLog, "the log"); !status.ok()) {
-    return Error(std::move(status));
-  }
-  wire::Envelope request;
-  request.mutable_log_request()->set_after_id(after_id);
-  const auto reply = channel_->Call(request, Body::kLogReply);
-  if (!reply) return Error(reply.error());
-  std::vector<AtlasEvent> events;
-  for (const wire::LogReply::Event& event : reply->log_reply().events()) {
-    events.push_back({event.id(), event.revision(), event.time_ms(), event.kind(), event.author(),
-                      event.subject(), event.detail()});
-  }
-  return events;
+bool AtlasClient::is_broken() const {
+  return channel_->is_broken();
 }
 
 milliseconds AtlasClient::retry_after() const {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "client/connection/atlas_watch.h"
 #include "client/connection/daemon_connection.h"
 #include "client/connection/endpoint.h"
 #include "client/connection/name_lookup.h"
@@ -66,14 +67,21 @@ class AtlasClient {
   // What is new in an area: calls back once a tile, in the order sent, as it arrives. Announced and
   // sent agree, or it ends with kInvalidData; what a blob says is the caller's to check. A failing
   // callback ends it with its status. A daemon that pauses for longer than the query's timeout and
-  // `request_timeout` together is kTimeout. kUnsupported when the daemon is too old for syncs.
+  // `request_timeout` together is kTimeout. kUnsupported when the daemon is too old for syncs. A
+  // callback that fails with kInvalidData says that the daemon sent what is no tile, which breaks
+  // the connection.
   Result<SyncSummary> Sync(const SyncQuery& query, const TileCallback& on_tile);
   // Goes on with a reply that was left on its way, for `give_up` at most (0: to its end), as Sync
-  // would have. Its summary is of the whole reply. kNotFound: another request was sent since, or it
-  // is of another connection; what still comes of it is thrown away.
+  // would have. Its summary is of the whole reply. kNotFound: another request was sent since, a
+  // watch or an upload was listened to, or it is of another connection; what still comes of it is
+  // thrown away.
   Result<SyncSummary> Continue(std::shared_ptr<SyncRest> rest,
                                std::chrono::milliseconds give_up,
                                const TileCallback& on_tile);
+  // Tells what changes in an area (atlas_watch.h): watch first, then sync, and nothing is missed.
+  // The request is on its way when it returns, or kUnavailable after `timeout` while an earlier one
+  // is. kInvalidArgument for an area that is none. kUnsupported when the daemon is too old for it.
+  Result<AtlasWatch> Watch(const WatchQuery& query, std::chrono::milliseconds timeout);
   Result<AtlasStatus> ReadStatus();
   // Returns when no tile is dirty; kTimeout after `timeout`.
   Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
@@ -106,6 +114,9 @@ class AtlasClient {
   // above.
   Result<std::vector<AtlasEvent>> ListEvents(std::uint64_t after_id);
 
+  // Nothing of use comes any more: the link failed, the daemon answered nothing in time, broke the
+  // protocol or refused the connection. A request that it refused breaks nothing.
+  bool is_broken() const;
   // How long the daemon still wants to be left alone, by what it refused for a while on this
   // connection (`retry_after_ms`); 0: it does not. Nothing here waits for it by itself.
   std::chrono::milliseconds retry_after() const;

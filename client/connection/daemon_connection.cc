@@ -11,6 +11,9 @@
 #include <boost/asio/ssl.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
 
 #include "core/base/str_cat.h"
 #include "proto/wire/frame.h"
@@ -24,6 +27,16 @@ using std::chrono::milliseconds;
 namespace {
 
 constexpr std::size_t kChunkBytes = std::size_t{64} << 10;
+
+// Who waits for events alone notices within 2 min, too, that the daemon is gone without a word.
+void HavePeerProbed(asio::ip::tcp::socket& socket) {
+  error_code ignored;  // a system without it: silence is looked into by whoever asks something
+  socket.set_option(asio::ip::tcp::socket::keep_alive(true), ignored);
+  for (const auto& [option, value] :
+       {std::pair(TCP_KEEPIDLE, 60), std::pair(TCP_KEEPINTVL, 15), std::pair(TCP_KEEPCNT, 4)}) {
+    ::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof(value));
+  }
+}
 
 Status UseFiles(const ConnectionTls& tls, asio::ssl::context& context) {
   const auto refuse = [](const char* what, const std::filesystem::path& file,
@@ -57,10 +70,12 @@ class DaemonConnection::Impl {
   Impl& operator=(Impl&&) = delete;
 
   Result<bool> Open(Clock::time_point latest, Clock::time_point deadline);
-  Status Send(ByteSpan frame, milliseconds timeout);
+  Result<bool> Flush(Clock::time_point latest, Clock::time_point deadline);
+  Status Take(Bytes frame);
   Result<Bytes> Receive(milliseconds timeout);
   Result<std::optional<Bytes>> Poll(milliseconds timeout);
 
+  bool is_closed() const { return !failure_.ok(); }
   const Endpoint& endpoint() const { return endpoint_; }
   std::uint64_t bytes_sent() const { return bytes_sent_; }
   std::uint64_t bytes_received() const { return bytes_received_; }
@@ -70,10 +85,6 @@ class DaemonConnection::Impl {
 
   // Runs what was started until `done` is set or the time is over.
   void Run(const std::optional<error_code>& done, Clock::time_point deadline);
-  // The same; kTimeout, with the socket closed, if it was not done in time.
-  Status Finish(const std::optional<error_code>& done,
-                Clock::time_point deadline,
-                const char* what);
   void StartRead();
   // False when nothing came: the read goes on.
   Result<bool> ReadSome(Clock::time_point deadline);
@@ -108,6 +119,10 @@ class DaemonConnection::Impl {
   bool is_reading_ = false;
   std::optional<error_code> read_;
   std::size_t read_bytes_ = 0;
+  // One frame at a time; likewise.
+  Bytes outgoing_;
+  bool is_sending_ = false;
+  std::optional<error_code> sent_;
   std::uint64_t bytes_sent_ = 0;
   std::uint64_t bytes_received_ = 0;
   Status failure_;
@@ -133,15 +148,6 @@ void DaemonConnection::Impl::Run(const std::optional<error_code>& done,
   io_.poll();  // what is there already, however late it is
   while (!done && io_.run_one_until(deadline) > 0) {
   }
-}
-
-Status DaemonConnection::Impl::Finish(const std::optional<error_code>& done,
-                                      Clock::time_point deadline,
-                                      const char* what) {
-  Run(done, deadline);
-  if (!done) return Fail(StatusCode::kTimeout, StrCat("timed out while ", what));
-  if (*done) return Fail(StatusCode::kUnavailable, StrCat(what, ": ", done->message()));
-  return {};
 }
 
 Result<bool> DaemonConnection::Impl::Open(Clock::time_point latest, Clock::time_point deadline) {
@@ -217,6 +223,7 @@ Status DaemonConnection::Impl::BeginTalking() {
   error_code refused;
   socket_.set_option(asio::ip::tcp::no_delay(true), refused);
   if (refused) return Fail(StatusCode::kUnavailable, refused.message());
+  HavePeerProbed(socket_);
   if (!tls_options_) return {};
   if (Status status = UseFiles(*tls_options_, tls_context_); !status.ok()) {
     return Fail(status.code(), status.message());
@@ -230,21 +237,32 @@ Status DaemonConnection::Impl::BeginTalking() {
   return {};
 }
 
-Status DaemonConnection::Impl::Send(ByteSpan frame, milliseconds timeout) {
+Status DaemonConnection::Impl::Take(Bytes frame) {
   ATLAS_RETURN_IF_ERROR(failure_);
-  std::optional<error_code> done;
-  const auto finish = [&](const error_code& error, std::size_t) {
-    done = error;
+  outgoing_ = std::move(frame);
+  bytes_sent_ += outgoing_.size();
+  is_sending_ = true;
+  sent_.reset();
+  const auto finish = [this](const error_code& error, std::size_t) {
+    sent_ = error;
   };
-  const auto bytes = asio::buffer(frame.data(), frame.size());
   if (tls_) {
-    asio::async_write(*tls_, bytes, finish);
+    asio::async_write(*tls_, asio::buffer(outgoing_), finish);
   } else {
-    asio::async_write(socket_, bytes, finish);
+    asio::async_write(socket_, asio::buffer(outgoing_), finish);
   }
-  ATLAS_RETURN_IF_ERROR(Finish(done, Clock::now() + timeout, "sending"));
-  bytes_sent_ += frame.size();
   return {};
+}
+
+Result<bool> DaemonConnection::Impl::Flush(Clock::time_point latest, Clock::time_point deadline) {
+  if (!failure_.ok()) return Error(failure_);
+  if (!is_sending_) return true;
+  Run(sent_, std::min(latest, deadline));
+  if (!sent_ && Clock::now() < deadline) return false;
+  if (!sent_) return Error(Fail(StatusCode::kTimeout, "timed out while sending"));
+  is_sending_ = false;
+  if (*sent_) return Error(Fail(StatusCode::kUnavailable, StrCat("sending: ", sent_->message())));
+  return true;
 }
 
 void DaemonConnection::Impl::StartRead() {
@@ -308,8 +326,12 @@ Result<bool> DaemonConnection::Open(Clock::time_point latest, Clock::time_point 
   return impl_->Open(latest, deadline);
 }
 
-Status DaemonConnection::Send(ByteSpan frame, milliseconds timeout) {
-  return impl_->Send(frame, timeout);
+Result<bool> DaemonConnection::Flush(Clock::time_point latest, Clock::time_point deadline) {
+  return impl_->Flush(latest, deadline);
+}
+
+Status DaemonConnection::Take(Bytes frame) {
+  return impl_->Take(std::move(frame));
 }
 
 Result<Bytes> DaemonConnection::Receive(milliseconds timeout) {
@@ -318,6 +340,10 @@ Result<Bytes> DaemonConnection::Receive(milliseconds timeout) {
 
 Result<std::optional<Bytes>> DaemonConnection::Poll(milliseconds timeout) {
   return impl_->Poll(timeout);
+}
+
+bool DaemonConnection::is_closed() const {
+  return impl_->is_closed();
 }
 
 const Endpoint& DaemonConnection::endpoint() const {

@@ -45,9 +45,13 @@ class DaemonConnection {
   // handshake fails, kTimeout when it is not done at `deadline`. kInvalidArgument names a file that
   // is of no use.
   Result<bool> Open(Clock::time_point latest, Clock::time_point deadline);
-  // A whole frame, header included. After a failure the connection is closed and every further call
-  // returns that failure.
-  Status Send(ByteSpan frame, std::chrono::milliseconds timeout);
+  // True when all that was taken is sent. What is not sent at `latest` goes on in later calls, also
+  // in those that read. kTimeout when it is not sent at `deadline`. After a failure the connection
+  // is closed and every further call returns that failure.
+  Result<bool> Flush(Clock::time_point latest, Clock::time_point deadline);
+  // Takes a whole frame, header included, once what was taken before is sent, and begins to send
+  // it.
+  Status Take(Bytes frame);
   // The payload of the next frame. kUnavailable when the peer closed, kTimeout when the frame was
   // not whole in time, kInvalidData when it is not a frame.
   Result<Bytes> Receive(std::chrono::milliseconds timeout);
@@ -55,8 +59,10 @@ class DaemonConnection {
   // came of the frame is kept.
   Result<std::optional<Bytes>> Poll(std::chrono::milliseconds timeout);
 
+  // By a failure.
+  bool is_closed() const;
   const Endpoint& endpoint() const;
-  std::uint64_t bytes_sent() const;
+  std::uint64_t bytes_sent() const;  // of the frames that were taken
   std::uint64_t bytes_received() const;
 
  private:

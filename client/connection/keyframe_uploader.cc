@@ -11,6 +11,7 @@
 namespace atlas {
 namespace {
 
+constexpr auto kNoEnd = std::chrono::steady_clock::time_point::max();
 // Of a daemon that is busy and does not say for how long.
 constexpr std::chrono::milliseconds kLeastPause{50};
 
@@ -34,12 +35,43 @@ Status Named(const Status& refusal, const KeyframeKey& key) {
 
 }  // namespace
 
-KeyframeUploader::KeyframeUploader(AtlasClient& client, const UploadOptions& options)
-    : client_(client), options_(options) {}
+struct KeyframeUploader::Answer {
+  const wire::Envelope& envelope;
+};
+
+KeyframeUploader::KeyframeUploader(const AtlasClient& client, const UploadOptions& options)
+    : channel_(client.channel_), options_(options) {}
+
+KeyframeUploader::~KeyframeUploader() {
+  const auto channel = channel_.lock();
+  if (channel == nullptr) return;
+  for (const InFlight& upload : in_flight_) {
+    channel->Forget(upload.request_id);
+  }
+}
+
+bool KeyframeUploader::IsOf(const AtlasClient& client) const {
+  return channel_.lock() == client.channel_;
+}
+
+Result<std::shared_ptr<RpcChannel>> KeyframeUploader::Channel() const {
+  auto channel = channel_.lock();
+  if (channel != nullptr) return channel;
+  return Error(StatusCode::kUnavailable, "upload: its connection is gone");
+}
 
 bool KeyframeUploader::IsFull(std::size_t next_bytes) const {
   return !in_flight_.empty() && (in_flight_.size() >= options_.max_in_flight ||
                                  in_flight_bytes_ + next_bytes > options_.max_in_flight_bytes);
+}
+
+Result<bool> KeyframeUploader::AwaitRoom(std::size_t next_bytes, Clock::time_point latest) {
+  while (IsFull(next_bytes)) {
+    const Result<bool> is_answered = HearOne(latest);
+    if (!is_answered || !*is_answered) return is_answered;
+  }
+  const auto channel = Channel();
+  return channel ? (*channel)->IsFree(latest) : Error(channel.error());
 }
 
 Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
@@ -49,27 +81,38 @@ Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
     next.blob.assign(upload.blob.begin(), upload.blob.end());
     next.upload.blob = next.blob;
   }
-  while (IsFull(next.size_bytes)) {
-    ATLAS_RETURN_IF_ERROR(ReceiveOne());
-  }
+  const Result<bool> has_room = AwaitRoom(next.size_bytes, kNoEnd);
+  if (!has_room) return has_room.error();
   ATLAS_RETURN_IF_ERROR(SendBusyAgain());
   ATLAS_RETURN_IF_ERROR(first_refusal_);
-  return Transmit(std::move(next));
+  return Transmit(std::move(next), kNoEnd);
 }
 
-Status KeyframeUploader::Transmit(InFlight upload) {
-  while (IsFull(upload.size_bytes)) {
-    ATLAS_RETURN_IF_ERROR(ReceiveOne());
-  }
+Result<bool> KeyframeUploader::UploadUntil(const KeyframeUpload& upload, Clock::time_point latest) {
+  const Result<bool> has_room = AwaitRoom(upload.blob.size(), latest);
+  if (!has_room || !*has_room) return has_room;
+  if (!first_refusal_.ok()) return Error(first_refusal_);
+  Status status = Transmit({next_number_++, 0, upload, upload.blob.size(), {}}, latest);
+  if (!status.ok()) return Error(std::move(status));
+  return true;
+}
+
+Status KeyframeUploader::Transmit(InFlight upload, Clock::time_point latest) {
+  const Result<bool> has_room = AwaitRoom(upload.size_bytes, kNoEnd);
+  if (!has_room) return has_room.error();
+  const auto channel = Channel();
+  if (!channel) return channel.error();
   wire::Envelope request = UploadRequest(upload.upload);
-  const std::uint64_t bytes_before = client_.bytes_sent();
-  const Result<std::uint64_t> id = client_.channel_->Send(request);
+  const std::uint64_t bytes_before = (*channel)->connection().bytes_sent();
+  const Result<std::uint64_t> id = (*channel)->Send(request, latest);
   if (!id) return id.error().WithContext(StrCat("keyframe ", upload.upload.key));
   upload.request_id = *id;
   in_flight_bytes_ += upload.size_bytes;
-  totals_.bytes_sent += client_.bytes_sent() - bytes_before;
+  totals_.bytes_sent += (*channel)->connection().bytes_sent() - bytes_before;
   ++totals_.sent;
   in_flight_.push_back(std::move(upload));
+  (*channel)->Listen(*id, RpcChannel::Kind::kAnswer,
+                     [this](const wire::Envelope& reply) { return OnAnswer({reply}); });
   return {};
 }
 
@@ -92,59 +135,86 @@ void KeyframeUploader::NoteRefusal(InFlight upload, const Status& refusal) {
 Status KeyframeUploader::SendBusyAgain() {
   while (!busy_.empty()) {
     while (!in_flight_.empty()) {
-      ATLAS_RETURN_IF_ERROR(ReceiveOne());
+      const Result<bool> is_answered = HearOne(kNoEnd);
+      if (!is_answered) return is_answered.error();
     }
     if (!first_refusal_.ok()) {
       busy_.clear();
       return {};
     }
-    const auto pause = std::max(client_.retry_after(), kLeastPause);
+    const auto channel = Channel();
+    if (!channel) return channel.error();
+    const auto pause = std::max((*channel)->retry_after(), kLeastPause);
     std::this_thread::sleep_for(std::min(pause, options_.patience));
     std::vector<InFlight> again;
     again.swap(busy_);
     std::sort(again.begin(), again.end(),
               [](const InFlight& a, const InFlight& b) { return a.number < b.number; });
     for (InFlight& upload : again) {
-      ATLAS_RETURN_IF_ERROR(Transmit(std::move(upload)));
+      ATLAS_RETURN_IF_ERROR(Transmit(std::move(upload), kNoEnd));
     }
   }
   return {};
 }
 
-Status KeyframeUploader::ReceiveOne() {
-  const Result<wire::Envelope> reply = client_.channel_->Receive();
-  if (!reply) return reply.error();
+Status KeyframeUploader::OnAnswer(const Answer& answer) {
+  const wire::Envelope& reply = answer.envelope;
+  const auto channel = channel_.lock();
   const auto entry = std::find_if(
       in_flight_.begin(), in_flight_.end(),
-      [&reply](const InFlight& upload) { return upload.request_id == reply->request_id(); });
-  if (entry == in_flight_.end()) return {};  // of a request that was given up
+      [&reply](const InFlight& upload) { return upload.request_id == reply.request_id(); });
   InFlight answered = std::move(*entry);
   in_flight_.erase(entry);
   in_flight_bytes_ -= answered.size_bytes;
-  const KeyframeKey& key = answered.upload.key;
-  if (reply->has_error()) {
-    NoteRefusal(std::move(answered), ErrorFromWire(reply->error()).status);
-  } else if (!reply->has_upload_reply()) {
+  channel->Forget(answered.request_id);
+  const KeyframeKey key = answered.upload.key;
+  if (reply.has_error()) {
+    channel->NoteRetryAfter(reply.error());
+    NoteRefusal(std::move(answered), ErrorFromWire(reply.error()).status);
+    return {};
+  }
+  if (!reply.has_upload_reply()) {
     return {StatusCode::kInvalidData,
             StrCat("keyframe ", key, ": the daemon answered with something else")};
-  } else {
-    const wire::UploadReply& ack = reply->upload_reply();
-    taken_ = Clock::now();
-    ++totals_.acked;
-    totals_.duplicates += ack.duplicate() ? 1U : 0U;
-    totals_.tiles_marked += ack.tiles_marked();
-    totals_.revision = std::max(totals_.revision, ack.revision());
-    if (options_.on_answer) options_.on_answer(key, {});
   }
+  const wire::UploadReply& ack = reply.upload_reply();
+  taken_ = Clock::now();
+  ++totals_.acked;
+  totals_.duplicates += ack.duplicate() ? 1U : 0U;
+  totals_.tiles_marked += ack.tiles_marked();
+  totals_.revision = std::max(totals_.revision, ack.revision());
+  if (options_.on_answer) options_.on_answer(key, {});
   return {};
+}
+
+Result<bool> KeyframeUploader::HearOne(Clock::time_point latest) {
+  const auto channel = Channel();
+  if (!channel) return Error(channel.error());
+  const std::size_t before = in_flight_.size();
+  while (in_flight_.size() == before) {
+    const Result<bool> is_told = (*channel)->Hear(latest, RpcChannel::Kind::kAnswer);
+    if (!is_told || !*is_told) return is_told;
+  }
+  return true;
 }
 
 Status KeyframeUploader::Finish() {
   while (!in_flight_.empty() || !busy_.empty()) {
     ATLAS_RETURN_IF_ERROR(SendBusyAgain());
-    if (!in_flight_.empty()) ATLAS_RETURN_IF_ERROR(ReceiveOne());
+    if (in_flight_.empty()) continue;
+    const Result<bool> is_answered = HearOne(kNoEnd);
+    if (!is_answered) return is_answered.error();
   }
   return first_refusal_;
+}
+
+Result<bool> KeyframeUploader::FinishUntil(Clock::time_point latest) {
+  while (!in_flight_.empty()) {
+    const Result<bool> is_answered = HearOne(latest);
+    if (!is_answered || !*is_answered) return is_answered;
+  }
+  if (!first_refusal_.ok()) return Error(first_refusal_);
+  return true;
 }
 
 }  // namespace atlas

@@ -1,6 +1,5 @@
 // Uploads keyframes without waiting for each: a bounded window of them is on its way at any time,
-// on the client's one connection. While there are uploads in flight, use the client for nothing
-// else.
+// on the client's one connection, which other requests may share.
 #pragma once
 
 #include <chrono>
@@ -8,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,10 +15,13 @@
 
 namespace atlas {
 
+class RpcChannel;
+
 struct UploadOptions {
   std::size_t max_in_flight = 64;  // the daemon commits up to 64 at a time
   std::size_t max_in_flight_bytes = std::size_t{16} << 20;
-  // Told of each keyframe once it is answered, in any order. With it a refusal stops nothing.
+  // Told of each keyframe once it is answered, in any order, also while another request of the
+  // client waits. With it a refusal stops nothing.
   std::function<void(const KeyframeKey&, const Status&)> on_answer = {};
   // With a daemon that is busy (kUnavailable): what it refused is sent again, in the same order and
   // not before the daemon wants it, until it has taken nothing for so long. 0: not at all.
@@ -36,8 +39,15 @@ struct UploadTotals {
 
 class KeyframeUploader {
  public:
-  // The client outlives the uploader.
-  explicit KeyframeUploader(AtlasClient& client, const UploadOptions& options = {});
+  using Clock = std::chrono::steady_clock;
+
+  // Without its client every call fails.
+  explicit KeyframeUploader(const AtlasClient& client, const UploadOptions& options = {});
+  KeyframeUploader(const KeyframeUploader&) = delete;  // the connection refers to it
+  KeyframeUploader& operator=(const KeyframeUploader&) = delete;
+  KeyframeUploader(KeyframeUploader&&) = delete;
+  KeyframeUploader& operator=(KeyframeUploader&&) = delete;
+  ~KeyframeUploader();
 
   // Sends; waits for an acknowledgement first when the window is full. A refusal of this or of an
   // earlier keyframe names that keyframe; its code is the daemon's (kConflict: other content under
@@ -45,12 +55,19 @@ class KeyframeUploader {
   Status Upload(const KeyframeUpload& upload);
   // Waits for every acknowledgement. Returns the first refusal, after the others have been counted.
   Status Finish();
+  // The same until `latest`, without patience. False: there was no room for it until then, and
+  // nothing was taken. What was taken may still be on its way, and goes on in later calls.
+  Result<bool> UploadUntil(const KeyframeUpload& upload, Clock::time_point latest);
+  // False: some are not answered yet.
+  Result<bool> FinishUntil(Clock::time_point latest);
 
+  // Whether it is this client's connection that it uploads on.
+  bool IsOf(const AtlasClient& client) const;
+  std::size_t in_flight() const { return in_flight_.size(); }
   const UploadTotals& totals() const { return totals_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
+  struct Answer;  // a message
   struct InFlight {
     std::uint64_t number = 0;  // in the order of Upload
     std::uint64_t request_id = 0;
@@ -59,14 +76,19 @@ class KeyframeUploader {
     Bytes blob;  // with patience: what `upload` refers to
   };
 
-  Status Transmit(InFlight upload);
+  // False: no room at `latest`.
+  Result<bool> AwaitRoom(std::size_t next_bytes, Clock::time_point latest);
+  Status Transmit(InFlight upload, Clock::time_point latest);
   void NoteRefusal(InFlight upload, const Status& refusal);
-  // Link failures only; refusals are remembered.
-  Status ReceiveOne();
+  Status OnAnswer(const Answer& answer);
+  // Until one more was answered; false when none was at `latest`. Link failures only; refusals are
+  // remembered.
+  Result<bool> HearOne(Clock::time_point latest);
   Status SendBusyAgain();
   bool IsFull(std::size_t next_bytes) const;
+  Result<std::shared_ptr<RpcChannel>> Channel() const;
 
-  AtlasClient& client_;
+  std::weak_ptr<RpcChannel> channel_;
   UploadOptions options_;
   UploadTotals totals_;
   std::deque<InFlight> in_flight_;

@@ -1,24 +1,21 @@
 #include "client/connection/sync_exchange.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
+#include "client/connection/area_message.h"
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
 
 namespace atlas {
 namespace {
 
-constexpr double kMaxCoordinate_m = 1e7;  // as for poses
-constexpr double kMaxLength_m = 1e8;
-constexpr std::size_t kMaxRoutePoints = 256;
-constexpr std::size_t kMaxTiles = 65'536;  // of an area; held ones; held blocks
-constexpr int kBlockBits = 6;              // of a tile's key within its block
-constexpr int kLevelShift = 58;            // of a tile's key
+constexpr std::size_t kMaxHeld = 65'536;  // tiles; blocks
+constexpr int kBlockBits = 6;             // of a tile's key within its block
+constexpr int kLevelShift = 58;           // of a tile's key
 
 Status Refuse(const std::string& why) {
   return {StatusCode::kInvalidArgument, StrCat("sync: ", why)};
@@ -26,69 +23,6 @@ Status Refuse(const std::string& why) {
 
 Status Wrong(const std::string& what) {
   return {StatusCode::kInvalidData, StrCat("sync: the daemon ", what)};
-}
-
-bool IsPlace(const Eigen::Vector2d& p_m) {
-  return p_m.cwiseAbs().maxCoeff() <= kMaxCoordinate_m;
-}
-
-bool IsLength(double length_m) {
-  return length_m >= 0.0 && length_m <= kMaxLength_m;
-}
-
-void SetPoint(const Eigen::Vector2d& p_m, wire::Area::Point& out) {
-  out.set_x_um(std::llround(p_m.x() * 1e6));
-  out.set_y_um(std::llround(p_m.y() * 1e6));
-}
-
-std::uint64_t Micrometres(double length_m) {
-  return static_cast<std::uint64_t>(std::llround(length_m * 1e6));
-}
-
-Status SetArea(const DiscArea& disc, wire::Area& out) {
-  if (!IsPlace(disc.center_m) || !IsLength(disc.radius_m)) {
-    return Refuse("expected a centre within +-10000 km and a radius of 0 to 100000 km");
-  }
-  SetPoint(disc.center_m, *out.mutable_disc()->mutable_center());
-  out.mutable_disc()->set_radius_um(Micrometres(disc.radius_m));
-  return {};
-}
-
-Status SetArea(const BoxArea& box, wire::Area& out) {
-  if (!IsPlace(box.min_m) || !IsPlace(box.max_m) ||
-      !(box.min_m.array() <= box.max_m.array()).all()) {
-    return Refuse("expected a box within +-10000 km, its first corner the lower one");
-  }
-  SetPoint(box.min_m, *out.mutable_box()->mutable_min());
-  SetPoint(box.max_m, *out.mutable_box()->mutable_max());
-  return {};
-}
-
-Status SetArea(const CorridorArea& corridor, wire::Area& out) {
-  const auto& route = corridor.route_m;
-  if (route.empty() || route.size() > kMaxRoutePoints ||
-      !std::all_of(route.begin(), route.end(), &IsPlace) || !IsLength(corridor.half_width_m)) {
-    return Refuse(StrCat("a route of ", route.size(), " points, expected 1 to ", kMaxRoutePoints,
-                         " within +-10000 km, and half a width of 0 to 100000 km"));
-  }
-  for (const Eigen::Vector2d& point_m : route) {
-    SetPoint(point_m, *out.mutable_corridor()->add_route());
-  }
-  out.mutable_corridor()->set_half_width_um(Micrometres(corridor.half_width_m));
-  return {};
-}
-
-Status SetArea(const TilesArea& tiles, wire::Area& out) {
-  if (tiles.ids.size() > kMaxTiles) {
-    return Refuse(StrCat("an area of ", tiles.ids.size(), " tiles, expected at most ", kMaxTiles));
-  }
-  auto& keys = *out.mutable_tiles()->mutable_keys();
-  for (const TileId& id : tiles.ids) {
-    keys.Add(id.Key());
-  }
-  std::sort(keys.begin(), keys.end());
-  const bool is_twice = std::adjacent_find(keys.begin(), keys.end()) != keys.end();
-  return is_twice ? Refuse("a tile of the area is named twice") : Status();
 }
 
 template <typename Numbers>
@@ -118,10 +52,10 @@ Status SetHeld(const SyncQuery& query, wire::SyncRequest& out) {
     tiles += group.tiles.size();
     blocks += group.blocks.size();
   }
-  return tiles <= kMaxTiles && blocks <= kMaxTiles
+  return tiles <= kMaxHeld && blocks <= kMaxHeld
              ? Status()
              : Refuse(StrCat(tiles, " tiles and ", blocks, " blocks are held, expected at most ",
-                             kMaxTiles, " of either"));
+                             kMaxHeld, " of either"));
 }
 
 // What is held, to be asked by key.
@@ -170,8 +104,7 @@ std::optional<std::vector<bool>> BitsFromWire(const std::string& bytes, std::siz
 Result<wire::Envelope> SyncRequestOf(const SyncQuery& query) {
   wire::Envelope envelope;
   wire::SyncRequest& request = *envelope.mutable_sync_request();
-  Status status = std::visit(
-      [&](const auto& area) { return SetArea(area, *request.mutable_area()); }, query.area);
+  Status status = AreaToWire(query.area, *request.mutable_area());
   if (status.ok()) status = SetHeld(query, request);
   if (status.ok() && query.sections == 0) status = Refuse("no section is wanted");
   if (!status.ok()) return Error(std::move(status));

@@ -106,11 +106,7 @@ void AtlasLink::Report(const Status& status) {
     failures_ = 0;
     return;
   }
-  // After a broken frame nothing behind it can be read; other refusals leave the link as it is.
-  const bool is_broken = status.code() == StatusCode::kUnavailable ||
-                         status.code() == StatusCode::kTimeout ||
-                         status.code() == StatusCode::kInvalidData;
-  if (!is_broken || !client_) return;
+  if (!client_ || !client_->is_broken()) return;
   const milliseconds retry_after = client_->retry_after();
   client_.reset();
   NoteFailure({StatusCode::kUnavailable, status.message()}, retry_after);

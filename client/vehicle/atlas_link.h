@@ -50,7 +50,9 @@ class AtlasLink {
   Result<AtlasClient*> Client(std::chrono::milliseconds timeout);
   // The same, sleeping between attempts. The last failure after `timeout`.
   Result<AtlasClient*> Wait(std::chrono::milliseconds timeout);
-  // What a call of the client came to: after a failure of the link the connection is dropped.
+  // What a call of the client came to: when that broke the connection (AtlasClient::is_broken) it
+  // is dropped. What the daemon refused, or did not finish in the time that it was given, breaks
+  // none.
   void Report(const Status& status);
 
   bool is_connected() const { return client_.has_value(); }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/str_cat.h"
+
 namespace atlas {
 
 Result<StoreSyncReport> LinkFeed::Sync(TileStore& store,
@@ -14,6 +16,12 @@ Result<StoreSyncReport> LinkFeed::Sync(TileStore& store,
   const Clock::time_point start = Clock::now();
   const Result<AtlasClient*> client = link_->Client(options.deadline);
   if (!client) return Error(client.error());
+  const milliseconds left_alone = (*client)->retry_after();
+  if (left_alone.count() > 0) {
+    return Error(StatusCode::kUnavailable,
+                 StrCat("atlas view: the daemon wants to be left alone for another ",
+                        left_alone.count(), " ms"));
+  }
   const auto spent = std::chrono::duration_cast<milliseconds>(Clock::now() - start);
   SyncQuery query;
   query.area = area;

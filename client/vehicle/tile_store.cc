@@ -113,6 +113,7 @@ Result<std::shared_ptr<const Bytes>> TileStore::Read(const TileId& id) {
       Erase(found);
     } else if (code != StatusCode::kResourceExhausted) {  // that would be the process, not the file
       entry.comes_whole = true;
+      ++changes_;
     }
     return Error(blob.error());
   }
@@ -143,6 +144,7 @@ Result<std::shared_ptr<const Bytes>> TileStore::BaseOf(const TileBlob& tile,
   }
   if (IsLost(blob.error().code())) return nullptr;
   held->second.comes_whole = true;
+  ++changes_;
   return blob;
 }
 
@@ -161,6 +163,7 @@ Status TileStore::Put(const TileBlob& tile, const AskedSections& asked) {
 }
 
 void TileStore::Keep(const TileFacts& facts, Bytes blob) {
+  ++changes_;
   const auto old = tiles_.find(facts.id.Key());
   // A file of this name is written over, and stays as it is where that fails.
   const bool has_file = old != tiles_.end() && old->second.is_on_disk && old->second.facts == facts;
@@ -202,11 +205,13 @@ void TileStore::Use(const TileId& id) {
 
 // It is in neither order any more.
 void TileStore::Drop(Entries::iterator entry) {
+  ++changes_;
   if (dropped_.size() < kMaxDropped) dropped_.push_back(entry->second.facts.id);
   tiles_.erase(entry);
 }
 
 void TileStore::Erase(Entries::iterator entry) {
+  ++changes_;
   const TileFacts& facts = entry->second.facts;
   memory_.Remove(facts.id);
   disk_.Remove(facts.id);

@@ -52,6 +52,8 @@ class TileStore {
 
   const AtlasKey& atlas() const { return atlas_; }
   std::size_t size() const { return tiles_.size(); }
+  // Moves whenever a tile comes, changes, goes or is to come again.
+  std::uint64_t changes() const { return changes_; }
   std::size_t memory_bytes() const { return memory_.bytes(); }
   std::uint64_t disk_bytes() const { return disk_.bytes() + others_.bytes(); }
   // Tiles that the disk had no room for, or would not take: held in memory only.
@@ -118,6 +120,7 @@ class TileStore {
   EvictionOrder disk_;
   std::set<std::uint64_t> differing_;  // blocks to be told tile by tile
   std::vector<TileId> dropped_;
+  std::uint64_t changes_ = 0;
   std::uint64_t disk_failures_ = 0;
   Status disk_problem_;
 };

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -22,7 +23,13 @@ struct SpoolOptions {
   std::uint64_t max_bytes = std::uint64_t{4} << 30;  // of waiting keyframes
   // Of those that were refused: the oldest go first.
   std::uint64_t max_refused_bytes = std::uint64_t{256} << 20;
-  UploadOptions upload = {};
+  UploadOptions upload = {};  // without its patience: Send has an end
+};
+
+// Of one Send.
+struct SendLimits {
+  std::chrono::milliseconds deadline{10'000};
+  std::uint64_t budget_bytes = 0;  // of files; the one that reaches it is the last. 0: none
 };
 
 struct SpoolReport {
@@ -33,6 +40,12 @@ struct SpoolReport {
   std::uint64_t skipped = 0;
   std::uint64_t vanished = 0;  // removed by somebody else: forgotten
   Status problem;              // the first file's of those skipped or vanished
+  std::uint64_t sent = 0;      // answered or not
+  std::uint64_t sent_bytes = 0;
+  // What is left on the disk, and how many of these are on their way: the next Send on the same
+  // connection begins with their answers.
+  std::uint64_t waiting = 0;
+  std::uint64_t in_flight = 0;
   // Not 0: nothing was sent, the daemon wants to be left alone for so long.
   std::chrono::milliseconds retry_after{0};
 };
@@ -43,14 +56,21 @@ class UploadSpool {
   // folder.
   static Result<UploadSpool> Open(const SpoolOptions& options);
 
+  UploadSpool(const UploadSpool&) = delete;
+  UploadSpool& operator=(const UploadSpool&) = delete;
+  UploadSpool(UploadSpool&&) noexcept;
+  UploadSpool& operator=(UploadSpool&&) noexcept;
+  ~UploadSpool();
+
   // On the disk when it returns. kResourceExhausted when there is no room, kInvalidArgument for a
   // name or a size that no daemon takes; nothing was written then.
   Status Put(const KeyframeUpload& upload);
-  // Oldest first, as many at a time as the options say. Fails when the link does, with the first
-  // refusal that may pass (what waits is kept then), or when the client may not upload at all.
-  // Sends nothing while the daemon wants to be left alone (AtlasClient::retry_after). A file that
-  // is of no use stops no other.
-  Result<SpoolReport> Send(AtlasClient& client);
+  // Oldest first, as many at a time as the options say, until the limits end it; the next call goes
+  // on where it ended. On another connection what was not answered is sent again. Fails when the
+  // link does, with the first refusal that may pass (what waits is kept then), or when the client
+  // may not upload at all. Sends nothing while the daemon wants to be left alone
+  // (AtlasClient::retry_after). A file that is of no use stops no other.
+  Result<SpoolReport> Send(AtlasClient& client, const SendLimits& limits = {});
 
   // Puts what was refused back into the queue, at the places that it had, as far as there is room:
   // for when the reason is gone (a clock that was fast, another daemon). How many; fails only when
@@ -65,9 +85,9 @@ class UploadSpool {
  private:
   using Number = std::uint64_t;
   class Sending;
+  struct Underway;
 
-  UploadSpool(SpoolOptions options, FolderLock lock)
-      : options_(std::move(options)), lock_(std::move(lock)) {}
+  UploadSpool(SpoolOptions options, FolderLock lock);
   Status Scan();
   void Remove(Number number);
   // Moves it out of the queue, the reason first. kNotFound: it vanished, and waits no more.
@@ -83,7 +103,8 @@ class UploadSpool {
   FolderLock lock_;
   std::map<Number, std::uint64_t> waiting_;  // with the bytes of each
   std::map<Number, std::uint64_t> refused_;
-  std::map<Number, int> failures_;  // of the daemon, at waiting ones
+  std::map<Number, int> failures_;      // of the daemon, at waiting ones
+  std::unique_ptr<Underway> underway_;  // null: nothing
   std::uint64_t waiting_bytes_ = 0;
   std::uint64_t refused_bytes_ = 0;
   Number next_ = 1;

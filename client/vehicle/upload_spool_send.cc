@@ -1,6 +1,8 @@
 // UploadSpool::Send: one run through the queue.
+#include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "client/vehicle/spooled_keyframe.h"
 #include "client/vehicle/stored_file.h"
@@ -25,44 +27,108 @@ bool IsOfTheClient(StatusCode code, const KeyframeKey& key, const AtlasIdentity&
 
 }  // namespace
 
+// What was sent on a connection and is not dealt with: it outlives the Send, and stays where it is
+// when the spool is moved. A round ends when all is answered.
+struct UploadSpool::Underway {
+  Underway(const AtlasClient& client, UploadOptions options)
+      : atlas(client.atlas()), uploader(client, WithoutPatience(std::move(options))) {}
+
+  UploadOptions WithoutPatience(UploadOptions options) {
+    options.patience = std::chrono::milliseconds(0);
+    options.on_answer = [this](const KeyframeKey& key, const Status& answer) {
+      answers.emplace_back(key, answer);
+    };
+    return options;
+  }
+  bool Has(Number number) const {
+    const auto is_it = [number](const auto& entry) {
+      return entry.second == number;
+    };
+    return std::any_of(in_flight.begin(), in_flight.end(), is_it) || failed.contains(number);
+  }
+
+  const AtlasIdentity atlas;  // as it was when the client connected
+  std::map<KeyframeKey, Number> in_flight;
+  std::vector<std::pair<KeyframeKey, Status>> answers;  // not looked at yet
+  std::map<Number, Status> failed;                      // in this round: at these the daemon did
+  std::uint64_t taken = 0;                              // in this round
+  bool is_round_over = false;  // something was refused that may pass: nothing more in this one
+  KeyframeUploader uploader;
+};
+
 class UploadSpool::Sending {
  public:
-  Sending(UploadSpool& spool, AtlasClient& client)
-      : spool_(spool), atlas_(client.atlas()), uploader_(client, OptionsOf(spool.options_)) {}
+  Sending(UploadSpool& spool, const SendLimits& limits)
+      : spool_(spool),
+        underway_(*spool.underway_),
+        limits_(limits),
+        latest_(std::chrono::steady_clock::now() + limits.deadline) {}
 
   Result<SpoolReport> Run() {
-    std::vector<Number> numbers;
-    for (const auto& [number, bytes] : spool_.waiting_) {
-      numbers.push_back(number);
-    }
-    Status link;
-    for (const Number number : numbers) {
-      link = SendOne(number);
-      if (!link.ok() || !failure_.ok()) break;
-    }
-    if (link.ok()) link = uploader_.Finish();
-    if (failure_.ok() && link.ok()) JudgeFailed();
+    Status link = underway_.is_round_over ? FinishRound() : Status();
+    TakeAnswers();
+    if (link.ok() && !underway_.is_round_over) link = SendAll();
+    if (link.ok()) link = FinishRound();
     if (!failure_.ok()) return Error(failure_);
     if (!link.ok()) return Error(std::move(link));
+    report_.waiting = spool_.waiting();
+    report_.in_flight = underway_.in_flight.size();
     return report_;
   }
 
  private:
-  UploadOptions OptionsOf(const SpoolOptions& options) {
-    UploadOptions upload = options.upload;
-    upload.on_answer = [this](const KeyframeKey& key, const Status& answer) {
-      OnAnswer(key, answer);
-    };
-    return upload;
+  Status SendAll() {
+    std::vector<Number> numbers;
+    for (const auto& [number, bytes] : spool_.waiting_) {
+      if (!underway_.Has(number)) numbers.push_back(number);
+    }
+    for (const Number number : numbers) {
+      if (IsSpent()) break;
+      const Result<bool> is_sent = SendOne(number);
+      TakeAnswers();
+      if (!is_sent) return is_sent.error();
+      if (!*is_sent || underway_.is_round_over) break;
+    }
+    return {};
   }
 
-  Status SendOne(Number number) {
+  bool IsSpent() const {
+    return std::chrono::steady_clock::now() >= latest_ ||
+           (limits_.budget_bytes != 0 && report_.sent_bytes >= limits_.budget_bytes);
+  }
+
+  // False: there was no time for it.
+  Result<bool> SendOne(Number number) {
     const Result<SpooledKeyframe> keyframe = Load(number);
-    if (!keyframe) return {};
+    if (!keyframe) return true;
     // Two under one key: the answers to them could not be told apart.
-    if (in_flight_.contains(keyframe->key)) ATLAS_RETURN_IF_ERROR(uploader_.Finish());
-    in_flight_[keyframe->key] = number;
-    return uploader_.Upload(keyframe->ToUpload());
+    if (underway_.in_flight.contains(keyframe->key)) {
+      const Result<bool> is_answered = underway_.uploader.FinishUntil(latest_);
+      if (!is_answered || !*is_answered) return is_answered;
+      TakeAnswers();
+    }
+    const Result<bool> is_sent = underway_.uploader.UploadUntil(keyframe->ToUpload(), latest_);
+    if (!is_sent || !*is_sent) return is_sent;
+    underway_.in_flight[keyframe->key] = number;
+    ++report_.sent;
+    report_.sent_bytes += spool_.waiting_.at(number);
+    return true;
+  }
+
+  // As far as the time goes.
+  Status FinishRound() {
+    const Result<bool> is_answered = underway_.uploader.FinishUntil(latest_);
+    TakeAnswers();
+    if (!is_answered) return is_answered.error();
+    if (*is_answered) EndRound();
+    return {};
+  }
+
+  void EndRound() {
+    if (failure_.ok()) JudgeFailed();
+    underway_.failed.clear();
+    underway_.taken = 0;
+    underway_.is_round_over = false;
   }
 
   // What cannot be sent is dealt with here, and stops no other.
@@ -95,27 +161,39 @@ class UploadSpool::Sending {
     if (report_.problem.ok()) report_.problem = problem;
   }
 
+  void TakeAnswers() {
+    for (const auto& [key, answer] : std::exchange(underway_.answers, {})) {
+      OnAnswer(key, answer);
+    }
+  }
+
   void OnAnswer(const KeyframeKey& key, const Status& answer) {
-    const Number number = in_flight_.at(key);
-    in_flight_.erase(key);
+    const Number number = underway_.in_flight.at(key);
+    underway_.in_flight.erase(key);
     if (answer.ok()) {
       spool_.Remove(number);
       ++report_.acknowledged;
+      ++underway_.taken;
     } else if (answer.code() == StatusCode::kInternal) {
-      failed_.emplace_back(number, answer);
-      if (failed_.size() >= kMaxFailed && report_.acknowledged == 0) failure_ = answer;
-    } else if (IsTemporary(answer.code()) || IsOfTheClient(answer.code(), key, atlas_)) {
-      if (failure_.ok()) failure_ = answer;
+      underway_.failed.emplace(number, answer);
+      if (underway_.failed.size() >= kMaxFailed && underway_.taken == 0) Stop(answer);
+    } else if (IsTemporary(answer.code()) || IsOfTheClient(answer.code(), key, underway_.atlas)) {
+      Stop(answer);
     } else {
       SetAside(number, answer);
     }
   }
 
+  void Stop(const Status& why) {
+    underway_.is_round_over = true;
+    if (failure_.ok()) failure_ = why;
+  }
+
   // A daemon that took others fails at these, not as a whole. They wait, for it may have been the
   // moment, but not for ever.
   void JudgeFailed() {
-    for (const auto& [number, answer] : failed_) {
-      if (report_.acknowledged == 0) {
+    for (const auto& [number, answer] : underway_.failed) {
+      if (underway_.taken == 0) {
         failure_ = answer;
         return;
       }
@@ -128,19 +206,30 @@ class UploadSpool::Sending {
   }
 
   UploadSpool& spool_;
-  const AtlasIdentity atlas_;  // as it was when the client connected
-  std::map<KeyframeKey, Number> in_flight_;
-  std::vector<std::pair<Number, Status>> failed_;  // at these the daemon did
+  Underway& underway_;
+  const SendLimits limits_;
+  const std::chrono::steady_clock::time_point latest_;
   SpoolReport report_;
   Status failure_;  // why to stop; the link is as it was
-  KeyframeUploader uploader_;
 };
 
-Result<SpoolReport> UploadSpool::Send(AtlasClient& client) {
+UploadSpool::UploadSpool(SpoolOptions options, FolderLock lock)
+    : options_(std::move(options)), lock_(std::move(lock)) {}
+UploadSpool::UploadSpool(UploadSpool&&) noexcept = default;
+UploadSpool& UploadSpool::operator=(UploadSpool&&) noexcept = default;
+UploadSpool::~UploadSpool() = default;
+
+Result<SpoolReport> UploadSpool::Send(AtlasClient& client, const SendLimits& limits) {
+  const bool is_same = underway_ != nullptr && underway_->uploader.IsOf(client);
   SpoolReport held_back;
   held_back.retry_after = client.retry_after();
-  if (held_back.retry_after.count() > 0) return held_back;
-  return Sending(*this, client).Run();
+  if (held_back.retry_after.count() > 0) {
+    held_back.waiting = waiting();
+    held_back.in_flight = is_same ? underway_->in_flight.size() : 0;
+    return held_back;
+  }
+  if (!is_same) underway_ = std::make_unique<Underway>(client, options_.upload);
+  return Sending(*this, limits).Run();
 }
 
 }  // namespace atlas

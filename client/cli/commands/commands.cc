@@ -13,6 +13,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeStatusCommand());
   commands.push_back(MakePointCommand());
   commands.push_back(MakeQueryCommand());
+  commands.push_back(MakeWatchCommand());
   commands.push_back(MakePosesApplyCommand());
   commands.push_back(MakeSessionsCommand());
   commands.push_back(MakeSessionRetractCommand());

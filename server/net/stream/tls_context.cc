@@ -42,12 +42,13 @@ std::string NameEntry(const X509_NAME* name, int nid) {
   return entry;
 }
 
-// Where there are lists of what was revoked, no certificate counts without one.
+// Where there are lists of what was revoked, no certificate counts without one, nor one whose
+// authority is in between and was revoked itself, or has no list.
 void UseRevocations(X509_STORE& store) {
   STACK_OF(X509_OBJECT)* const objects = X509_STORE_get0_objects(&store);
   for (int i = 0; i < sk_X509_OBJECT_num(objects); ++i) {
     if (X509_OBJECT_get_type(sk_X509_OBJECT_value(objects, i)) == X509_LU_CRL) {
-      X509_STORE_set_flags(&store, X509_V_FLAG_CRL_CHECK);
+      X509_STORE_set_flags(&store, X509_V_FLAG_CRL_CHECK | X509_V_FLAG_CRL_CHECK_ALL);
     }
   }
 }

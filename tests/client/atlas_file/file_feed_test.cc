@@ -161,6 +161,21 @@ TEST_F(FileFeedTest, ADamagedTileIsNamedAndTheOthersCome) {
   EXPECT_EQ(map->coarse_places, 1U);
 }
 
+TEST_F(FileFeedTest, ATileThatIsListedAndNotThereIsDamage) {
+  written_.DamageIndex({0, 3, 3});
+  AtlasFile file = Opened();
+  FileFeed feed(file);
+  const auto map = AtlasView(store_, feed).Around(kMiddle, 0.5);
+  ASSERT_TRUE(map);
+  EXPECT_EQ(map->sync.code(), StatusCode::kInvalidData) << map->sync.message();
+  EXPECT_NE(map->sync.message().find("tile 0/3/3"), std::string::npos) << map->sync.message();
+  EXPECT_FALSE(map->is_current);
+  EXPECT_EQ(map->finest_places, 3U);
+  EXPECT_EQ(map->coarse_places, 1U);
+  const Status level = file.ReadLevel(0, std::nullopt, [](const TileBlob&) { return Status(); });
+  EXPECT_EQ(level.code(), StatusCode::kInvalidData) << level.message();
+}
+
 // Links to themselves cannot be opened, also not by root.
 TEST_F(FileFeedTest, HeldTilesWhoseFilesCannotBeReadComeAgain) {
   namespace fs = std::filesystem;

@@ -68,16 +68,30 @@ class TinyAtlasFile {
   // Closes it and damages the stored blob.
   void Damage(const TileId& id) {
     Close();
-    sqlite3* db = nullptr;
-    const std::string sql =
-        "UPDATE tiles SET blob = zeroblob(9) WHERE key = " + std::to_string(id.Key());
-    const bool is_done = sqlite3_open(path().c_str(), &db) == SQLITE_OK &&
-                         sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
-    sqlite3_close(db);
-    if (!is_done) throw std::runtime_error("damage");
+    Execute("UPDATE tiles SET blob = zeroblob(9) WHERE key = " + std::to_string(id.Key()));
+  }
+  // Closes it and takes the tile out of its table, but not out of the index that lists tiles: who
+  // does not know that the index is there leaves it as it is.
+  void DamageIndex(const TileId& id) {
+    Close();
+    const std::string of_index = " WHERE name = 'tile_summaries'";
+    Execute("PRAGMA writable_schema = ON; CREATE TABLE hidden AS SELECT * FROM sqlite_schema" +
+            of_index + "; DELETE FROM sqlite_schema" + of_index);
+    Execute("DELETE FROM tiles WHERE key = " + std::to_string(id.Key()));
+    Execute("PRAGMA writable_schema = ON; INSERT INTO sqlite_schema SELECT * FROM hidden");
+    Execute("DROP TABLE hidden");
   }
 
  private:
+  // On a connection of its own, which reads the schema anew.
+  void Execute(const std::string& sql) {
+    sqlite3* db = nullptr;
+    const bool is_done = sqlite3_open(path().c_str(), &db) == SQLITE_OK &&
+                         sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
+    const std::string error = is_done ? "" : sqlite3_errmsg(db);
+    sqlite3_close(db);
+    if (!is_done) throw std::runtime_error(sql + ": " + error);
+  }
   void Finish(const TileClaim& claim, const TinyWorld& world) {
     FinishedTile tile{claim, claim.generation, std::nullopt};
     const auto found = world.tiles().find(claim.id);

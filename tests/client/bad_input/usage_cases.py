@@ -37,6 +37,13 @@ USAGE = {
         ["--center", "0,0", "--radius", "5", "--budget", "-1"],
         ["--center", "0,0", "--radius", "5", "--budget", "1MB"],
     ],
+    "watch": [
+        [], ["--center", "0,0"], ["--radius", "5"], ["--center", "0,0", "--radius", "-5"],
+        ["--center", "0,0", "--radius", "nan"], ["--center", "1e30,0", "--radius", "5"],
+        ["--center", "0,0", "--radius", "5", "--level", "99"],
+        ["--center", "0,0", "--radius", "5", "--interval", "-1"],
+        ["--center", "0,0", "--radius", "5", "--for", "soon"],
+    ],
     "poses": [[], ["apply"], ["revert"], ["apply", "a", "b"]],
     "sessions": [["more"], ["--atlas", "WORK/x.db"]],
     "session": [[], ["retract"], ["restore"], ["purge", "vehicle/good"], ["retract", "vehicle/good", "more"],

@@ -1,6 +1,12 @@
 // The client against peers that behave badly, and against one that behaves.
 #include "client/connection/atlas_client.h"
 
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "proto/wire/convert.h"
@@ -99,6 +105,32 @@ TEST(AtlasClientTest, DaemonsErrorKeepsItsCodeAndMessage) {
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code(), StatusCode::kConflict);
   EXPECT_EQ(status.error().message(), "keyframe a/b/3 is another");
+}
+
+// The system's own table: 02 is the timer of a connection that is probed when it is silent.
+TEST(AtlasClientTest, ADaemonThatIsSilentIsProbed) {
+  TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    socket.Drain();
+  });
+  const auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  std::array<char, 6> port{};
+  std::snprintf(port.data(), port.size(), ":%04X", peer.endpoint().port);
+  std::ifstream table("/proc/net/tcp");
+  std::string timer;
+  for (std::string line; timer.empty() && std::getline(table, line);) {
+    std::istringstream fields(line);
+    std::string number;
+    std::string local;
+    std::string remote;
+    std::string state;
+    std::string queues;
+    std::string its_timer;
+    fields >> number >> local >> remote >> state >> queues >> its_timer;
+    if (remote.ends_with(port.data()) && state == "01") timer = its_timer.substr(0, 2);
+  }
+  EXPECT_EQ(timer, "02");
 }
 
 TEST(AtlasClientTest, LinkFailureStays) {

@@ -6,7 +6,7 @@ source=$1 build=$2 bin=$3 cmake=$4 compiler=$5
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$cmake" --install "$build" --prefix "$folder/prefix" >/dev/null
-if grep -rlE '<boost/asio|\.pb\.h|<openssl|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
+if grep -rlE '<boost/asio|\.pb\.h|google/protobuf|<openssl|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
   echo "public headers include what should stay behind the library"
   exit 1
 fi

@@ -177,7 +177,7 @@ void CrashLife::SendSpools(AtlasClient& client) {
   for (int vehicle = 0; vehicle < Fleet::kVehicles; ++vehicle) {
     if (Fleet::KindOf(vehicle) != VehicleKind::kSpool) continue;
     UploadSpool spool = ValueOf(UploadSpool::Open({.folder = fleet_.SpoolOf(vehicle)}));
-    ValueOf(spool.Send(client));
+    ValueOf(spool.Send(client, {.deadline = kPatience}));
     if (spool.waiting() > 0) throw std::runtime_error("a spool does not empty");
   }
 }

@@ -205,7 +205,7 @@ Status LedgerVehicle::SendSpool(AtlasClient& client) {
     ATLAS_RETURN_IF_ERROR(Put());
   }
   ledger_.Write("send");
-  const Result<SpoolReport> report = spool_->Send(client);
+  const Result<SpoolReport> report = spool_->Send(client, {.deadline = std::chrono::minutes(2)});
   if (!report) return report.error();
   if (report->retry_after.count() > 0) return {StatusCode::kUnavailable, "left alone"};
   const auto failed = report->set_aside + report->skipped + report->vanished;

@@ -2,9 +2,13 @@
 #include "client/vehicle/atlas_link.h"
 
 #include <deque>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "proto/wire/convert.h"
 #include "tests/client/vehicle/sync_peer.h"
 
 namespace atlas {
@@ -112,7 +116,7 @@ TEST(AtlasLinkTest, WhatARefusedRequestAskedForHoldsForTheNextConnection) {
     reply.mutable_error()->set_retry(true);
     reply.mutable_error()->set_retry_after_ms(~0U);
     socket.Reply(request->request_id(), std::move(reply));
-    socket.Drain();
+    socket.ReadRequest();  // and closes
   });
   LinkWorld world;
   world.random = 0.0;
@@ -133,6 +137,9 @@ TEST(AtlasLinkTest, WhatARefusedRequestAskedForHoldsForTheNextConnection) {
   EXPECT_LE((*client)->retry_after(), milliseconds(60'000));
   EXPECT_GE((*client)->retry_after(), milliseconds(30'000));
   link.Report(status.error());
+  EXPECT_TRUE(link.is_connected()) << "it only refused";
+  link.Report((*client)->ReadStatus().error());
+  EXPECT_FALSE(link.is_connected());
   world.Pass(milliseconds(29'000));
   EXPECT_FALSE(link.Client(milliseconds(50)));
   EXPECT_FALSE(link.is_connected());
@@ -244,16 +251,94 @@ TEST(AtlasLinkTest, AnotherAtlasIsRefused) {
   EXPECT_EQ(link.refusal().code(), StatusCode::kConflict);
 }
 
-TEST(AtlasLinkTest, ABrokenLinkIsDroppedARefusedRequestIsNot) {
+// A link to a peer that serves one connection after its greeting.
+class LinkToPeer {
+ public:
+  explicit LinkToPeer(std::function<void(PeerSocket&)> serve)
+      : peer_([serve = std::move(serve)](PeerSocket& socket) {
+          AnswerHello(socket, {});
+          serve(socket);
+        }) {}
+
+  // What a status request came to, reported to the link.
+  Status Ask() {
+    const auto client = link_.Client(milliseconds(2'000));
+    if (!client) return client.error();
+    const auto reply = (*client)->ReadStatus();
+    const Status status = reply ? Status() : reply.error();
+    link_.Report(status);
+    return status;
+  }
+  AtlasLink& link() { return link_; }
+
+ private:
+  TestPeer peer_;
+  AtlasLink link_{LinkOptions{.connection = peer_.options()}};
+};
+
+TEST(AtlasLinkTest, WhateverTheDaemonRefusesTheLinkStays) {
+  const std::vector<StatusCode> codes = {StatusCode::kUnavailable, StatusCode::kTimeout,
+                                         StatusCode::kInvalidData, StatusCode::kResourceExhausted,
+                                         StatusCode::kInternal};
+  LinkToPeer peer([codes](PeerSocket& socket) {
+    for (const StatusCode code : codes) {
+      wire::Envelope reply;
+      *reply.mutable_error() = ErrorToWire({code, "not this"});
+      socket.Reply(socket.ReadRequest()->request_id(), std::move(reply));
+    }
+    wire::Envelope reply;
+    reply.mutable_status_reply();
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(reply));
+    socket.Drain();
+  });
+  for (const StatusCode code : codes) {
+    EXPECT_EQ(peer.Ask().code(), code);
+    EXPECT_TRUE(peer.link().is_connected());
+  }
+  EXPECT_TRUE(peer.Ask().ok()) << "on the same connection: the peer takes no other";
+}
+
+TEST(AtlasLinkTest, WhatBreaksTheConnectionDropsIt) {
+  const auto answer_under = [](std::uint64_t id, wire::Envelope reply) {
+    return [id, reply](PeerSocket& socket) {
+      socket.ReadRequest();
+      socket.Reply(id, reply);
+      socket.Drain();
+    };
+  };
+  wire::Envelope refused;
+  *refused.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "full"});
+  wire::Envelope other;
+  other.mutable_wait_reply();
+  wire::Envelope status;
+  status.mutable_status_reply();
+  const std::vector<std::pair<std::function<void(PeerSocket&)>, StatusCode>> peers = {
+      {[](PeerSocket& socket) { socket.ReadRequest(); }, StatusCode::kUnavailable},
+      {[](PeerSocket& socket) { socket.Drain(); }, StatusCode::kTimeout},
+      {[](PeerSocket& socket) {
+         socket.ReadRequest();
+         socket.Write(Bytes(20, 'x'));
+         socket.Drain();
+       },
+       StatusCode::kInvalidData},
+      {answer_under(0, refused), StatusCode::kUnavailable},
+      {answer_under(2, other), StatusCode::kInvalidData},
+      {answer_under(77, status), StatusCode::kInvalidData},
+  };
+  for (std::size_t i = 0; i < peers.size(); ++i) {
+    LinkToPeer peer(peers[i].first);
+    EXPECT_EQ(peer.Ask().code(), peers[i].second) << i;
+    EXPECT_FALSE(peer.link().is_connected()) << i;
+    EXPECT_TRUE(peer.link().refusal().ok()) << i;
+  }
+}
+
+TEST(AtlasLinkTest, WhatSomebodySaysOfAGoodConnectionDoesNotDropIt) {
   LinkWorld world;
   AtlasLink link({}, world.environment());
   ASSERT_TRUE(link.Client(milliseconds(10)));
-  link.Report({StatusCode::kNotFound, "no such session"});
+  link.Report({StatusCode::kTimeout, "nothing came of it"});
   EXPECT_TRUE(link.is_connected());
-  link.Report({StatusCode::kTimeout, "silent"});
-  EXPECT_FALSE(link.is_connected());
-  EXPECT_TRUE(link.refusal().ok());
-  EXPECT_FALSE(link.Client(milliseconds(10)));  // not at once
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/wire/convert.h"
 #include "tests/client/vehicle/sync_peer.h"
 #include "tests/client/vehicle/test_folder.h"
 
@@ -202,6 +203,38 @@ TEST(AtlasViewTest, WhatIsLookedAtAllTheTimeStays) {
       EXPECT_EQ(view.Around(corner, 0.5)->transfer.tiles, 0U) << x << ' ' << y;
     }
   }
+}
+
+TEST(AtlasViewTest, ABusyDaemonKeepsItsLinkAndIsAskedNothingForAsLongAsItWants) {
+  int syncs = 0;
+  {
+    TestPeer busy([&syncs](PeerSocket& socket) {
+      wire::Envelope greeting;
+      wire::HelloReply& hello = *greeting.mutable_hello_reply();
+      hello.set_protocol_major(kProtocolMajor);
+      hello.set_protocol_minor(kProtocolMinor);
+      hello.set_profile(ProfileToWire(TinyProfile()));
+      hello.set_atlas_id(BytesToWire(TinyAtlas().atlas_id));
+      socket.Reply(socket.ReadRequest()->request_id(), std::move(greeting));
+      while (const auto request = socket.ReadRequest()) {
+        ++syncs;
+        wire::Envelope reply;
+        *reply.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "busy"});
+        reply.mutable_error()->set_retry_after_ms(60'000);
+        socket.Reply(request->request_id(), std::move(reply));
+      }
+    });
+    AtlasLink link({.connection = busy.options()});
+    TileStore store = *TileStore::Open(TinyAtlas(), {});
+    AtlasView view(store, &link);
+    for (int call = 0; call < 5; ++call) {
+      const auto map = view.Around(kMiddle, 1.0);
+      ASSERT_TRUE(map);
+      EXPECT_EQ(map->sync.code(), StatusCode::kUnavailable) << map->sync.message();
+      EXPECT_TRUE(link.is_connected());
+    }
+  }
+  EXPECT_EQ(syncs, 1);
 }
 
 TEST(AtlasViewTest, WhatMakesNoSenseIsRefused) {

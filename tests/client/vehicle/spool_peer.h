@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -31,7 +32,8 @@ class UploadPeer {
 
   Result<SpoolReport> Take(UploadSpool& spool) {
     auto client = AtlasClient::Connect(peer_.options());
-    return client ? spool.Send(*client) : Result<SpoolReport>(Error(client.error()));
+    return client ? spool.Send(*client, {.deadline = std::chrono::minutes(2)})
+                  : Result<SpoolReport>(Error(client.error()));
   }
   std::vector<std::uint32_t> came() {
     const std::lock_guard lock(mutex_);

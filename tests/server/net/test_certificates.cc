@@ -24,7 +24,8 @@ X509* Make(EVP_PKEY* key,
            const std::string& common_name,
            const std::string& unit,
            const X509* issuer,
-           EVP_PKEY* issuer_key) {
+           EVP_PKEY* issuer_key,
+           const char* basic_constraints) {
   static long serial = 0;
   X509* const made = X509_new();
   X509_set_version(made, X509_VERSION_3);
@@ -39,8 +40,7 @@ X509* Make(EVP_PKEY* key,
   AddEntry(subject, "CN", common_name);
   X509_set_issuer_name(made, issuer == nullptr ? subject : X509_get_subject_name(issuer));
   X509_EXTENSION* const rights =
-      X509V3_EXT_conf_nid(nullptr, nullptr, NID_basic_constraints,
-                          issuer == nullptr ? "critical,CA:TRUE" : "critical,CA:FALSE");
+      X509V3_EXT_conf_nid(nullptr, nullptr, NID_basic_constraints, basic_constraints);
   X509_add_ext(made, rights, -1);
   X509_EXTENSION_free(rights);
   EXPECT_GT(X509_sign(made, issuer_key, EVP_sha256()), 0);
@@ -56,11 +56,18 @@ void WriteCertificate(const std::filesystem::path& path, const X509* certificate
 
 }  // namespace
 
-TestAuthority::TestAuthority(std::filesystem::path directory, const std::string& name)
+TestAuthority::TestAuthority(std::filesystem::path directory,
+                             const std::string& name,
+                             const TestAuthority* above)
     : directory_(std::move(directory)),
       certificate_(directory_ / (name + ".ca.pem")),
       key_(EVP_EC_gen("P-256")),
-      own_(Make(key_, name, "", nullptr, key_)) {
+      own_(Make(key_,
+                name,
+                "",
+                above == nullptr ? nullptr : above->own_,
+                above == nullptr ? key_ : above->key_,
+                "critical,CA:TRUE")) {
   WriteCertificate(certificate_, own_);
 }
 
@@ -74,7 +81,7 @@ CertificateFiles TestAuthority::Issue(const std::string& common_name,
   CertificateFiles files{directory_ / (common_name + unit + ".pem"),
                          directory_ / (common_name + unit + ".key")};
   EVP_PKEY* const key = EVP_EC_gen("P-256");
-  X509* const certificate = Make(key, common_name, unit, own_, key_);
+  X509* const certificate = Make(key, common_name, unit, own_, key_, "critical,CA:FALSE");
   WriteCertificate(files.certificate, certificate);
   std::FILE* const file = std::fopen(files.key.c_str(), "w");
   EXPECT_EQ(PEM_write_PrivateKey(file, key, nullptr, nullptr, 0, nullptr, nullptr), 1);

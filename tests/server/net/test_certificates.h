@@ -17,8 +17,10 @@ struct CertificateFiles {
 
 class TestAuthority {
  public:
-  // Its files are put in `directory`, which is there.
-  TestAuthority(std::filesystem::path directory, const std::string& name);
+  // Its files are put in `directory`, which is there. Without one above it vouches for itself.
+  TestAuthority(std::filesystem::path directory,
+                const std::string& name,
+                const TestAuthority* above = nullptr);
   TestAuthority(const TestAuthority&) = delete;
   TestAuthority& operator=(const TestAuthority&) = delete;
   ~TestAuthority();

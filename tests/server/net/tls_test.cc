@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <fstream>
 #include <future>
 #include <memory>
 #include <string>
@@ -182,6 +183,39 @@ TEST_F(TlsTest, ACertificateThatIsTakenBackClosesItsConnectionsAndOpensNothing) 
   EXPECT_EQ(again.Greet().body_case(), wire::Envelope::BODY_NOT_SET);
   BlockingPeer other(port_, As("car.9"));
   EXPECT_TRUE(other.Greet().has_hello_reply());
+}
+
+// The vehicle's own certificate is on no list: that of its authority is, on the list of the one
+// above.
+TEST_F(TlsTest, AnAuthorityInBetweenThatIsTakenBackTakesItsVehiclesWithIt) {
+  ServeTls();
+  const TestAuthority stolen(directory_, "stolen", ca_.get());
+  const TestAuthority good(directory_, "good", ca_.get());
+  const auto admit = [&] {
+    std::ofstream all(directory_ / "all.pem");
+    for (const auto& file : {ca_->certificate(), stolen.certificate(), good.certificate()}) {
+      all << std::ifstream(file).rdbuf();
+    }
+    all.close();
+    const CertificateFiles own = ca_->Issue("daemon");
+    const auto tls = TlsContext::Load({own.certificate, own.key, directory_ / "all.pem"});
+    ASSERT_TRUE(tls) << tls.error().message();
+    server_->ChangeSecurity({*tls, security_.access});
+  };
+  admit();
+  BlockingPeer thief(port_, {ca_->certificate(), stolen.Issue("car.7")});
+  ASSERT_TRUE(thief.Greet().has_hello_reply());
+  BlockingPeer car(port_, {ca_->certificate(), good.Issue("car.8")});
+  ASSERT_TRUE(car.Greet().has_hello_reply());
+  ca_->Revoke({stolen.certificate(), {}});
+  for (const TestAuthority* between : {&stolen, &good}) {
+    between->Revoke(between->Issue("scrapped"));
+  }
+  admit();
+  EXPECT_TRUE(thief.IsClosed());
+  EXPECT_EQ(Ask(car, StatusOf(1)), StatusCode::kOk);
+  BlockingPeer again(port_, {ca_->certificate(), stolen.Issue("car.9")});
+  EXPECT_EQ(again.Greet().body_case(), wire::Envelope::BODY_NOT_SET);
 }
 
 TEST_F(TlsTest, WhoeverIsTakenBackBeforeItsGreetingStaysOutside) {

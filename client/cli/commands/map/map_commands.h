@@ -11,5 +11,6 @@ std::unique_ptr<Command> MakePlanCommand();
 std::unique_ptr<Command> MakePointCommand();
 std::unique_ptr<Command> MakeQueryCommand();
 std::unique_ptr<Command> MakeRenderCommand();
+std::unique_ptr<Command> MakeWatchCommand();
 
 }  // namespace atlas

@@ -1,0 +1,149 @@
+// What AtlasClient asks of the atlas as a whole: waits, digests, verifications, compactions, and
+// changes of whole sessions.
+#include <utility>
+
+#include "client/connection/atlas_client.h"
+#include "client/connection/rpc_channel.h"
+#include "core/base/str_cat.h"
+#include "proto/wire/convert.h"
+
+namespace atlas {
+namespace {
+
+using Body = wire::Envelope;
+using std::chrono::milliseconds;
+
+constexpr std::uint32_t kMinorWithLog = 8;
+
+Result<VerifySummary> CallVerify(RpcChannel& channel,
+                                 wire::Envelope& request,
+                                 milliseconds timeout) {
+  request.mutable_verify_request()->set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel.Call(request, Body::kVerifyReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::VerifyReply& done = reply->verify_reply();
+  return VerifySummary{done.checked(),    done.damaged(),
+                       done.mismatched(), {done.findings().begin(), done.findings().end()},
+                       done.revision(),   done.restored(),
+                       done.given_up()};
+}
+
+Result<SessionChangeSummary> CallChangeSession(RpcChannel& channel,
+                                               const SessionKey& key,
+                                               SessionAction action,
+                                               const std::string& author) {
+  wire::Envelope request;
+  wire::ChangeSession& change = *request.mutable_change_session();
+  change.set_vehicle(key.vehicle);
+  change.set_session(key.session);
+  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
+                                                      : wire::ChangeSession::RESTORE);
+  change.set_author(author);
+  const auto reply = channel.Call(request, Body::kChangeSessionReply);
+  if (!reply) return Error(reply.error());
+  const wire::ChangeSessionReply& done = reply->change_session_reply();
+  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision(),
+                              done.sessions()};
+}
+
+}  // namespace
+
+Result<WaitSummary> AtlasClient::WaitUntilFused(milliseconds timeout) {
+  wire::Envelope request;
+  request.mutable_wait_request()->set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel_->Call(request, Body::kWaitReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::WaitReply& done = reply->wait_reply();
+  if (done.timed_out()) {
+    return Error(StatusCode::kTimeout,
+                 StrCat(done.dirty_tiles(), " tiles are still to be fused after ",
+                        static_cast<double>(timeout.count()) * 1e-3, " s"));
+  }
+  return WaitSummary{done.revision(), done.dirty_tiles()};
+}
+
+Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
+                                                        SessionAction action,
+                                                        const std::string& author) {
+  if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
+  return CallChangeSession(*channel_, key, action, author);
+}
+
+Result<SessionChangeSummary> AtlasClient::ChangeVehicle(const std::string& vehicle,
+                                                        SessionAction action,
+                                                        const std::string& author) {
+  if (Status status = CheckMinor(kMinorWithLog, "a change of all of a vehicle's sessions");
+      !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = ValidateName("vehicle", vehicle); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return CallChangeSession(*channel_, {vehicle, ""}, action, author);
+}
+
+Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,
+                                          std::optional<std::uint64_t> at_revision) {
+  if (Status status = CheckPast(at_revision); !status.ok()) return Error(std::move(status));
+  wire::Envelope request;
+  wire::DigestRequest& digest = *request.mutable_digest_request();
+  digest.set_timeout_ms(TimeoutField(timeout));
+  if (at_revision) digest.set_at_revision(*at_revision);
+  const auto reply = channel_->Call(request, Body::kDigestReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::DigestReply& done = reply->digest_reply();
+  const ByteSpan sha256 = BytesFromWire(done.sha256());
+  return DigestSummary{Bytes(sha256.begin(), sha256.end()), done.tiles(), done.revision()};
+}
+
+Result<CompactionSummary> AtlasClient::Compact(std::int64_t before_ms,
+                                               const std::string& author,
+                                               milliseconds timeout) {
+  wire::Envelope request;
+  wire::CompactRequest& compact = *request.mutable_compact_request();
+  compact.set_before_ms(before_ms);
+  compact.set_author(author);
+  compact.set_timeout_ms(TimeoutField(timeout));
+  const auto reply = channel_->Call(request, Body::kCompactReply, timeout);
+  if (!reply) return Error(reply.error());
+  const wire::CompactReply& done = reply->compact_reply();
+  return CompactionSummary{done.dropped(), done.bytes(), done.tiles_checked(), done.horizon(),
+                           done.revision()};
+}
+
+Result<VerifySummary> AtlasClient::Verify(bool is_rebuild, milliseconds timeout) {
+  wire::Envelope request;
+  request.mutable_verify_request()->set_rebuild(is_rebuild);
+  return CallVerify(*channel_, request, timeout);
+}
+
+Result<VerifySummary> AtlasClient::Repair(bool is_rebuild,
+                                          const std::string& author,
+                                          milliseconds timeout) {
+  if (Status status = CheckMinor(kMinorWithLog, "a repair"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  wire::Envelope request;
+  request.mutable_verify_request()->set_rebuild(is_rebuild);
+  request.mutable_verify_request()->set_repair(true);
+  request.mutable_verify_request()->set_author(author);
+  return CallVerify(*channel_, request, timeout);
+}
+
+Result<std::vector<AtlasEvent>> AtlasClient::ListEvents(std::uint64_t after_id) {
+  if (Status status = CheckMinor(kMinorWithLog, "the log"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  wire::Envelope request;
+  request.mutable_log_request()->set_after_id(after_id);
+  const auto reply = channel_->Call(request, Body::kLogReply);
+  if (!reply) return Error(reply.error());
+  std::vector<AtlasEvent> events;
+  for (const wire::LogReply::Event& event : reply->log_reply().events()) {
+    events.push_back({event.id(), event.revision(), event.time_ms(), event.kind(), event.author(),
+                      event.subject(), event.detail()});
+  }
+  return events;
+}
+
+}  // namespace atlas
