@@ -33,10 +33,9 @@ enum class RequestKind : std::uint8_t {
 };
 // As metrics and logs call them, in the order of the enumerators.
 inline constexpr std::array<std::string_view, 16> kRequestKindNames = {
-    "hello",  "upload_keyframe", "update_poses", "change_session", "query_region",
-    "sync",   "status",          "sessions",     "wait",           "digest",
-    "verify", "compact",         "watch",        "cancel",         "log",
-    "unknown"};
+    "hello",  "upload_keyframe", "update_poses", "change_session", "query_region", "sync",
+    "status", "sessions",        "wait",         "digest",         "verify",       "compact",
+    "watch",  "cancel",          "log",          "unknown"};
 inline constexpr std::size_t kRequestKinds = kRequestKindNames.size();
 inline constexpr std::size_t kStatusCodes = 1 + static_cast<std::size_t>(StatusCode::kInternal);
 

@@ -47,8 +47,8 @@ class AtlasStore : public TileIndex {
   virtual void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) = 0;
 
   // One transaction: the state, its line in the history, a mark on every tile that a keyframe of
-  // the session touches. A session that is so already: nothing changes. kNotFound: unknown. The same
-  // for all sessions of a vehicle; the state is then that of the last one.
+  // the session touches. A session that is so already: nothing changes. kNotFound: unknown. The
+  // same for all sessions of a vehicle; the state is then that of the last one.
   virtual void ChangeSession(SessionChange change, Done<SessionChangeResult> done) = 0;
 
   // One transaction: the keyframes go with their poses and footprints, tombstones stay, and no

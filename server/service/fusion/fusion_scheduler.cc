@@ -287,9 +287,9 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
 void FusionScheduler::NoteDamage(const TileId& tile) {
   const auto keyframes = store_.ListKeyframesOfTile(tile);
   const auto noted =
-      keyframes ? Await<std::uint32_t>(
-                      [&](auto done) { store_.NoteDamage(*keyframes, std::move(done)); })
-                : Result<std::uint32_t>(Error(keyframes.error()));
+      keyframes
+          ? Await<std::uint32_t>([&](auto done) { store_.NoteDamage(*keyframes, std::move(done)); })
+          : Result<std::uint32_t>(Error(keyframes.error()));
   if (!noted) {
     log_(LogLevel::kError, StrCat("fusion: cannot note what is damaged of tile ", tile, ": ",
                                   noted.error().message()));

@@ -25,9 +25,12 @@ KEYS = {
     "poses": "updated tiles_marked revision batch",
     "sessions": "sessions",
     "session": "vehicle session state changed tiles_marked revision",
+    "vehicle": "vehicle sessions changed tiles_marked revision",
+    "watch": "type revision",
+    "log": "events",
     "compact": "dropped bytes tiles_checked horizon revision",
     "digest": "digest tiles revision",
-    "verify": "checked damaged mismatched",
+    "verify": "checked damaged mismatched restored given_up",
     "segment": "precision recall f1 missed_curb false_road ms_per_scan scans",
     "localize": "type translation_rmse_m rotation_rmse_deg translation_p95_m failures lost restarts scans hz "
                 "bytes_received",
@@ -54,6 +57,9 @@ def lines_of(cases, work, drive):
         "poses": ["poses", "apply", correction],
         "sessions": ["sessions"],
         "session": ["session", "restore", "vehicle/good"],
+        "vehicle": ["vehicle", "restore", "vehicle"],
+        "watch": ["watch", "--center", "0,0", "--radius", "20", "--for", "0.2"],
+        "log": ["log"],
         "compact": ["compact", "--before", "1.5"],
         "digest": ["digest"],
         "verify": ["verify", "--rebuild"],
@@ -103,6 +109,7 @@ def content_cases(cases, found):
                            all(map(is_ratio, layer["column"]["probabilities"])), layer)
     cases.report.equal("point: lowest first", layers, sorted(layers, key=lambda layer: layer["z_m"]))
     cases.report.check("digest: hex", re.fullmatch("[0-9a-f]{64}", found["digest"][0]["digest"]), found["digest"])
+    has_keys(cases, "event", found["log"][0]["events"][0], "id revision time_ms kind author subject detail")
     has_keys(cases, "session", found["sessions"][0]["sessions"][0], "vehicle session state keyframes compacted")
     cases.report.check("segment: ratios", all(is_ratio(found["segment"][0][key])
                                               for key in ("precision", "recall", "f1")), found["segment"])

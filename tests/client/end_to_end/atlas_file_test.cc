@@ -130,8 +130,8 @@ TEST_F(AtlasFileEndToEndTest, TilesThatWaitToBeFusedAreNoted) {
   const CommandRun before = RunOn(file, {"point", "0", "-3"});
   EXPECT_EQ(before.err, "");
   Change(file,
-         "INSERT INTO dirty_tiles (key, shard, level, generation, since) "
-         "SELECT key, shard, 0, 1, 1 FROM tiles LIMIT 2");
+         "INSERT INTO dirty_tiles (key, shard, level, generation, since, checksum) "
+         "SELECT key, shard, 0, 1, 1, 0 FROM tiles LIMIT 2");
   const CommandRun noted = RunOn(file, {"point", "0", "-3"});
   EXPECT_EQ(noted.exit_code, 0);
   EXPECT_EQ(noted.out, before.out);
