@@ -49,7 +49,7 @@ TEST_F(DamageEndToEndTest, ASecondIngestHealsAndARepairGivesUp) {
   {
     DaemonProcess daemon(data, {});
     const CommandRun verify = RunAtlas(daemon.address(), {"verify"});
-    EXPECT_EQ(verify.exit_code, 4) << verify.err;
+    EXPECT_EQ(verify.exit_code, 6) << verify.err;
     EXPECT_EQ(verify.Get<int>("damaged"), 2);
     EXPECT_THAT(Kinds(daemon), ::testing::ElementsAre("keyframe_damaged", "keyframe_damaged"));
     EXPECT_EQ(Digest(daemon), intact);  // nothing is fused without them
