@@ -120,8 +120,8 @@ TEST_F(SpoolLimitsTest, WhatIsNotAnsweredInTimeIsAnsweredInTheNextCallAndNotSent
 // More than the system's buffers take: the frame that is on its way goes on in the next call.
 TEST_F(SpoolLimitsTest, APeerThatDoesNotReadHoldsNoCallAndNothingIsSentTwice) {
   Put(4, std::size_t{12} << 20);
+  peer_.Set(true, true);  // before it can read a request
   AtlasClient client = peer_.Connect();
-  peer_.Set(true, true);
   const SpoolReport first = Send(client);
   EXPECT_EQ(first.acknowledged, 0U);
   EXPECT_LT(first.sent, 4U);

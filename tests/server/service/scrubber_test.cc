@@ -62,7 +62,7 @@ TEST_F(ScrubberTest, DamageIsFoundBeforeAnybodyAsks) {
     EXPECT_GE(scrubber->figures().damaged, 2u);
   }
   EXPECT_EQ(store_->ListDamagedKeyframes()->size(), 1u);
-  EXPECT_THAT(Lines(), ::testing::Contains(::testing::HasSubstr("error: scrub: store: the blob")));
+  EXPECT_THAT(Lines(), ::testing::Contains(::testing::HasSubstr("store: the blob of keyframe 2")));
   ASSERT_TRUE(Upload(DriveUpload(1)));
   EXPECT_EQ(Digest().sha256, intact.sha256);
   lines_.clear();
