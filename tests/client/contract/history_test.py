@@ -5,8 +5,11 @@ Usage: history_test.py BIN_DIR DRIVE; DRIVE is a simulated street."""
 import contextlib
 import pathlib
 import sqlite3
+import struct
 import sys
 import tempfile
+
+import xxhash
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
@@ -14,6 +17,12 @@ from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 
 PLACE = ("1", "-1.6")
 AREA = ("--center", "0,0", "--radius", "20")
+
+
+def checksum_of_counter(number, value):
+    """docs/formats/store.md, "Checksums"."""
+    unsigned = xxhash.xxh64_intdigest(struct.pack("<BqQ", 12, number, value))
+    return struct.unpack("<q", struct.pack("<Q", unsigned))[0]
 
 
 class Moment:
@@ -146,7 +155,8 @@ def main():
                                                                   if "scratch" in path.name], [])
         horizon = moments["two sessions"].revision
         with contextlib.closing(sqlite3.connect(data + "/atlas.db")) as database, database:
-            database.execute("UPDATE counters SET value = ? WHERE name = 'history_horizon'", (horizon,))
+            database.execute("UPDATE counters SET value = ?, checksum = ? WHERE name = 'history_horizon'",
+                             (horizon, checksum_of_counter(11, horizon)))
         with Daemon(bin_dir, data) as daemon:
             forgotten_cases(Cases(report, bin_dir, daemon.server), horizon)
     print(f"{report.checks} checks, {report.failed} failed")
