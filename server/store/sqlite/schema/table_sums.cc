@@ -127,13 +127,14 @@ void WithoutCounting(Connection& connection, RowKind table, const std::function<
 
 // Triggers of the connection alone: what others delete is missed.
 void KeepTableSums(Connection& connection) {
-  for (const auto& [kind, name, checksums] : kTables) {
+  for (const SummedTable& table : kTables) {
     const auto trigger = [&](const char* event, const char* change, const std::string& sum) {
-      connection.Execute(
-          StrCat("CREATE TEMP TRIGGER ", name, "_", std::string_view(event, 6), " AFTER ", event,
-                 " ON main.", name, " BEGIN UPDATE table_sums SET row_count = row_count", change,
-                 ", checksums = ", sum, " WHERE id = ", static_cast<int>(kind), "; END")
-              .c_str());
+      connection.Execute(StrCat("CREATE TEMP TRIGGER ", table.name, "_", std::string_view(event, 6),
+                                " AFTER ", event, " ON main.", table.name,
+                                " BEGIN UPDATE table_sums SET row_count = row_count", change,
+                                ", checksums = ", sum, " WHERE id = ", static_cast<int>(table.kind),
+                                "; END")
+                             .c_str());
     };
     trigger("INSERT", " + 1", Xored("checksums", "new.checksum"));
     trigger("DELETE", " - 1", Xored("checksums", "old.checksum"));
