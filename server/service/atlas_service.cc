@@ -118,7 +118,7 @@ Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
 
 std::function<Status()> AtlasService::CheckPast(std::uint64_t revision,
                                                 const Patience& patience) const {
-  return wait_.Check(FusionWait::Limit(patience),
+  return wait_.Check(patience,
                      StrCat("the atlas of revision ", revision, " was not fused in time"));
 }
 

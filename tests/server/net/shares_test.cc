@@ -65,6 +65,22 @@ class SharesTest : public NetTest {
     }
     return sent > most / 2 ? "" : StrCat("only ", sent, " bytes");
   }
+  wire::Envelope PastDigestOf(std::uint64_t id, std::uint32_t timeout_ms) const {
+    wire::Envelope envelope;
+    envelope.set_request_id(id);
+    envelope.mutable_digest_request()->set_at_revision(service_->revision());
+    envelope.mutable_digest_request()->set_timeout_ms(timeout_ms);
+    return envelope;
+  }
+  // In a moment.
+  bool AreUnderWay(std::uint64_t requests) const {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (server_->ReadFigures().in_flight != requests &&
+           std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::yield();
+    }
+    return server_->ReadFigures().in_flight == requests;
+  }
   static std::string ErrorOf(const std::optional<wire::Envelope>& reply) {
     EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
     return reply ? reply->error().message() : "";
@@ -89,6 +105,35 @@ TEST_F(SharesTest, TheWaitsOfOneNameLeavePlacesForOthers) {
   const auto busy = bob->Receive();
   EXPECT_EQ(busy->request_id(), 5u) << "the first one has a place";
   EXPECT_THAT(ErrorOf(busy), HasSubstr("of bob"));
+}
+
+TEST_F(SharesTest, OneNamesDigestsOfThePastLeaveAThreadForOthers) {
+  ServeAliceAndBob(0);
+  UploadDrive(6);
+  const auto alice = ConnectAs("alice");
+  const auto bob = ConnectAs("bob");
+  alice->Send(PastDigestOf(1, 60'000));
+  alice->Send(PastDigestOf(2, 60'000));
+  EXPECT_TRUE(AreUnderWay(2));
+  bob->Send(PastDigestOf(3, 60'000));
+  EXPECT_TRUE(bob->Receive()->has_digest_reply());
+  EXPECT_GE(server_->ReadFigures().in_flight, 1u) << "her second one came behind it";
+  EXPECT_TRUE(alice->Receive()->has_digest_reply());
+  EXPECT_TRUE(alice->Receive()->has_digest_reply());
+}
+
+TEST_F(SharesTest, WhoseTimeIsOverBeforeAThreadIsFreeIsTold) {
+  net_.reading_threads = 1;
+  ServeAliceAndBob(0);
+  UploadDrive(6);
+  const auto alice = ConnectAs("alice");
+  const auto bob = ConnectAs("bob");
+  alice->Send(PastDigestOf(1, 60'000));
+  EXPECT_TRUE(AreUnderWay(1));
+  bob->Send(PastDigestOf(2, 5));
+  EXPECT_EQ(CodeOf(bob->Receive()), StatusCode::kTimeout);
+  EXPECT_EQ(server_->ReadFigures().in_flight, 1u) << "hers goes on";
+  EXPECT_TRUE(alice->Receive()->has_digest_reply());
 }
 
 TEST_F(SharesTest, TheWatchesOfOneNameLeavePlacesForOthers) {
