@@ -71,7 +71,7 @@ class TcpServer::Impl {
         pool_(static_cast<std::size_t>(options.service_threads)),
         reply_pool_(static_cast<std::size_t>(options.reply_threads),
                     static_cast<std::size_t>(std::max(1, options.reply_threads / 2))),
-        reading_pool_(static_cast<std::size_t>(options.reading_threads), 2),
+        reading_pool_(static_cast<std::size_t>(options.reading_threads), 1),
         handler_(service, pool_, reply_pool_, reading_pool_, options_),
         limits_(options),
         places_(options.max_connections),
