@@ -170,7 +170,7 @@ Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
 }
 
 bool IsSmallBesidesBlobs(ByteSpan payload, std::size_t max_bytes) {
-  return CheckShape(payload, max_bytes).ok();
+  return CheckShape(payload, max_bytes).has_value();
 }
 
 Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope) {
