@@ -70,6 +70,7 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
                                                    << 20;
   options.scrub.bytes_per_s = config.scrub_kib_per_s * 1024.0;
   options.scrub.between = std::chrono::hours(config.scrub_hours);
+  options.sessions_per_hour = static_cast<std::uint32_t>(config.vehicle_sessions_per_hour);
   options.scratch_directory = config.data;
   return options;
 }

@@ -152,6 +152,14 @@ LiveConfig::Prepare PrepareNameLimits(TcpServer& server) {
   };
 }
 
+LiveConfig::Prepare PrepareSessionLimit(AtlasService& service) {
+  return [&service](const DaemonConfig& config) -> Result<LiveConfig::Commit> {
+    return [&service, limit = ServiceFrom(config).sessions_per_hour] {
+      service.set_sessions_per_hour(limit);
+    };
+  };
+}
+
 // A connection is a file, and the store has some.
 void AllowConnections(const NetOptions& options) {
   constexpr std::size_t kOtherFiles = 256;
@@ -206,6 +214,7 @@ int Serve(LiveConfig& live, std::atomic<bool>& has_failed) {
   }
   live.AddPart(PrepareSecurity(server, !config.tls_certificate.empty()));
   live.AddPart(PrepareNameLimits(server));
+  live.AddPart(PrepareSessionLimit(service));
   const HangupWatch hangups([&live] { ReloadConfig(live); });
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());

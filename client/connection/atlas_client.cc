@@ -241,15 +241,31 @@ Result<AtlasStatus> AtlasClient::ReadStatus() {
 }
 
 Result<std::vector<SessionSummary>> AtlasClient::ListSessions() {
-  wire::Envelope request;
-  request.mutable_sessions_request();
-  const auto reply = channel_->Call(request, Body::kSessionsReply);
-  if (!reply) return Error(reply.error());
   std::vector<SessionSummary> sessions;
-  for (const wire::SessionInfo& info : reply->sessions_reply().sessions()) {
-    sessions.push_back(SessionFromWire(info));
+  while (true) {
+    wire::Envelope request;
+    wire::SessionsRequest& page = *request.mutable_sessions_request();
+    if (!sessions.empty()) {
+      page.set_after_vehicle(sessions.back().key.vehicle);
+      page.set_after_session(sessions.back().key.session);
+    }
+    const auto reply = channel_->Call(request, Body::kSessionsReply);
+    if (!reply) return Error(reply.error());
+    const std::size_t before = sessions.size();
+    for (const wire::SessionInfo& info : reply->sessions_reply().sessions()) {
+      SessionSummary session = SessionFromWire(info);
+      if (!sessions.empty() && session.key <= sessions.back().key) {
+        return Error(StatusCode::kInvalidData,
+                     StrCat("sessions: the daemon told of ", session.key, " behind ",
+                            sessions.back().key, ", expected them in order"));
+      }
+      sessions.push_back(std::move(session));
+    }
+    if (!reply->sessions_reply().has_more()) return sessions;
+    if (sessions.size() == before) {
+      return Error(StatusCode::kInvalidData, "sessions: the daemon has more of them and told none");
+    }
   }
-  return sessions;
 }
 
 // A daemon that does not know the field would answer with the atlas as it is.

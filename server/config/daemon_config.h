@@ -48,7 +48,8 @@ struct DaemonConfig {
   int name_requests_per_s = 1'000;
   int name_mib_per_s = 64;
   int name_served_mib_per_s = 256;
-  std::optional<HostPort> http;  // the operations port; none: off
+  int vehicle_sessions_per_hour = 1'000;  // that it may begin; 0: no limit
+  std::optional<HostPort> http;           // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.
   std::filesystem::path tls_certificate;

@@ -30,6 +30,7 @@ AtlasService::AtlasService(AtlasStore& store,
       clock_(std::move(clock)),
       log_(std::move(log)),
       options_(options),
+      starts_(std::make_shared<SessionStarts>(options.sessions_per_hour)),
       fusion_(
           store,
           changes_,
@@ -58,6 +59,7 @@ Result<NewKeyframe> AtlasService::CheckUpload(UploadRequest request) const {
 }
 
 void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done) {
+  keyframe.starts = starts_;
   store_.PutKeyframe(std::move(keyframe), Notifying(changes_, std::move(done)));
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct ServiceStatus {
 struct ServiceOptions {
   FusionOptions fusion;
   ScrubOptions scrub;
+  std::uint32_t sessions_per_hour = 1'000;    // that one vehicle may begin; 0: no limit
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
@@ -72,6 +74,8 @@ class AtlasService {
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
   void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
+  // From now on.
+  void set_sessions_per_hour(std::uint32_t sessions) { starts_->set_per_hour(sessions); }
 
   // fusion_wait.h
   Result<WaitOutcome> WaitUntilClean(const Patience& patience) {
@@ -100,7 +104,10 @@ class AtlasService {
   Result<std::optional<StoredTile>> ReadTile(const TileId& id);
 
   Result<ServiceStatus> ReadStatus();
-  Result<std::vector<SessionRecord>> ListSessions() { return store_.ListSessions(); }
+  // Behind `after`; atlas_store.h.
+  Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after, std::uint32_t limit) {
+    return store_.ListSessions(after, limit);
+  }
   // nullopt: unknown.
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) {
     return store_.FindSession(key);
@@ -141,6 +148,7 @@ class AtlasService {
   WallClock clock_;
   LogSink log_;
   ServiceOptions options_;
+  const std::shared_ptr<SessionStarts> starts_;
   ChangeSignal changes_;
   WatchHub watches_;
   FusionScheduler fusion_;

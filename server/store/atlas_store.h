@@ -38,7 +38,7 @@ class AtlasStore : public TileIndex {
   // Same key, blob hash and time as a stored one: a duplicate, nothing changes, even if its pose
   // was corrected since, unless what is stored is damaged: that is put right then. Other content
   // under the key: kConflict. Marks the footprint dirty. All the same where a compaction dropped
-  // the stored one.
+  // the stored one. kUnavailable: it would begin a session, and its vehicle began too many.
   virtual void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) = 0;
   // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
   // and marks nothing. Marks the union of the old and the new footprints. Neither uploads nor poses
@@ -132,7 +132,9 @@ class AtlasStore : public TileIndex {
 
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
-  virtual Result<std::vector<SessionRecord>> ListSessions() = 0;
+  // Behind `after` by vehicle and session, whether there is one of that name or not, up to `limit`.
+  virtual Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
+                                                          std::uint32_t limit) = 0;
   // nullopt: unknown.
   virtual Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) = 0;
   // Verifies every checksum of a session's history and of what is left of its dropped keyframes.

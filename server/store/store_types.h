@@ -15,6 +15,7 @@
 #include "core/geometry/pose.h"
 #include "core/geometry/tile_id.h"
 #include "server/store/missing_uploads.h"
+#include "server/store/session_starts.h"
 #include "server/store/session_types.h"
 
 namespace atlas {
@@ -59,6 +60,7 @@ struct NewKeyframe {
   Bytes blob;
   std::vector<TileId> footprint;            // the level-0 tiles it touches at `pose`
   std::shared_ptr<MissingUploads> missing;  // of who sends it; null: order does not matter
+  std::shared_ptr<SessionStarts> starts;    // of all; null: as many sessions as they like
 };
 
 struct PutKeyframeResult {

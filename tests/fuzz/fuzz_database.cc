@@ -79,7 +79,7 @@ bool ReadAsDaemon(const ScratchFolder& folder) {
       **store, [] { return TinyAtlas::kNow_ms; }, [](LogLevel, const std::string&) {},
       service_options);
   const auto report = service.Verify({}, {std::chrono::seconds(5), {}});
-  static_cast<void>(service.ListSessions());
+  static_cast<void>(service.ListSessions({}, 1'000));
   static_cast<void>(service.ReadStatus());
   const Patience patience{std::chrono::seconds(5), {}};
   static_cast<void>(service.DigestAt(1, patience));

@@ -144,7 +144,20 @@ class AtlasClient:
         return self._call(atlas_pb2.StatusRequest())
 
     def sessions(self) -> list[atlas_pb2.SessionInfo]:
-        return list(self._call(atlas_pb2.SessionsRequest()).sessions)
+        """All, by vehicle and session, however many pages they take."""
+        sessions: list[atlas_pb2.SessionInfo] = []
+        request = atlas_pb2.SessionsRequest()
+        while True:
+            reply = self._call(request)
+            for session in reply.sessions:
+                if (session.vehicle, session.session) <= (request.after_vehicle, request.after_session):
+                    raise BrokenReply(f"session {session.vehicle}/{session.session} comes twice, or out of order")
+                sessions.append(session)
+                request.after_vehicle, request.after_session = session.vehicle, session.session
+            if not reply.has_more:
+                return sessions
+            if not reply.sessions:
+                raise BrokenReply("there are more sessions, and none of them came")
 
     def wait(self, timeout_ms: int) -> atlas_pb2.WaitReply:
         """Until no tile is dirty; `timed_out` tells."""

@@ -17,12 +17,6 @@ namespace asio = boost::asio;
 
 constexpr std::uint32_t kMaxEvents = 1'000;  // of a reply
 
-void SessionsToWire(const std::vector<SessionRecord>& sessions, wire::SessionsReply& out) {
-  for (const SessionRecord& record : sessions) {
-    SessionToWire(record, *out.add_sessions());
-  }
-}
-
 // Fusing is long work: it has places and threads of its own, and ends when the peer leaves.
 asio::awaitable<Status> QueryThePast(RequestContext& context,
                                      const wire::Envelope& request,
@@ -89,23 +83,6 @@ asio::awaitable<Status> AnswerLog(RequestContext& context,
   const Result<std::vector<Event>> events = co_await OnPool(context.pool, list);
   co_return co_await Answer(request, events, &wire::Envelope::mutable_log_reply, EventsToWire,
                             peer.out);
-}
-
-asio::awaitable<Status> AnswerSessions(RequestContext& context,
-                                       const wire::Envelope& request,
-                                       Peer& peer) {
-  TurnOrder::Turn turn(peer.streams);  // there may be many
-  co_await turn.Come();
-  const bool is_open = co_await peer.out.WaitForRoom();
-  if (!is_open) {
-    co_return Status();
-  }
-  const Blocking<std::vector<SessionRecord>> list = [&context] {
-    return context.service.ListSessions();
-  };
-  const Result<std::vector<SessionRecord>> sessions = co_await OnPool(context.pool, list);
-  co_return co_await Answer(request, sessions, &wire::Envelope::mutable_sessions_reply,
-                            SessionsToWire, peer.out);
 }
 
 asio::awaitable<Status> AwaitRevision(RequestContext& context,

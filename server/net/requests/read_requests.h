@@ -24,9 +24,6 @@ boost::asio::awaitable<Status> AnswerStatus(RequestContext& context,
 boost::asio::awaitable<Status> AnswerLog(RequestContext& context,
                                          const wire::Envelope& request,
                                          Peer& peer);
-boost::asio::awaitable<Status> AnswerSessions(RequestContext& context,
-                                              const wire::Envelope& request,
-                                              Peer& peer);
 
 // Until the tiles reflect `revision` (0: at once). If they do not yet it takes a place of those who
 // wait: kUnavailable when there is none, kTimeout.

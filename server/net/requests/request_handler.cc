@@ -11,6 +11,7 @@
 #include "server/net/requests/on_pool.h"
 #include "server/net/requests/read_requests.h"
 #include "server/net/requests/request_conversion.h"
+#include "server/net/requests/sessions_reply.h"
 #include "server/net/requests/whole_atlas_requests.h"
 #include "server/net/requests/write_requests.h"
 #include "server/service/process_memory.h"

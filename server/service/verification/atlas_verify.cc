@@ -129,15 +129,22 @@ Status AtlasVerifier::Mismatch(const TileId& id, const std::string& what) {
 }
 
 Status AtlasVerifier::VerifySessions() {
-  const auto sessions = store_.ListSessions();
-  if (!sessions) {
-    return Note(sessions.error());
+  SessionKey after;
+  while (true) {
+    const auto sessions = store_.ListSessions(after, kPage);
+    if (!sessions) {
+      return Note(sessions.error());
+    }
+    if (sessions->empty()) {
+      return {};
+    }
+    for (const SessionRecord& session : *sessions) {
+      ATLAS_RETURN_IF_ERROR(options_.check_stop());
+      expected_keyframes_ += session.keyframes;
+      ATLAS_RETURN_IF_ERROR(Note(store_.CheckSession(session.key)));
+    }
+    after = sessions->back().key;
   }
-  for (const SessionRecord& session : *sessions) {
-    expected_keyframes_ += session.keyframes;
-    ATLAS_RETURN_IF_ERROR(Note(store_.CheckSession(session.key)));
-  }
-  return {};
 }
 
 Status AtlasVerifier::VerifyCompactions() {

@@ -280,9 +280,10 @@ class SqliteStore final : public AtlasStore {
       return Result<StoreCounts>(counts);
     });
   }
-  Result<std::vector<SessionRecord>> ListSessions() override {
+  Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
+                                                  std::uint32_t limit) override {
     return readers_.Run<std::vector<SessionRecord>>(
-        [](Connection& connection) { return ReadSessions(connection); });
+        [&](Connection& connection) { return ReadSessions(connection, after, limit); });
   }
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) override {
     using Found = std::optional<SessionRecord>;

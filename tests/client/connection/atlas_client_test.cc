@@ -143,6 +143,59 @@ TEST(AtlasClientTest, LinkFailureStays) {
   EXPECT_EQ(again.error().code(), StatusCode::kUnavailable);
 }
 
+// Answers requests for sessions with these pages, "vehicle/session" each; all but the last one have
+// more behind them. Notes behind which one each was asked for.
+struct Pages {
+  std::vector<std::vector<SessionKey>> pages;
+  bool has_more_at_last = false;
+  std::vector<SessionKey> asked = {};
+
+  void Serve(PeerSocket& socket) {
+    AnswerHello(socket, {});
+    for (std::size_t i = 0; i < pages.size(); ++i) {
+      const auto request = socket.ReadRequest();
+      if (!request) return;
+      asked.push_back({request->sessions_request().after_vehicle(),
+                       request->sessions_request().after_session()});
+      wire::Envelope reply;
+      wire::SessionsReply& page = *reply.mutable_sessions_reply();
+      for (const SessionKey& key : pages[i]) {
+        wire::SessionInfo& session = *page.add_sessions();
+        session.set_vehicle(key.vehicle);
+        session.set_session(key.session);
+      }
+      page.set_has_more(i + 1 < pages.size() || has_more_at_last);
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+  }
+};
+
+TEST(AtlasClientTest, SessionsAreAllOfTheirPages) {
+  Pages pages{{{{"a", "1"}, {"a", "2"}}, {{"a", "3"}, {"b", "1"}}, {{"b", "2"}}}};
+  {
+    TestPeer peer([&pages](PeerSocket& socket) { pages.Serve(socket); });
+    auto client = AtlasClient::Connect(peer.options());
+    ASSERT_TRUE(client);
+    const auto sessions = client->ListSessions();
+    ASSERT_TRUE(sessions) << sessions.error().message();
+    ASSERT_EQ(sessions->size(), 5U);
+    EXPECT_EQ(sessions->back().key, (SessionKey{"b", "2"}));
+  }
+  EXPECT_EQ(pages.asked, (std::vector<SessionKey>{{}, {"a", "2"}, {"b", "1"}}));
+}
+
+TEST(AtlasClientTest, PagesOfSessionsThatNeverEndAreRefused) {
+  for (Pages pages : {Pages{{{{"a", "1"}}, {{"a", "1"}}, {}}}, Pages{{{{"a", "2"}, {"a", "1"}}}},
+                      Pages{{{{"a", "1"}}, {}}, true}}) {
+    TestPeer peer([&pages](PeerSocket& socket) { pages.Serve(socket); });
+    auto client = AtlasClient::Connect(peer.options());
+    ASSERT_TRUE(client);
+    const auto sessions = client->ListSessions();
+    ASSERT_FALSE(sessions);
+    EXPECT_EQ(sessions.error().code(), StatusCode::kInvalidData);
+  }
+}
+
 void SendTile(PeerSocket& socket, std::uint64_t request_id, const TileId& id) {
   wire::Envelope reply;
   reply.mutable_tile()->set_key(id.Key());

@@ -40,7 +40,7 @@ StoredAtlas ReadStoredAtlas(const std::filesystem::path& data) {
     }
     last = ids.back();
   }
-  for (const SessionRecord& session : ValueOf(store->ListSessions())) {
+  for (const SessionRecord& session : ValueOf(store->ListSessions({}, 1'000'000))) {
     Expect(store->CheckSession(session.key));
     atlas.retracted[session.key] = session.state == SessionState::kRetracted;
   }

@@ -20,7 +20,7 @@ SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
 WATCH = atlas_pb2.Envelope(request_id=3, watch_request=atlas_pb2.WatchRequest(
     area=geometry.disc(1.5, -2, 100), interval_ms=1000))
 HELLO_REPLY = atlas_pb2.Envelope(request_id=1, hello_reply=atlas_pb2.HelloReply(
-    protocol_major=1, protocol_minor=7, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
+    protocol_major=1, protocol_minor=8, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
     max_frame_bytes=MAX_PAYLOAD_BYTES, name="car.7", role="vehicle", last_sequence=11))
 UPLOAD = atlas_pb2.Envelope(request_id=4, upload_keyframe=atlas_pb2.UploadKeyframe(
     key=atlas_pb2.KeyframeKey(vehicle="car.7", session="monday", sequence=12), time_ms=1_790_000_000_000,
@@ -28,13 +28,19 @@ UPLOAD = atlas_pb2.Envelope(request_id=4, upload_keyframe=atlas_pb2.UploadKeyfra
 UPLOADED = atlas_pb2.Envelope(request_id=4, upload_reply=atlas_pb2.UploadReply(revision=42, tiles_marked=9))
 BUSY = atlas_pb2.Envelope(request_id=4, error=atlas_pb2.Error(code=5, message="store: busy", retry=True,
                                                               retry_after_ms=250))
+SESSIONS = atlas_pb2.Envelope(request_id=5, sessions_request=atlas_pb2.SessionsRequest(
+    after_vehicle="car.7", after_session="monday", limit=1))
+PAGE = atlas_pb2.Envelope(request_id=5, sessions_reply=atlas_pb2.SessionsReply(
+    sessions=[atlas_pb2.SessionInfo(vehicle="car.7", session="tuesday", state="live", keyframes=2, bytes=300,
+                                    first_time_ms=1_790_000_000_000, last_time_ms=1_790_000_001_000,
+                                    last_sequence=1)], has_more=True))
 MANIFEST = atlas_pb2.Envelope(request_id=2, sync_manifest=atlas_pb2.SyncManifest(
     keys=[geometry.tile_key(1, 1, 1)], revisions=[42], payload_hashes=[0x0807060504030201], bytes=[3], errors_mm=[200],
     current_tiles=b"\1", not_modified=1))
 TILE = atlas_pb2.Envelope(request_id=2, tile=atlas_pb2.TileMessage(
     key=geometry.tile_key(1, 1, 1), revision=42, payload_hash=0x0807060504030201, blob=b"\xaa\xbb\xcc"))
 END = atlas_pb2.Envelope(request_id=2, sync_end=atlas_pb2.SyncEnd(tiles=1, bytes=116, revision=42))
-ENVELOPES = [HELLO, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, MANIFEST, TILE, END]
+ENVELOPES = [HELLO, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, SESSIONS, PAGE, MANIFEST, TILE, END]
 
 
 def leading_bytes(line):

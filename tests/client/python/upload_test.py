@@ -1,12 +1,14 @@
 #!/usr/bin/python3
 """Uploads, corrections and sessions against a real daemon. Keyframes are encoded from the document alone."""
 
+import pathlib
+import tempfile
 import unittest
 
 import atlas_pb2
 import keyframes
-from roadatlas import Code, geometry
-from support import RADIUS_CELLS, AtlasCase, key, pose_at
+from roadatlas import AtlasClient, Code, geometry
+from support import BIN_DIR, RADIUS_CELLS, SMALL, AtlasCase, Daemon, key, pose_at
 
 RETRACT = atlas_pb2.ChangeSession.RETRACT
 RESTORE = atlas_pb2.ChangeSession.RESTORE
@@ -133,6 +135,30 @@ class CorrectionTest(AtlasCase):
         self.assertEqual((after.sha256, after.tiles), (before.sha256, before.tiles))
         self.assertEqual(self.client.digest(60_000, at_revision=0).tiles, 0)
         self.refused(Code.NOT_FOUND, self.client.change_session, "car", "nobody", RETRACT)
+
+
+class SessionsTest(AtlasCase):
+
+    def test_sessions_of_several_pages(self):
+        uploads = []
+        for i in range(2_400):
+            upload = self.upload(1, 0, f"s{i:05}", radius_cells=8)
+            upload.key.vehicle = f"car{i % 3}"  # each may begin a thousand an hour
+            uploads.append(upload)
+        self.client.upload_keyframes(uploads)
+        names = sorted((upload.key.vehicle, upload.key.session) for upload in uploads)
+        self.assertEqual([(session.vehicle, session.session) for session in self.client.sessions()], names)
+
+    def test_a_vehicle_that_begins_too_many_sessions(self):
+        work = self.enterContext(tempfile.TemporaryDirectory())
+        daemon = self.enterContext(Daemon(BIN_DIR, pathlib.Path(work) / "atlas", *SMALL,
+                                          "--sessions-per-hour-per-vehicle", "2"))
+        host, port = daemon.server.rsplit(":", 1)
+        client = self.enterContext(AtlasClient(host, int(port)))
+        for session in ("a", "b"):
+            client.upload_keyframe(self.upload(0, 0, session))
+        self.refused(Code.UNAVAILABLE, client.upload_keyframe, self.upload(0, 0, "c"), says="2 an hour")
+        client.upload_keyframe(self.upload(1, 8, "b"))
 
 
 if __name__ == "__main__":

@@ -306,6 +306,7 @@ void SyncPeer::Serve(PeerSocket& socket) {
   }
   socket.Reply(hello->request_id(), std::move(greeting));
   while (const auto request = socket.ReadRequest()) {
+    if (AnswerWatch(socket, *request)) continue;
     ++syncs_;
     for (wire::Envelope& frame : Reply(world_, *request)) {
       if (frames_left_-- <= 0) return;
@@ -314,6 +315,52 @@ void SyncPeer::Serve(PeerSocket& socket) {
       if (!Send(socket, frame)) return;
     }
   }
+}
+
+bool SyncPeer::AnswerWatch(PeerSocket& socket, const wire::Envelope& request) {
+  if (!request.has_watch_request() && !request.has_cancel_request()) return false;
+  const std::scoped_lock lock(mutex_);
+  if (request.has_cancel_request()) {
+    wire::Envelope done;
+    done.mutable_cancel_reply();
+    return socket.Reply(request.request_id(), std::move(done));
+  }
+  ++watches_asked_;
+  wire::Envelope reply;
+  if (watches_ == Watches::kTaken) {
+    watcher_ = &socket;
+    watch_id_ = request.request_id();
+    reply.mutable_watch_event()->set_revision(world_.revision());
+  } else {
+    *reply.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "too many watches"});
+  }
+  if (watches_ != Watches::kLeftWaiting) socket.Reply(request.request_id(), std::move(reply));
+  return true;
+}
+
+void SyncPeer::SetWatches(Watches watches) {
+  const std::scoped_lock lock(mutex_);
+  watches_ = watches;
+}
+
+void SyncPeer::TellWatch(wire::Envelope reply) {
+  const std::scoped_lock lock(mutex_);
+  watcher_->Reply(watch_id_, std::move(reply));
+}
+
+void SyncPeer::TellChange(const TileId& id) {
+  wire::Envelope reply;
+  wire::WatchEvent& event = *reply.mutable_watch_event();
+  event.set_revision(world_.revision());
+  event.add_keys(id.Key());
+  event.add_revisions(world_.revision());
+  TellWatch(std::move(reply));
+}
+
+void SyncPeer::EndWatch() {
+  wire::Envelope reply;
+  *reply.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "the daemon stops"});
+  TellWatch(std::move(reply));
 }
 
 bool SyncPeer::Send(PeerSocket& socket, const wire::Envelope& frame) {

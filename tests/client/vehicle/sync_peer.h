@@ -1,5 +1,6 @@
 // A small atlas that changes, and a daemon that answers syncs about it: from the rules of
-// docs/protocol.md, without priorities. Its connections break where a test wants it.
+// docs/protocol.md, without priorities. Its connections break where a test wants it. Watches hear
+// what a test tells.
 #pragma once
 
 #include <atomic>
@@ -67,13 +68,24 @@ class SyncPeer {
   void FallSilentAfter(int frames);
   void Release();
 
+  enum class Watches { kTaken, kRefused, kLeftWaiting };
+  // Those that are asked for from now on.
+  void SetWatches(Watches watches);
+  // To the last one that was taken.
+  void TellChange(const TileId& id);
+  void EndWatch();
+
   ConnectionOptions options() const { return peer_.options(); }
   int syncs() const { return syncs_; }
+  int watches() const { return watches_asked_; }
   int tiles_sent() const { return tiles_sent_; }
 
  private:
   void Serve(PeerSocket& socket);
   bool Send(PeerSocket& socket, const wire::Envelope& frame);
+  // False: the request is another one.
+  bool AnswerWatch(PeerSocket& socket, const wire::Envelope& request);
+  void TellWatch(wire::Envelope reply);
 
   const TinyWorld& world_;
   std::mutex mutex_;
@@ -81,6 +93,10 @@ class SyncPeer {
   bool is_greeting_held_ = false;
   int frames_until_silence_ = kNever;
   int frames_left_;
+  Watches watches_ = Watches::kTaken;
+  PeerSocket* watcher_ = nullptr;  // as long as it is connected
+  std::uint64_t watch_id_ = 0;
+  std::atomic<int> watches_asked_{0};
   std::atomic<int> syncs_{0};
   std::atomic<int> tiles_sent_{0};
   TestPeer peer_;  // last: its thread uses the others

@@ -93,7 +93,7 @@ wire::Envelope HelloReply() {
   wire::Envelope envelope = Of(1);
   wire::HelloReply& reply = *envelope.mutable_hello_reply();
   reply.set_protocol_major(kProtocolMajor);
-  reply.set_protocol_minor(7);
+  reply.set_protocol_minor(kProtocolMinor);
   reply.set_profile("\x01\x02\x03");
   for (char i = 0; i < 16; ++i) {
     reply.mutable_atlas_id()->push_back(i);
@@ -136,6 +136,30 @@ wire::Envelope Busy() {
   return envelope;
 }
 
+wire::Envelope Sessions() {
+  wire::Envelope envelope = Of(5);
+  wire::SessionsRequest& sessions = *envelope.mutable_sessions_request();
+  sessions.set_after_vehicle("car.7");
+  sessions.set_after_session("monday");
+  sessions.set_limit(1);
+  return envelope;
+}
+
+wire::Envelope SessionsReply() {
+  wire::Envelope envelope = Of(5);
+  wire::SessionInfo& session = *envelope.mutable_sessions_reply()->add_sessions();
+  session.set_vehicle("car.7");
+  session.set_session("tuesday");
+  session.set_state("live");
+  session.set_keyframes(2);
+  session.set_bytes(300);
+  session.set_first_time_ms(1'790'000'000'000);
+  session.set_last_time_ms(1'790'000'001'000);
+  session.set_last_sequence(1);
+  envelope.mutable_sessions_reply()->set_has_more(true);
+  return envelope;
+}
+
 wire::Envelope Manifest() {
   wire::Envelope envelope = Of(2);
   wire::SyncManifest& manifest = *envelope.mutable_sync_manifest();
@@ -171,10 +195,10 @@ TEST(DocumentedFramesTest, AreWhatThisBuildWrites) {
   const auto frame = [](const wire::Envelope& envelope) {
     return EncodeEnvelopeFrame(envelope).value();
   };
-  const std::vector<Bytes> written = {frame(Hello()),      frame(Sync()),     frame(Watch()),
-                                      frame(HelloReply()), frame(Upload()),   frame(UploadReply()),
-                                      frame(Busy()),       frame(Manifest()), TileFrame(),
-                                      frame(SyncEnd())};
+  const std::vector<Bytes> written = {
+      frame(Hello()),         frame(Sync()),        frame(Watch()), frame(HelloReply()),
+      frame(Upload()),        frame(UploadReply()), frame(Busy()),  frame(Sessions()),
+      frame(SessionsReply()), frame(Manifest()),    TileFrame(),    frame(SyncEnd())};
   EXPECT_EQ(DocumentedFrames(), written);
 }
 

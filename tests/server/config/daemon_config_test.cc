@@ -248,13 +248,16 @@ TEST_F(DaemonConfigTest, WhatANameMayHaveIsRead) {
   const auto read = Parse({"--config", File("data = '/x'\n[limits]\nconnections_per_name = 7\n"
                                             "held_mib_per_name = 50\nmib_per_s_per_name = 0\n"
                                             "served_mib_per_s_per_name = 3\n"
-                                            "requests_per_s_per_name = 9\n")});
+                                            "requests_per_s_per_name = 9\n"
+                                            "sessions_per_hour_per_vehicle = 0\n")});
   ASSERT_TRUE(read.has_value()) << read.error().message();
   EXPECT_EQ(read->config.name_connections, 7);
   EXPECT_EQ(read->config.name_held_mib, 50);
   EXPECT_EQ(read->config.name_mib_per_s, 0);
   EXPECT_EQ(read->config.name_served_mib_per_s, 3);
   EXPECT_EQ(read->config.name_requests_per_s, 9);
+  EXPECT_EQ(read->config.vehicle_sessions_per_hour, 0);
+  EXPECT_TRUE(IsLiveSetting("limits.sessions_per_hour_per_vehicle"));
   EXPECT_THAT(Refusal({"--data", "/x", "--connections-per-name", "0"}),
               HasSubstr("limits.connections_per_name is '0'"));
   EXPECT_TRUE(IsLiveSetting("limits.connections_per_name"));

@@ -86,7 +86,7 @@ TEST_F(HistoryRequestTest, BadSessionChangesAreTyped) {
   EXPECT_EQ(code(ChangeOf("a/b", wire::ChangeSession::RETRACT)), StatusCode::kInvalidArgument);
   EXPECT_EQ(code(ChangeOf("day", wire::ChangeSession::NONE)), StatusCode::kInvalidArgument);
   EXPECT_EQ(code(ChangeOf("day", static_cast<Action>(7))), StatusCode::kInvalidArgument);
-  EXPECT_EQ(service_->ListSessions()->at(0).state, SessionState::kLive);
+  EXPECT_EQ(service_->ListSessions({}, 1'000)->at(0).state, SessionState::kLive);
 }
 
 TEST_F(HistoryRequestTest, AQueryOfThePastSendsItsTilesWithItsRevision) {

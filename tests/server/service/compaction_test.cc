@@ -87,7 +87,7 @@ TEST_F(CompactionTest, OldPassesGoAndTheAtlasStays) {
     EXPECT_EQ(service_->ReadStatus()->counts.compacted, 3 * kKeyframes);
     EXPECT_EQ(service_->ReadStatus()->counts.keyframe_bytes,
               counts.keyframe_bytes - done->stored.bytes);
-    const auto sessions = service_->ListSessions().value();
+    const auto sessions = service_->ListSessions({}, 1'000).value();
     ASSERT_EQ(sessions.size(), 6u);
     for (std::uint32_t pass = 0; pass < 6; ++pass) {
       EXPECT_EQ(sessions[pass].state, SessionState::kLive);
@@ -182,7 +182,7 @@ TEST_F(CompactionTest, WhatIsNotInTheMapStays) {
   const AtlasDigest all = Digest();
   ASSERT_TRUE(Change(NameOf(0), SessionAction::kRetract).has_value());
   EXPECT_EQ(Compact(kAll_ms)->stored.dropped, 2 * kKeyframes);
-  EXPECT_EQ(service_->ListSessions()->at(0).keyframes, kKeyframes);
+  EXPECT_EQ(service_->ListSessions({}, 1'000)->at(0).keyframes, kKeyframes);
   ASSERT_TRUE(Change(NameOf(0), SessionAction::kRestore).has_value());
   EXPECT_EQ(Digest().sha256, all.sha256);
   EXPECT_EQ(Compact(kAll_ms)->stored.dropped, kKeyframes);

@@ -58,7 +58,7 @@ TEST_F(CompactionTest, WhatIsDroppedIsGoneAndCounted) {
     EXPECT_EQ(counts.keyframes, 1u);
     EXPECT_EQ(counts.keyframe_bytes, 3u);
     EXPECT_EQ(counts.compacted, 2u);
-    const SessionRecord session = store_->ListSessions()->at(0);
+    const SessionRecord session = store_->ListSessions({}, 1'000)->at(0);
     EXPECT_EQ(session.keyframes, 1u);
     EXPECT_EQ(session.bytes, 3u);
     EXPECT_EQ(session.compacted, 2u);
@@ -191,13 +191,13 @@ TEST_F(CompactionTest, WhoAskedBeforeItIsToldEverything) {
 TEST_F(CompactionTest, ASessionThatLostAllGoesOn) {
   OpenWithThree();
   Compact({1, 2, 3}).value();
-  EXPECT_EQ(store_->ListSessions()->at(0).keyframes, 0u);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).keyframes, 0u);
   EXPECT_EQ(store_->ReadCounts()->sessions, 1u);
   EXPECT_TRUE(Put(MakeKeyframe(2, {kA}))->is_duplicate);
   ASSERT_TRUE(Put(MakeKeyframe(4, {kA})).has_value());
-  EXPECT_EQ(store_->ListSessions()->at(0).keyframes, 1u);
-  EXPECT_EQ(store_->ListSessions()->at(0).compacted, 3u);
-  EXPECT_EQ(store_->ListSessions()->at(0).first_time_ms, 1001);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).keyframes, 1u);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).compacted, 3u);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).first_time_ms, 1001);
   EXPECT_EQ(store_->ListKeyframeIds(0, 10).value(), std::vector<std::int64_t>{4});  // no id twice
   EXPECT_TRUE(store_->CheckSession({"bus", "day"}).ok());
   const auto retracted = Await<SessionChangeResult>([&](auto done) {
@@ -223,7 +223,7 @@ TEST_F(CompactionTest, DamageToWhatIsLeftIsFound) {
     Open();
     const std::array<Status, 3> found{
         store_->CheckSession({"bus", "day"}), store_->CheckCompactions(),
-        store_->ListSessions() ? Status() : store_->ListSessions().error()};
+        store_->ListSessions({}, 1'000) ? Status() : store_->ListSessions({}, 1'000).error()};
     EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const Status& status) {
       return status.code() == StatusCode::kInvalidData;
     }));

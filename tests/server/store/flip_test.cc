@@ -155,7 +155,7 @@ class FlipTest : public StoreTest {
           return text;
         });
     answers["sessions"] =
-        Answer(store_->ListSessions(), [](const std::vector<SessionRecord>& sessions) {
+        Answer(store_->ListSessions({}, 1'000), [](const std::vector<SessionRecord>& sessions) {
           std::string text;
           for (const SessionRecord& session : sessions) {
             text += StrCat(session.key, " ", static_cast<int>(session.state), " ",

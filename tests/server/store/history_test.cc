@@ -73,8 +73,8 @@ TEST_F(HistoryTest, RetractingTakesASessionOutAndRestoringPutsItBack) {
   EXPECT_EQ(retracted->revision, 4u);
   EXPECT_EQ(Marked(), (std::set<TileId>{kA, kB}));
   EXPECT_TRUE(store_->GatherTile(kB, 0)->keyframes.empty());
-  EXPECT_EQ(store_->ListSessions()->at(0).state, SessionState::kRetracted);
-  EXPECT_EQ(store_->ListSessions()->at(1).state, SessionState::kLive);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).state, SessionState::kRetracted);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(1).state, SessionState::kLive);
   Open();
   const auto restored = Change(SessionAction::kRestore);
   ASSERT_TRUE(restored.has_value()) << restored.error().message();
@@ -201,8 +201,8 @@ TEST_F(HistoryTest, ARetractedSessionGrowsAndMovesWithoutMarks) {
   EXPECT_EQ(moved->tiles_marked, 0u);
   EXPECT_EQ(moved->batch, 1u);
   EXPECT_EQ(Dirty().dirty_tiles, 0u);
-  EXPECT_EQ(store_->ListSessions()->at(0).keyframes, 2u);
-  EXPECT_EQ(store_->ListSessions()->at(0).state, SessionState::kRetracted);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).keyframes, 2u);
+  EXPECT_EQ(store_->ListSessions({}, 1'000)->at(0).state, SessionState::kRetracted);
   Change(SessionAction::kRestore).value();
   EXPECT_EQ(Marked(), (std::set<TileId>{kB, kC}));
 }

@@ -127,7 +127,7 @@ TEST_F(KeyframeStoreTest, SessionsAndCountsFollowUploads) {
   NewKeyframe other = MakeKeyframe(8, {kB});
   other.key.session.session = "night";
   ASSERT_TRUE(Put(std::move(other)).has_value());
-  const auto sessions = store_->ListSessions().value();
+  const auto sessions = store_->ListSessions({}, 1'000).value();
   ASSERT_EQ(sessions.size(), 2u);
   EXPECT_EQ(sessions[0].keyframes, 2u);
   EXPECT_EQ(sessions[0].bytes, 6u);

@@ -33,7 +33,7 @@ class EarlierStoreTest : public StoreTest,
     EXPECT_TRUE(counted.ok()) << counted.message();
     const Status compacted = store_->CheckCompactions();
     EXPECT_TRUE(compacted.ok()) << compacted.message();
-    const auto sessions = store_->ListSessions();
+    const auto sessions = store_->ListSessions({}, 1'000);
     ASSERT_TRUE(sessions.has_value()) << sessions.error().message();
     EXPECT_GE(sessions->size(), 2u);
     for (const SessionRecord& session : *sessions) {

@@ -55,7 +55,9 @@ class InTurnTest : public StoreTest {
     return Begin<PutKeyframeResult>(
         [&](auto done) { store_->PutKeyframe(std::move(keyframe), std::move(done)); });
   }
-  std::uint32_t last_sequence() const { return store_->ListSessions()->at(0).last_sequence; }
+  std::uint32_t last_sequence() const {
+    return store_->ListSessions({}, 1'000)->at(0).last_sequence;
+  }
 
   std::shared_ptr<MissingUploads> missing_ = std::make_shared<MissingUploads>();
 };

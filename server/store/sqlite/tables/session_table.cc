@@ -54,6 +54,25 @@ Result<SessionRow> ReadRow(Query& row) {
   return result;
 }
 
+// Of a damaged index they may come in another order, in which who goes on behind the last one goes
+// round in circles.
+Result<std::vector<SessionRow>> ReadPage(Query& row, const SessionKey& after) {
+  std::vector<SessionRow> sessions;
+  while (row.Step()) {
+    auto session = ReadRow(row);
+    if (!session) {
+      return Error(session.error());
+    }
+    if (session->record.key <= (sessions.empty() ? after : sessions.back().record.key)) {
+      return Error(StatusCode::kInvalidData,
+                   StrCat("store: the index of sessions is damaged at session ", session->id, " (",
+                          session->record.key, ")"));
+    }
+    sessions.push_back(std::move(*session));
+  }
+  return sessions;
+}
+
 std::int64_t ReadChecksum(Connection& connection, std::int64_t id) {
   Query row = connection.Prepare("SELECT checksum FROM sessions WHERE id = ?");
   row.Bind(id);
@@ -103,18 +122,33 @@ Result<std::optional<SessionRow>> FindSession(Connection& connection, const Sess
   return std::move(*session);
 }
 
-Result<std::vector<SessionRow>> FindSessions(Connection& connection, const std::string& vehicle) {
+Result<std::vector<SessionRow>> ReadVehicleSessions(Connection& connection,
+                                                    const SessionKey& after,
+                                                    std::uint32_t limit) {
   Query row = connection.Prepare(
       "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? ORDER BY session");
-  row.Bind(std::string_view(vehicle));
-  std::vector<SessionRow> sessions;
-  while (row.Step()) {
-    auto session = ReadRow(row);
-    if (!session) {
-      return Error(session.error());
-    }
-    sessions.push_back(std::move(*session));
+      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? AND session > ? "
+      "ORDER BY session LIMIT ?");
+  row.Bind(std::string_view(after.vehicle)).Bind(std::string_view(after.session)).Bind(limit);
+  return ReadPage(row, after);
+}
+
+Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
+                                                const SessionKey& after,
+                                                std::uint32_t limit) {
+  Query row = connection.Prepare(
+      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
+      "last_sequence, compacted, checksum FROM sessions WHERE (vehicle, session) > (?, ?) "
+      "ORDER BY vehicle, session LIMIT ?");
+  row.Bind(std::string_view(after.vehicle)).Bind(std::string_view(after.session)).Bind(limit);
+  auto page = ReadPage(row, after);
+  if (!page) {
+    return Error(page.error());
+  }
+  std::vector<SessionRecord> sessions;
+  sessions.reserve(page->size());
+  for (SessionRow& session : *page) {
+    sessions.push_back(std::move(session.record));
   }
   return sessions;
 }
@@ -128,21 +162,6 @@ Result<SessionRow> ReadSession(Connection& connection, std::int64_t id) {
     return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", id, " is missing"));
   }
   return ReadRow(row);
-}
-
-Result<std::vector<SessionRecord>> ReadSessions(Connection& connection) {
-  Query row = connection.Prepare(
-      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions ORDER BY vehicle, session");
-  std::vector<SessionRecord> sessions;
-  while (row.Step()) {
-    auto session = ReadRow(row);
-    if (!session) {
-      return Error(session.error());
-    }
-    sessions.push_back(std::move(session->record));
-  }
-  return sessions;
 }
 
 Status CheckSessionHistory(Connection& connection, const SessionKey& key) {
@@ -252,14 +271,7 @@ int RecountSessions(Connection& connection) {
   return changed;
 }
 
-Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key) {
-  auto found = FindSession(connection, key);
-  if (!found) {
-    return Error(found.error());
-  }
-  if (*found) {
-    return std::move(**found);
-  }
+SessionRow AddSession(Connection& connection, const SessionKey& key) {
   SessionRow row;
   row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));
   row.record.key = key;

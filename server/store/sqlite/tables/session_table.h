@@ -17,10 +17,15 @@ struct SessionRow {
 
 // nullopt: unknown. kInvalidData: its row is damaged.
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
-// All of a vehicle. kInvalidData: a row is damaged.
-Result<std::vector<SessionRow>> FindSessions(Connection& connection, const std::string& vehicle);
+// Up to `limit` of those behind `after`, by vehicle and session; the first one of its vehicle
+// alone. kInvalidData: a row is damaged, or their index.
+Result<std::vector<SessionRow>> ReadVehicleSessions(Connection& connection,
+                                                    const SessionKey& after,
+                                                    std::uint32_t limit);
+Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
+                                                const SessionKey& after,
+                                                std::uint32_t limit);
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
-Result<std::vector<SessionRecord>> ReadSessions(Connection& connection);
 // kInvalidData when its row, a line of its history or a tombstone of its keyframes is damaged.
 Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 
@@ -34,8 +39,8 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
 // Counts what is stored of each. How many counted something else.
 int RecountSessions(Connection& connection);
 
-// The live session `key`, made if it is new.
-Result<SessionRow> FindOrAddSession(Connection& connection, const SessionKey& key);
+// A new live one.
+SessionRow AddSession(Connection& connection, const SessionKey& key);
 void WriteSession(Connection& connection, const SessionRow& row);
 // Counts one more keyframe in.
 void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);

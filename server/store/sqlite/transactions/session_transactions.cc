@@ -12,6 +12,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::uint32_t kPage = 256;  // sessions read at a time
+
 Result<SessionState> StateAfter(Connection& connection,
                                 const SessionRow& session,
                                 SessionAction action) {
@@ -68,27 +70,33 @@ Result<SessionChangeResult> ChangeOne(Connection& connection,
 }
 
 Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionChange& change) {
-  const auto sessions = FindSessions(connection, change.key.vehicle);
-  if (!sessions) {
-    return Error(sessions.error());
+  SessionChangeResult all;
+  SessionChange one = change;
+  one.key.session.clear();
+  while (true) {
+    const auto sessions = ReadVehicleSessions(connection, one.key, kPage);
+    if (!sessions) {
+      return Error(sessions.error());
+    }
+    if (sessions->empty()) {
+      break;
+    }
+    for (const SessionRow& session : *sessions) {
+      one.key = session.record.key;
+      const auto result = ChangeOne(connection, session, one);
+      if (!result) {
+        return result;
+      }
+      all.state = result->state;
+      all.is_changed = all.is_changed || result->is_changed;
+      all.tiles_marked += result->tiles_marked;
+      all.revision = result->revision;
+      all.sessions += result->sessions;
+    }
   }
-  if (sessions->empty()) {
+  if (one.key.session.empty()) {
     return Error(StatusCode::kNotFound,
                  StrCat("vehicle ", change.key.vehicle, " is not in the atlas"));
-  }
-  SessionChangeResult all;
-  for (const SessionRow& session : *sessions) {
-    SessionChange one = change;
-    one.key = session.record.key;
-    const auto result = ChangeOne(connection, session, one);
-    if (!result) {
-      return result;
-    }
-    all.state = result->state;
-    all.is_changed = all.is_changed || result->is_changed;
-    all.tiles_marked += result->tiles_marked;
-    all.revision = result->revision;
-    all.sessions += result->sessions;
   }
   return all;
 }

@@ -135,6 +135,24 @@ std::set<TileId> AllTiles(Connection& connection, std::uint8_t levels) {
   return tiles;
 }
 
+Result<SessionRow> FindOrBeginSession(Connection& connection, const NewKeyframe& keyframe) {
+  const SessionKey& key = keyframe.key.session;
+  auto found = FindSession(connection, key);
+  if (!found) {
+    return Error(found.error());
+  }
+  if (*found) {
+    return std::move(**found);
+  }
+  if (keyframe.starts != nullptr) {
+    Status status = keyframe.starts->Begin(key.vehicle, SessionStarts::Clock::now());
+    if (!status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  return AddSession(connection, key);
+}
+
 Status CheckKeysDiffer(const PoseBatch& batch) {
   std::set<KeyframeKey> seen;
   for (const NewPose& update : batch.poses) {
@@ -149,7 +167,7 @@ Status CheckKeysDiffer(const PoseBatch& batch) {
 }  // namespace
 
 Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKeyframe& keyframe) {
-  const auto session = FindOrAddSession(connection, keyframe.key.session);
+  const auto session = FindOrBeginSession(connection, keyframe);
   if (!session) {
     return Error(session.error());
   }

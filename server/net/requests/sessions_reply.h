@@ -1,0 +1,21 @@
+// The reply to a request for sessions: a page of them (docs/protocol.md).
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+
+#include "proto/wire/envelope.h"
+#include "server/net/requests/peer.h"
+#include "server/net/requests/request_context.h"
+
+namespace atlas {
+
+// Of a page, however much is asked for.
+inline constexpr std::uint32_t kMaxSessionsOfPage = 2'000;
+
+// Sends the page, as large as there is room for replies, or returns an error for the peer:
+// kInvalidArgument on names that are none. All arguments outlive the call.
+boost::asio::awaitable<Status> AnswerSessions(RequestContext& context,
+                                              const wire::Envelope& request,
+                                              Peer& peer);
+
+}  // namespace atlas

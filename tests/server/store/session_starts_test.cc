@@ -1,0 +1,155 @@
+// A vehicle begins an hour's worth of sessions at once, and then as many an hour.
+#include "server/store/session_starts.h"
+
+#include "tests/server/store/store_fixture.h"
+
+namespace atlas {
+namespace {
+
+using std::chrono::minutes;
+using std::chrono::seconds;
+
+constexpr SessionStarts::Clock::time_point kStart{};
+
+TEST(SessionStartsTest, AnHoursWorthMayBeginAtOnceAndThenAsManyAnHour) {
+  SessionStarts starts(6);
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_TRUE(starts.Begin("bus", kStart + seconds(i)).ok()) << i;
+  }
+  const Status refused = starts.Begin("bus", kStart + minutes(5));
+  EXPECT_EQ(refused.code(), StatusCode::kUnavailable);
+  EXPECT_NE(refused.message().find("vehicle bus"), std::string::npos);
+  EXPECT_NE(refused.message().find("in 300 s"), std::string::npos) << refused.message();
+  EXPECT_TRUE(starts.Begin("tram", kStart + minutes(5)).ok()) << "every vehicle for itself";
+  EXPECT_TRUE(starts.Begin("bus", kStart + minutes(10)).ok());
+  EXPECT_FALSE(starts.Begin("bus", kStart + minutes(10)).ok());
+  int begun = 0;
+  for (minutes passed{11}; passed <= minutes(130); ++passed) {
+    begun += starts.Begin("bus", kStart + passed).ok() ? 1 : 0;
+  }
+  EXPECT_EQ(begun, 12) << "in two hours";
+}
+
+TEST(SessionStartsTest, TheLimitChangesAndZeroIsNone) {
+  SessionStarts starts(1);
+  EXPECT_TRUE(starts.Begin("bus", kStart).ok());
+  EXPECT_FALSE(starts.Begin("bus", kStart).ok());
+  starts.set_per_hour(0);
+  EXPECT_TRUE(starts.Begin("bus", kStart).ok());
+  starts.set_per_hour(2);
+  EXPECT_FALSE(starts.Begin("bus", kStart).ok()) << "what was begun stays counted";
+  EXPECT_TRUE(starts.Begin("bus", kStart + minutes(30)).ok());
+}
+
+TEST(SessionStartsTest, IsBounded) {
+  SessionStarts starts(1'000);
+  for (std::size_t i = 0; i < 3 * SessionStarts::kMaxVehicles; ++i) {
+    ASSERT_TRUE(starts.Begin("bus-" + std::to_string(i), kStart).ok());
+    ASSERT_LE(starts.vehicles(), SessionStarts::kMaxVehicles);
+  }
+}
+
+// With those that count no more, no other is forgotten.
+TEST(SessionStartsTest, ForgetsWhoIsRestedFirst) {
+  SessionStarts starts(1);
+  for (std::size_t i = 0; i < SessionStarts::kMaxVehicles - 1; ++i) {
+    ASSERT_TRUE(starts.Begin("bus-" + std::to_string(i), kStart).ok());
+  }
+  ASSERT_TRUE(starts.Begin("late", kStart + minutes(30)).ok());
+  ASSERT_TRUE(starts.Begin("another", kStart + minutes(61)).ok());
+  EXPECT_EQ(starts.vehicles(), 2u);
+  EXPECT_FALSE(starts.Begin("late", kStart + minutes(61)).ok());
+}
+
+class SessionsStoreTest : public StoreTest {
+ protected:
+  Result<PutKeyframeResult> PutInto(const SessionKey& session, std::uint32_t sequence = 1) {
+    NewKeyframe keyframe = MakeKeyframe(sequence, {{0, 1, 2}});
+    keyframe.key.session = session;
+    keyframe.starts = starts_;
+    return Put(std::move(keyframe));
+  }
+  // "vehicle/session", page by page.
+  std::vector<std::string> PagesOf(std::uint32_t limit) {
+    std::vector<std::string> names;
+    SessionKey after;
+    while (true) {
+      const auto page = store_->ListSessions(after, limit);
+      EXPECT_TRUE(page.has_value()) << page.error().message();
+      if (!page || page->empty()) {
+        return names;
+      }
+      EXPECT_LE(page->size(), limit);
+      for (const SessionRecord& session : *page) {
+        names.push_back(session.key.vehicle + "/" + session.key.session);
+      }
+      after = page->back().key;
+    }
+  }
+
+  std::shared_ptr<SessionStarts> starts_ = std::make_shared<SessionStarts>(2);
+};
+
+TEST_F(SessionsStoreTest, OneThatMayNotBeginLeavesNothing) {
+  Open();
+  ASSERT_TRUE(PutInto({"bus", "a"}));
+  ASSERT_TRUE(PutInto({"bus", "b"}));
+  const auto refused = PutInto({"bus", "c"});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(store_->ReadCounts()->sessions, 2u);
+  EXPECT_EQ(PagesOf(10), (std::vector<std::string>{"bus/a", "bus/b"}));
+  EXPECT_TRUE(PutInto({"bus", "a"}, 2)) << "one that is there goes on";
+  EXPECT_TRUE(PutInto({"tram", "c"}));
+  EXPECT_EQ(store_->ReadCounts()->sessions, 3u);
+}
+
+TEST_F(SessionsStoreTest, PagesAreInOrderWhateverTheirSize) {
+  starts_ = nullptr;
+  Open();
+  const std::vector<SessionKey> keys = {{"b", "2"}, {"a", "9"}, {"b", "10"}, {"ab", "1"},
+                                        {"a", "1"}, {"B", "z"}, {"b", "1"}};
+  for (const SessionKey& key : keys) {
+    ASSERT_TRUE(PutInto(key));
+  }
+  const std::vector<std::string> all = {"B/z", "a/1", "a/9", "ab/1", "b/1", "b/10", "b/2"};
+  for (const std::uint32_t limit : {1u, 2u, 3u, 7u, 8u}) {
+    EXPECT_EQ(PagesOf(limit), all) << limit;
+  }
+  // Behind one that is not there.
+  EXPECT_EQ(store_->ListSessions({"a", "5"}, 1)->at(0).key, (SessionKey{"a", "9"}));
+  EXPECT_EQ(store_->ListSessions({"aa", ""}, 1)->at(0).key, (SessionKey{"ab", "1"}));
+  EXPECT_TRUE(store_->ListSessions({"c", ""}, 1)->empty());
+}
+
+// Whoever goes on behind the last one of a page would go round in circles.
+TEST_F(SessionsStoreTest, AnIndexInAnotherOrderIsDamage) {
+  Open();
+  starts_ = nullptr;
+  for (const char* const session : {"a", "b", "c", "d"}) {
+    ASSERT_TRUE(PutInto({"bus", session}));
+  }
+  Tamper(
+      "CREATE TABLE other (id INTEGER PRIMARY KEY, vehicle TEXT, session TEXT, "
+      "UNIQUE (vehicle, session DESC));"
+      "INSERT INTO other SELECT id, vehicle, session FROM sessions;"
+      "PRAGMA writable_schema = ON;"
+      "UPDATE sqlite_schema SET rootpage = "
+      "(SELECT sum(rootpage) FROM sqlite_schema WHERE name IN "
+      "('sqlite_autoindex_sessions_1', 'sqlite_autoindex_other_1')) - rootpage "
+      "WHERE name IN ('sqlite_autoindex_sessions_1', 'sqlite_autoindex_other_1');");
+  Open();
+  const auto page = store_->ListSessions({}, 3);
+  ASSERT_FALSE(page);
+  EXPECT_EQ(page.error().code(), StatusCode::kInvalidData);
+  EXPECT_NE(page.error().message().find("index of sessions"), std::string::npos)
+      << page.error().message();
+  const auto changed = Await<SessionChangeResult>([&](auto done) {
+    store_->ChangeSession({{"bus", ""}, SessionAction::kRetract, "tester", ""}, std::move(done));
+  });
+  ASSERT_FALSE(changed);
+  EXPECT_EQ(changed.error().code(), StatusCode::kInvalidData);
+}
+
+}  // namespace
+}  // namespace atlas
