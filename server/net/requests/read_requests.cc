@@ -1,5 +1,7 @@
 #include "server/net/requests/read_requests.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -16,6 +18,9 @@ namespace {
 namespace asio = boost::asio;
 
 constexpr std::uint32_t kMaxEvents = 1'000;  // of a reply
+// As much as one takes: a retraction with the longest names and reason.
+constexpr std::size_t kEventBytes = 512;
+static_assert(kMaxEvents * kEventBytes <= kReplyBatchBytes);
 
 // Fusing is long work: it has places and threads of its own, and ends when the peer leaves.
 asio::awaitable<Status> QueryThePast(RequestContext& context,
@@ -71,14 +76,17 @@ asio::awaitable<Status> AnswerLog(RequestContext& context,
                                   Peer& peer) {
   TurnOrder::Turn turn(peer.streams);
   co_await turn.Come();
-  const bool is_open = co_await peer.out.WaitForRoom();
-  if (!is_open) {
+  const wire::LogRequest& message = request.log_request();
+  const std::uint32_t wanted =
+      message.limit() == 0 ? kMaxEvents : std::min(message.limit(), kMaxEvents);
+  const ReplyWriter::Room room = co_await peer.out.TakeRoom(wanted * kEventBytes);
+  if (!room) {
     co_return Status();
   }
-  const wire::LogRequest& message = request.log_request();
-  const std::uint32_t limit = message.limit() == 0 ? kMaxEvents : message.limit();
+  const auto limit =
+      static_cast<std::uint32_t>(std::max<std::size_t>(1, room.bytes() / kEventBytes));
   const Blocking<std::vector<Event>> list = [&context, &message, limit] {
-    return context.service.ListEvents(message.after_id(), std::min(limit, kMaxEvents));
+    return context.service.ListEvents(message.after_id(), limit);
   };
   const Result<std::vector<Event>> events = co_await OnPool(context.pool, list);
   co_return co_await Answer(request, events, &wire::Envelope::mutable_log_reply, EventsToWire,

@@ -106,6 +106,8 @@ TEST(AtlasWatchTest, WhatComesDuringOtherRequestsIsKeptAsOne) {
     }
     socket.Reply(id, Event(11, 4, 11));
     socket.Reply(id, Event(12, 4, 0));
+    socket.Reply(id, Event(13, 5, 0));
+    socket.Reply(id, Event(14, 5, 14));
     AnswerStatus(socket);
     socket.Drain();
   });
@@ -118,8 +120,9 @@ TEST(AtlasWatchTest, WhatComesDuringOtherRequestsIsKeptAsOne) {
   EXPECT_EQ(status->tiles, 42U);
   const auto changes = watch->Next(milliseconds(0));
   ASSERT_TRUE(changes && *changes);
-  EXPECT_EQ((*changes)->revision, 12U);
-  EXPECT_EQ((*changes)->changed, (std::map<TileId, std::uint64_t>{{{1, 3, 0}, 10}}));
+  EXPECT_EQ((*changes)->revision, 14U);
+  EXPECT_EQ((*changes)->changed,
+            (std::map<TileId, std::uint64_t>{{{1, 3, 0}, 10}, {{1, 5, 0}, 14}}));
   EXPECT_EQ((*changes)->removed, (std::set<TileId>{{1, 4, 0}}));
 }
 

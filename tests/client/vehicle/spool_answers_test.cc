@@ -203,12 +203,13 @@ TEST(SpoolAnswersTest, ADaemonThatWantsToBeLeftAloneIs) {
   const TestFolder folder;
   UploadSpool spool = OpenSpool(folder);
   ASSERT_TRUE(PutOne(spool, 0).ok());
+  ASSERT_TRUE(PutOne(spool, 1).ok());
   int requests = 0;
   {
     TestPeer full([&requests](PeerSocket& socket) {
       AnswerHello(socket, {});
       while (const auto request = socket.ReadRequest()) {
-        ++requests;
+        if (++requests == 2) continue;  // not answered yet
         wire::Envelope reply;
         *reply.mutable_error() = ErrorToWire({StatusCode::kResourceExhausted, "a full disk"});
         reply.mutable_error()->set_retry_after_ms(60'000);
@@ -217,14 +218,31 @@ TEST(SpoolAnswersTest, ADaemonThatWantsToBeLeftAloneIs) {
     });
     auto client = AtlasClient::Connect(full.options());
     ASSERT_TRUE(client) << client.error().message();
-    EXPECT_EQ(spool.Send(*client).error().code(), StatusCode::kResourceExhausted);
+    const auto first = spool.Send(*client, {.deadline = std::chrono::milliseconds(300)});
+    EXPECT_EQ(first.error().code(), StatusCode::kResourceExhausted);
     const auto again = spool.Send(*client);
     ASSERT_TRUE(again) << again.error().message();
     EXPECT_GT(again->retry_after, std::chrono::milliseconds(0));
     EXPECT_EQ(again->acknowledged, 0U);
+    EXPECT_EQ(again->waiting, 2U);
+    EXPECT_EQ(again->in_flight, 1U);
   }
-  EXPECT_EQ(requests, 1);
-  EXPECT_EQ(spool.waiting(), 1U);
+  EXPECT_EQ(requests, 2);
+  EXPECT_EQ(spool.waiting(), 2U);
+}
+
+TEST(SpoolAnswersTest, BehindARefusalNothingMoreIsSent) {
+  const TestFolder folder;
+  SpoolOptions options;
+  options.folder = folder.path();
+  options.upload.max_in_flight = 4;
+  UploadSpool spool = *UploadSpool::Open(options);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  UploadPeer peer({{0, {StatusCode::kUnavailable, "busy"}}});
+  EXPECT_EQ(peer.Take(spool).error().code(), StatusCode::kUnavailable);
+  EXPECT_LE(peer.came().size(), 8U) << "what was on its way";
 }
 
 }  // namespace

@@ -37,6 +37,11 @@ class GatedPeer {
     is_asleep_ = is_asleep;
     changed_.notify_all();
   }
+  // Once, and at once: the next upload is not for this client.
+  void RefuseNext() {
+    const std::lock_guard lock(mutex_);
+    refuses_ = true;
+  }
   std::vector<std::uint32_t> came() {
     const std::lock_guard lock(mutex_);
     return came_;
@@ -56,9 +61,12 @@ class GatedPeer {
       if (request->has_upload_keyframe()) {
         came_.push_back(request->upload_keyframe().key().sequence());
       }
-      changed_.wait(lock, [this] { return is_open_; });
+      const bool is_refused = std::exchange(refuses_, false);
+      changed_.wait(lock, [&] { return is_open_ || is_refused; });
       wire::Envelope reply;
-      if (request->has_status_request()) {
+      if (is_refused) {
+        *reply.mutable_error() = ErrorToWire({StatusCode::kPermissionDenied, "not you"});
+      } else if (request->has_status_request()) {
         reply.mutable_status_reply();
       } else {
         reply.mutable_upload_reply()->set_revision(1);
@@ -71,6 +79,7 @@ class GatedPeer {
   std::condition_variable changed_;
   bool is_open_ = true;
   bool is_asleep_ = false;
+  bool refuses_ = false;
   std::vector<std::uint32_t> came_;
   TestPeer peer_;
 };
@@ -150,6 +159,15 @@ TEST_F(SpoolLimitsTest, ABudgetEndsACallAndTheNextGoesOn) {
   EXPECT_EQ(peer_.came(), UpTo(10));
 }
 
+TEST_F(SpoolLimitsTest, ACallWithoutTimeSendsNothing) {
+  Put(3);
+  AtlasClient client = peer_.Connect();
+  const SpoolReport report = Send(client, {.deadline = milliseconds(0)});
+  EXPECT_EQ(report.sent, 0U);
+  EXPECT_EQ(report.waiting, 3U);
+  EXPECT_EQ(Send(client).acknowledged, 3U);
+}
+
 TEST_F(SpoolLimitsTest, OnAnotherConnectionWhatWasNotAnsweredIsSentAgain) {
   Put(3);
   {
@@ -162,6 +180,22 @@ TEST_F(SpoolLimitsTest, OnAnotherConnectionWhatWasNotAnsweredIsSentAgain) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->acknowledged, 3U);
   EXPECT_EQ(other.came(), UpTo(3));
+}
+
+// The answers to what was on its way come first, then what was refused is sent again.
+TEST_F(SpoolLimitsTest, ARoundThatARefusalEndedEndsInTheNextCallWhichBeginsAnother) {
+  Put(3);
+  AtlasClient client = peer_.Connect();
+  peer_.RefuseNext();
+  peer_.Set(false, false);
+  const auto refused = spool_.Send(client, {.deadline = kDeadline});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code(), StatusCode::kPermissionDenied);
+  peer_.Set(true, false);
+  const SpoolReport report = Send(client, {});
+  EXPECT_EQ(report.acknowledged, 3U);
+  EXPECT_EQ(report.waiting, 0U);
+  EXPECT_EQ(peer_.came().size(), 4U) << "each once, the first one twice";
 }
 
 TEST_F(SpoolLimitsTest, AnotherRequestMeanwhileLosesNoAnswer) {

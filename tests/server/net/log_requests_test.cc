@@ -42,6 +42,45 @@ TEST_F(LogRequestTest, EventsComeInOrderAndInPages) {
   EXPECT_EQ(peer->Receive()->log_reply().events_size(), 0);
 }
 
+TEST_F(LogRequestTest, EventsThatNobodyReadsStayWithinWhatAllMayQueue) {
+  constexpr std::size_t kPeers = 20;
+  constexpr std::uint64_t kEvents = 700;  // 100 KB and more
+  net_.max_all_queued_bytes = 256u << 10;
+  Serve(0);
+  ASSERT_TRUE(Upload(DriveUpload(0)));
+  const std::string reason(256, 'r');
+  for (std::uint64_t i = 0; i < kEvents; ++i) {
+    const auto action = i % 2 == 0 ? SessionAction::kRetract : SessionAction::kRestore;
+    service_->ChangeSession({{"bus", "day"}, action, "tester", reason}, [](const auto& changed) {
+      EXPECT_TRUE(changed.has_value()) << changed.error().message();
+    });
+  }
+  service_->Flush();
+  std::vector<std::unique_ptr<BlockingPeer>> peers;
+  for (std::size_t i = 0; i < kPeers; ++i) {
+    peers.push_back(Connect(4'096));
+    for (int request = 0; request < 64; ++request) {
+      peers.back()->Send(LogOf(0));
+    }
+  }
+  const std::uint64_t most = WaitUntilAtRest().most;
+  EXPECT_GT(most, net_.max_all_queued_bytes / 2);
+  EXPECT_LE(most, net_.max_all_queued_bytes + kPeers * 512);
+  // Who reads gets them all.
+  const auto good = Connect();
+  std::uint64_t told = 0;
+  while (true) {
+    good->Send(LogOf(told));
+    const auto reply = good->Receive();
+    ASSERT_TRUE(reply && reply->has_log_reply());
+    if (reply->log_reply().events().empty()) {
+      break;
+    }
+    told = reply->log_reply().events().rbegin()->id();
+  }
+  EXPECT_EQ(told, kEvents);
+}
+
 // Whoever is known by a name cannot take another's.
 TEST_F(TlsTest, TheLogNamesWhoeverIsKnown) {
   ServeTls("admin");

@@ -1,6 +1,7 @@
 // A served atlas on a free port of loopback, and the requests that tests send to it.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -68,6 +69,24 @@ class NetTest : public ServiceTest {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     EXPECT_EQ(server_->ReadFigures().held_bytes, bytes);
+  }
+  // What was queued until nothing changes any more, and is then.
+  struct Queued {
+    std::uint64_t most = 0;
+    std::uint64_t at_rest = 0;
+  };
+  Queued WaitUntilAtRest() const {
+    std::uint64_t most = 0;
+    NetFigures last;
+    for (int unchanged = 0; unchanged < 50;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      const NetFigures now = server_->ReadFigures();
+      most = std::max(most, now.queued_bytes);
+      unchanged =
+          now.sent_bytes == last.sent_bytes && now.in_flight == last.in_flight ? unchanged + 1 : 0;
+      last = now;
+    }
+    return {most, last.queued_bytes};
   }
   // `count` queries, padded with a field that the daemon does not know: few of them fill a socket.
   static Bytes PaddedQueries(std::uint64_t count) {

@@ -133,15 +133,7 @@ TEST_F(SessionsTest, PagesThatNobodyReadsStayWithinWhatAllMayQueue) {
     peers.push_back(Connect(4'096));
     peers.back()->SendBytes(requests);
   }
-  std::uint64_t most = 0;
-  NetFigures last;
-  for (int unchanged = 0; unchanged < 50;) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    const NetFigures now = server_->ReadFigures();
-    most = std::max(most, now.queued_bytes);
-    unchanged = now.sent_bytes == last.sent_bytes ? unchanged + 1 : 0;
-    last = now;
-  }
+  const std::uint64_t most = WaitUntilAtRest().most;
   EXPECT_GT(most, net_.max_all_queued_bytes / 2);
   EXPECT_LE(most, net_.max_all_queued_bytes + kPeers * 512);
   // Who reads gets them all, in smaller pages.

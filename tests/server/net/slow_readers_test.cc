@@ -71,24 +71,6 @@ class SlowReadersTest : public NetTest {
     }
     return bytes;
   }
-  // What was queued until nothing changes any more, and is then.
-  struct Queued {
-    std::uint64_t most = 0;
-    std::uint64_t at_rest = 0;
-  };
-  Queued WaitUntilAtRest() const {
-    std::uint64_t most = 0;
-    NetFigures last;
-    for (int unchanged = 0; unchanged < 50;) {
-      std::this_thread::sleep_for(milliseconds(10));
-      const NetFigures now = server_->ReadFigures();
-      most = std::max(most, now.queued_bytes);
-      unchanged =
-          now.sent_bytes == last.sent_bytes && now.in_flight == last.in_flight ? unchanged + 1 : 0;
-      last = now;
-    }
-    return {most, last.queued_bytes};
-  }
 };
 
 TEST_F(SlowReadersTest, OneQueuesNoMoreThanItMay) {

@@ -122,6 +122,34 @@ TEST_F(SessionsStoreTest, PagesAreInOrderWhateverTheirSize) {
   EXPECT_TRUE(store_->ListSessions({"c", ""}, 1)->empty());
 }
 
+// More than are read at a time.
+TEST_F(SessionsStoreTest, AVehicleOfManySessionsChangesAsOne) {
+  Open();
+  starts_ = nullptr;
+  constexpr std::uint32_t kMany = 600;
+  for (std::uint32_t i = 0; i < kMany; ++i) {
+    NewKeyframe keyframe = MakeKeyframe(1, {{0, 1, 2}});
+    keyframe.key.session = {"bus", std::to_string(i)};
+    store_->PutKeyframe(std::move(keyframe), [](const Result<PutKeyframeResult>& put) {
+      EXPECT_TRUE(put) << put.error().message();
+    });
+  }
+  ASSERT_TRUE(PutInto({"tram", "1"}));
+  const auto changed = Await<SessionChangeResult>([&](auto done) {
+    store_->ChangeSession({{"bus", ""}, SessionAction::kRetract, "tester", ""}, std::move(done));
+  });
+  ASSERT_TRUE(changed) << changed.error().message();
+  EXPECT_EQ(changed->sessions, kMany);
+  EXPECT_EQ(changed->tiles_marked, kMany);
+  const auto sessions = store_->ListSessions({}, 2 * kMany);
+  std::uint32_t retracted = 0;
+  for (const SessionRecord& session : *sessions) {
+    retracted += session.state == SessionState::kRetracted ? 1u : 0u;
+  }
+  EXPECT_EQ(retracted, kMany);
+  EXPECT_EQ(sessions->size(), kMany + 1);
+}
+
 // Whoever goes on behind the last one of a page would go round in circles.
 TEST_F(SessionsStoreTest, AnIndexInAnotherOrderIsDamage) {
   Open();
