@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/status.h"
+#include "server/service/backup/backup_keeper.h"
 #include "server/service/change_signal.h"
 #include "server/service/fusion/fusion_scheduler.h"
 #include "server/service/fusion_wait.h"
@@ -49,6 +50,7 @@ struct ServiceStatus {
 struct ServiceOptions {
   FusionOptions fusion;
   ScrubOptions scrub;
+  BackupOptions backup;
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
@@ -120,6 +122,11 @@ class AtlasService {
   Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience) {
     return whole_.Compact(request, patience);
   }
+  // backup_keeper.h; `patience` bounds all of it, kTimeout, kUnavailable.
+  Result<AtlasFacts> Backup(const BackupRequest& request,
+                            const Patience& patience,
+                            const std::function<void(const BackupProgress&)>& on_progress);
+  Result<std::vector<StoredBackup>> ListBackups() const { return backups_.List(); }
   // Of the atlas as of an earlier revision, fused again; kTimeout if that takes longer.
   Result<AtlasDigest> DigestAt(std::uint64_t revision, const Patience& patience);
 
@@ -148,6 +155,7 @@ class AtlasService {
   WholeAtlas whole_;
   PastAtlas past_;
   Scrubber scrubber_;
+  BackupKeeper backups_;
 };
 
 }  // namespace atlas

@@ -57,7 +57,7 @@ Status CheckTarget(const RestoreOrder& order) {
   if (is_there && !order.replaces) {
     return {StatusCode::kConflict,
             StrCat("there is an atlas already, ", order.target.string(),
-                   ": only if it is to be replaced it is, and kept under another name")};
+                   ": it is replaced on demand alone (--replace), and kept under another name")};
   }
   return {};
 }
