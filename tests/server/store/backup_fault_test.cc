@@ -14,6 +14,7 @@ class BackupFaultTest : public BackupTest {
  protected:
   BackupFaultTest() {
     Fill(5, 3'000);
+    store_.reset();
     rows_ = RowsOf(Database());
   }
   ~BackupFaultTest() override { store_.reset(); }  // before the layer that it was opened with goes

@@ -85,7 +85,7 @@ class BackupTest : public StoreTest {
     return names;
   }
 
-  // Every row of what a restore leaves as it is, by table.
+  // Every row of what a restore leaves as it is, by table. Nobody has the database open.
   static std::map<std::string, std::string> RowsOf(const std::filesystem::path& database) {
     constexpr std::array kTables = {"sessions",       "keyframes",    "poses",
                                     "pose_history",   "pose_batches", "tiles",
@@ -93,7 +93,9 @@ class BackupTest : public StoreTest {
                                     "compactions",    "tombstones",   "damaged_keyframes"};
     std::map<std::string, std::string> rows;
     sqlite3* db = nullptr;
-    EXPECT_EQ(sqlite3_open_v2(database.c_str(), &db, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
+    const std::string uri = "file:" + database.string() + "?immutable=1";  // nothing beside it
+    EXPECT_EQ(sqlite3_open_v2(uri.c_str(), &db, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr),
+              SQLITE_OK);
     for (const char* table : kTables) {
       const auto add = [](void* text, int columns, char** values, char** /*names*/) {
         for (int i = 0; i < columns; ++i) {

@@ -22,7 +22,7 @@ class BackupFlipTest : public BackupTest {
 };
 
 TEST_F(BackupFlipTest, IsFoundOrHarmless) {
-  Fill(20, 3'000);
+  Fill(40, 20'000);
   ASSERT_TRUE(WriteBackup().has_value());
   store_.reset();
   const auto rows = RowsOf(backup());
@@ -40,7 +40,9 @@ TEST_F(BackupFlipTest, IsFoundOrHarmless) {
       EXPECT_EQ(RowsOf(restored()), rows);
     } else {
       ++found;
-      EXPECT_NE(done.error().code(), StatusCode::kInternal) << done.error().message();
+      const StatusCode code = done.error().code();
+      EXPECT_TRUE(code == StatusCode::kInvalidData || code == StatusCode::kUnsupported)
+          << done.error().message();
       EXPECT_FALSE(std::filesystem::exists(restored().parent_path())) << "nothing is written";
     }
     std::filesystem::remove_all(restored().parent_path());

@@ -125,6 +125,26 @@ TEST_F(BackupTest, ADamagedAtlasIsNotBackedUp) {
   }
 }
 
+// The disk gives back something else, and nothing in it is damaged.
+TEST_F(BackupTest, ACopyOfAnotherStateIsNone) {
+  Fill(1);
+  ASSERT_TRUE(WriteBackup().has_value());
+  const auto earlier = folder() / "sunday";
+  std::filesystem::rename(backup(), earlier);
+  ASSERT_TRUE(Update({{{{"bus", "day"}, 1}, PoseAt(7), {{0, 1, 0}}}}).has_value());
+  BackupWork work = Work();
+  work.on_progress = [&](const BackupProgress& progress) {
+    if (progress.stage == BackupProgress::Stage::kCopying) {
+      std::filesystem::copy_file(earlier, backup().string() + ".partial",
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+  };
+  const auto facts = store_->WriteBackup(backup(), work);
+  ASSERT_FALSE(facts.has_value());
+  EXPECT_EQ(facts.error().code(), StatusCode::kInvalidData) << facts.error().message();
+  EXPECT_EQ(NamesIn(folder()), std::vector<std::string>{"sunday"});
+}
+
 TEST_F(BackupTest, IsAnEvent) {
   Fill(1);
   const auto noted = Await<bool>([&](auto done) {
