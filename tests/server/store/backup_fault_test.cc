@@ -32,6 +32,8 @@ class BackupFaultTest : public BackupTest {
       SCOPED_TRACE("call " + std::to_string(number) + ", " + vfs_.first());
       judge(number, is_done);
       if (!has_failed || HasFailure()) {
+        points_ += number - 1;
+        RecordProperty("points", static_cast<int>(points_));
         return number - 1;
       }
     }
@@ -94,6 +96,7 @@ class BackupFaultTest : public BackupTest {
   }
 
   FaultyVfs vfs_;
+  std::uint64_t points_ = 0;
   std::map<std::string, std::string> rows_;  // of the atlas that is backed up
 };
 
