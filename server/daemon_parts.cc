@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <random>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -33,6 +35,17 @@ unsigned WorkersFrom(const DaemonConfig& config) {
                             : std::max(1U, std::thread::hardware_concurrency());
 }
 
+// Names of backups would be names of the atlas's own files.
+Status CheckBackupFolder(const DaemonConfig& config) {
+  std::error_code error;
+  const bool is_data = !config.backup_folder.empty() &&
+                       std::filesystem::equivalent(config.backup_folder, config.data, error);
+  return is_data ? Status(StatusCode::kInvalidArgument,
+                          StrCat("backup.folder is the data directory ", config.data.string(),
+                                 ", expected another folder"))
+                 : Status();
+}
+
 }  // namespace
 
 Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
@@ -40,6 +53,9 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
   const Result<MapProfile> profile = config.NewProfile();
   if (!profile) {
     return Error(profile.error());
+  }
+  if (Status status = CheckBackupFolder(config); !status.ok()) {
+    return Error(std::move(status));
   }
   SqliteStoreOptions options;
   options.directory = config.data;
@@ -71,6 +87,8 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.scrub.bytes_per_s = config.scrub_kib_per_s * 1024.0;
   options.scrub.between = std::chrono::hours(config.scrub_hours);
   options.sessions_per_hour = static_cast<std::uint32_t>(config.vehicle_sessions_per_hour);
+  options.backup.folder = config.backup_folder;
+  options.backup.bytes_per_s = config.backup_mib_per_s * double{1u << 20};
   options.scratch_directory = config.data;
   return options;
 }

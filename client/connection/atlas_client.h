@@ -112,6 +112,16 @@ class AtlasClient {
   Result<VerifySummary> Repair(bool is_rebuild,
                                const std::string& author,
                                std::chrono::milliseconds timeout);
+  // Has the daemon write a copy of its atlas into its folder for backups, and read it back; calls
+  // back now and then. kConflict: there is a file of that name. kUnavailable: another one is being
+  // written. kResourceExhausted: there is no room. kUnsupported: a daemon before 1.8. Whoever gives
+  // up closes the connection, which ends it.
+  Result<BackupSummary> Backup(const std::string& name,
+                               const std::string& author,
+                               std::chrono::milliseconds timeout,
+                               const std::function<void(const BackupStage&)>& on_progress);
+  // By name. kUnsupported as above.
+  Result<std::vector<BackupFile>> ListBackups();
   // Above `after_id`, oldest first, up to a thousand; none: there are no more. kUnsupported as
   // above.
   Result<std::vector<AtlasEvent>> ListEvents(std::uint64_t after_id);

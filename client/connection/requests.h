@@ -149,6 +149,28 @@ struct VerifySummary {
   std::uint64_t given_up = 0;
 };
 
+// How far a backup is.
+struct BackupStage {
+  bool is_copied = false;  // and is read back
+  std::uint64_t done_bytes = 0;
+  std::uint64_t total_bytes = 0;
+};
+
+struct BackupSummary {
+  std::uint64_t bytes = 0;
+  std::uint64_t revision = 0;
+  std::uint64_t keyframes = 0;
+  std::uint64_t tiles = 0;
+  Bytes sha256;  // of the tiles, as in a DigestSummary
+};
+
+// A file in the daemon's folder for backups.
+struct BackupFile {
+  std::string name;
+  std::uint64_t bytes = 0;
+  std::int64_t time_ms = 0;
+};
+
 // What happened to the atlas beside uploads.
 struct AtlasEvent {
   std::uint64_t id = 0;

@@ -1,5 +1,6 @@
 // What AtlasClient asks of the atlas as a whole: waits, digests, verifications, compactions, and
 // changes of whole sessions.
+#include <algorithm>
 #include <utility>
 
 #include "client/connection/atlas_client.h"
@@ -128,6 +129,54 @@ Result<VerifySummary> AtlasClient::Repair(bool is_rebuild,
   request.mutable_verify_request()->set_repair(true);
   request.mutable_verify_request()->set_author(author);
   return CallVerify(*channel_, request, timeout);
+}
+
+Result<BackupSummary> AtlasClient::Backup(
+    const std::string& name,
+    const std::string& author,
+    milliseconds timeout,
+    const std::function<void(const BackupStage&)>& on_progress) {
+  if (Status status = CheckMinor(kMinorWithLog, "a backup"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  if (Status status = ValidateName("backup", name); !status.ok()) return Error(std::move(status));
+  wire::Envelope request;
+  wire::BackupRequest& backup = *request.mutable_backup_request();
+  backup.set_name(name);
+  backup.set_author(author);
+  backup.set_timeout_ms(TimeoutField(timeout));
+  const Result<std::uint64_t> id = channel_->Send(request);
+  if (!id) return Error(id.error());
+  const auto latest = std::chrono::steady_clock::now() + timeout;
+  while (true) {
+    const auto left = std::chrono::ceil<milliseconds>(latest - std::chrono::steady_clock::now());
+    const auto reply = channel_->ReceiveFor(*id, Body::kBackupReply, Body::kBackupReply,
+                                            std::max(left, milliseconds(0)));
+    if (!reply) return Error(reply.error());
+    const wire::BackupReply& done = reply->backup_reply();
+    if (done.stage() == wire::BackupReply::DONE) {
+      const ByteSpan sha256 = BytesFromWire(done.sha256());
+      return BackupSummary{done.done_bytes(), done.revision(), done.keyframes(), done.tiles(),
+                           Bytes(sha256.begin(), sha256.end())};
+    }
+    on_progress(
+        {done.stage() == wire::BackupReply::VERIFYING, done.done_bytes(), done.total_bytes()});
+  }
+}
+
+Result<std::vector<BackupFile>> AtlasClient::ListBackups() {
+  if (Status status = CheckMinor(kMinorWithLog, "a list of backups"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  wire::Envelope request;
+  request.mutable_backup_request();
+  const auto reply = channel_->Call(request, Body::kBackupReply);
+  if (!reply) return Error(reply.error());
+  std::vector<BackupFile> backups;
+  for (const wire::BackupReply::Backup& backup : reply->backup_reply().backups()) {
+    backups.push_back({backup.name(), backup.bytes(), backup.time_ms()});
+  }
+  return backups;
 }
 
 Result<std::vector<AtlasEvent>> AtlasClient::ListEvents(std::uint64_t after_id) {

@@ -46,6 +46,9 @@ struct SpoolReport {
   // connection begins with their answers.
   std::uint64_t waiting = 0;
   std::uint64_t in_flight = 0;
+  // The atlas was restored from a backup since this spool sent to it last: of what was acknowledged
+  // before some may be lost, and is to be put again by who still has it. Told once.
+  bool is_restored = false;
   // Not 0: nothing was sent, the daemon wants to be left alone for so long.
   std::chrono::milliseconds retry_after{0};
 };
@@ -108,6 +111,7 @@ class UploadSpool {
   std::uint64_t waiting_bytes_ = 0;
   std::uint64_t refused_bytes_ = 0;
   Number next_ = 1;
+  std::uint64_t epoch_ = 0;  // of the atlas that it sent to last; 0: it did not
 };
 
 }  // namespace atlas

@@ -229,7 +229,14 @@ Result<SpoolReport> UploadSpool::Send(AtlasClient& client, const SendLimits& lim
     return held_back;
   }
   if (!is_same) underway_ = std::make_unique<Underway>(client, options_.upload);
-  return Sending(*this, limits).Run();
+  const std::uint64_t epoch = client.atlas().epoch;
+  const bool is_restored = epoch_ != 0 && epoch != epoch_;
+  Result<SpoolReport> report = Sending(*this, limits).Run();
+  if (report) {
+    report->is_restored = is_restored;
+    epoch_ = epoch;
+  }
+  return report;
 }
 
 }  // namespace atlas

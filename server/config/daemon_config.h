@@ -28,18 +28,20 @@ struct DaemonConfig {
   std::filesystem::path data;  // required
   std::string host = "127.0.0.1";
   std::uint16_t port = 7447;
-  int workers = 0;             // fusion threads; 0: one a core
-  bool is_fusing = true;       // else dirty tiles wait for a daemon that does
-  int fusion_nice = 10;        // how far fusion threads stand back behind the others
-  int network_threads = 0;     // that run connections; 0: one for every four cores
-  int cache_mib = 512;         // decoded keyframes, all workers together
-  int survey_mib = 1024;       // what tiles keep from one fusion to the next
-  int survey_disk_mib = 4096;  // the same on disk; 0: nothing
-  int scrub_kib_per_s = 2048;  // that is read back to find damage; 0: nothing
-  int scrub_hours = 24;        // between two passes
-  int reply_mib = 64;          // tiles ready to be sent
-  int queue_mib = 16;          // replies that wait for slow readers
-  int watch_mib = 64;          // areas that are watched
+  int workers = 0;                      // fusion threads; 0: one a core
+  bool is_fusing = true;                // else dirty tiles wait for a daemon that does
+  int fusion_nice = 10;                 // how far fusion threads stand back behind the others
+  int network_threads = 0;              // that run connections; 0: one for every four cores
+  int cache_mib = 512;                  // decoded keyframes, all workers together
+  int survey_mib = 1024;                // what tiles keep from one fusion to the next
+  int survey_disk_mib = 4096;           // the same on disk; 0: nothing
+  int scrub_kib_per_s = 2048;           // that is read back to find damage; 0: nothing
+  int scrub_hours = 24;                 // between two passes
+  std::filesystem::path backup_folder;  // empty: no backups
+  int backup_mib_per_s = 64;            // that are copied and read back; 0: no limit
+  int reply_mib = 64;                   // tiles ready to be sent
+  int queue_mib = 16;                   // replies that wait for slow readers
+  int watch_mib = 64;                   // areas that are watched
   std::string log_level = "info";
   std::string log_format = "text";
   // Of one name, a certificate's or a token's, on all its connections; 0: no limit to a rate.

@@ -29,13 +29,14 @@ enum class RequestKind : std::uint8_t {
   kWatch,
   kCancel,
   kLog,
+  kBackup,
   kUnknown,
 };
 // As metrics and logs call them, in the order of the enumerators.
-inline constexpr std::array<std::string_view, 16> kRequestKindNames = {
+inline constexpr std::array<std::string_view, 17> kRequestKindNames = {
     "hello",  "upload_keyframe", "update_poses", "change_session", "query_region", "sync",
     "status", "sessions",        "wait",         "digest",         "verify",       "compact",
-    "watch",  "cancel",          "log",          "unknown"};
+    "watch",  "cancel",          "log",          "backup",         "unknown"};
 inline constexpr std::size_t kRequestKinds = kRequestKindNames.size();
 inline constexpr std::size_t kStatusCodes = 1 + static_cast<std::size_t>(StatusCode::kInternal);
 

@@ -41,7 +41,8 @@ AtlasService::AtlasService(AtlasStore& store,
       wait_(store, changes_, fusion_),
       whole_(store, changes_, wait_),
       past_(store, options.past_cache_bytes, options.scratch_directory),
-      scrubber_(store, changes_, log_, options.scrub) {}
+      scrubber_(store, changes_, log_, options.scrub),
+      backups_(store, log_, options.backup) {}
 
 AtlasService::~AtlasService() {
   Stop();
@@ -197,6 +198,16 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
                        fusion_.kept_disk_bytes(),
                        ResidentBytes(),
                        scrubber_.figures()};
+}
+
+Result<AtlasFacts> AtlasService::Backup(
+    const BackupRequest& request,
+    const Patience& patience,
+    const std::function<void(const BackupProgress&)>& on_progress) {
+  BackupWork work;
+  work.check_stop = wait_.Check(patience, "the backup was not written in time");
+  work.on_progress = on_progress;
+  return backups_.Write(request, std::move(work));
 }
 
 Result<AtlasDigest> AtlasService::DigestAt(std::uint64_t revision, const Patience& patience) {

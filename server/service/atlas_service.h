@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/status.h"
+#include "server/service/backup/backup_keeper.h"
 #include "server/service/change_signal.h"
 #include "server/service/fusion/fusion_scheduler.h"
 #include "server/service/fusion_wait.h"
@@ -50,6 +51,7 @@ struct ServiceStatus {
 struct ServiceOptions {
   FusionOptions fusion;
   ScrubOptions scrub;
+  BackupOptions backup;
   std::uint32_t sessions_per_hour = 1'000;    // that one vehicle may begin; 0: no limit
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
@@ -127,6 +129,11 @@ class AtlasService {
   Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience) {
     return whole_.Compact(request, patience);
   }
+  // backup_keeper.h; `patience` bounds all of it, kTimeout, kUnavailable.
+  Result<AtlasFacts> Backup(const BackupRequest& request,
+                            const Patience& patience,
+                            const std::function<void(const BackupProgress&)>& on_progress);
+  Result<std::vector<StoredBackup>> ListBackups() const { return backups_.List(); }
   // Of the atlas as of an earlier revision, fused again; kTimeout if that takes longer.
   Result<AtlasDigest> DigestAt(std::uint64_t revision, const Patience& patience);
 
@@ -156,6 +163,7 @@ class AtlasService {
   WholeAtlas whole_;
   PastAtlas past_;
   Scrubber scrubber_;
+  BackupKeeper backups_;
 };
 
 }  // namespace atlas

@@ -95,6 +95,7 @@ Status FusionWait::ForRevision(std::uint64_t revision, const Patience& patience)
     return Status(StatusCode::kInvalidArgument,
                   StrCat("cannot wait for revision ", revision, ", the atlas is at ", current));
   }
+  ATLAS_RETURN_IF_ERROR(store_.identity().CheckNotLost(revision));
   DirtyState state;
   const auto end = Until(
       [revision](const DirtyState& s) { return s.dirty_tiles == 0 || s.oldest_since > revision; },

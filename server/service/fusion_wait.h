@@ -53,7 +53,7 @@ class FusionWait {
   Result<WaitOutcome> UntilCleanInTime(const Patience& patience) const;
   // Until the tiles reflect every change up to `revision`. kTimeout if they do not in time,
   // kInvalidData if damage keeps them from it, kInvalidArgument when the atlas has no such revision
-  // yet.
+  // yet, kNotFound when it is lost (StoreIdentity).
   Status ForRevision(std::uint64_t revision, const Patience& patience) const;
 
   // For long work to ask now and then: a failed status ends it. kTimeout, in the words of

@@ -8,11 +8,13 @@
 // trace.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <span>
 #include <vector>
 
 #include "core/base/status.h"
+#include "server/store/backup_types.h"
 #include "server/store/compaction_types.h"
 #include "server/store/damage_types.h"
 #include "server/store/event_types.h"
@@ -82,6 +84,14 @@ class AtlasStore : public TileIndex {
   // The value: how much was not as it should be.
   virtual void RepairTables(TableRepair what, std::string author, Done<std::uint32_t> done) = 0;
 
+  // A copy of one state in `file`, read back (backup_writing.h); takes minutes, while all else goes
+  // on. kConflict, kNotFound, kResourceExhausted: `file`, its folder, its disk. kInvalidData: what
+  // is damaged. What ends the work: its status. After an error there is none.
+  virtual Result<AtlasFacts> WriteBackup(const std::filesystem::path& file,
+                                         const BackupWork& work) = 0;
+  // An event about one.
+  virtual void NoteBackup(BackupNote note, Done<bool> done) = 0;
+
   enum class ProbeDepth { kQueue, kDisk };
   // Goes the way of a write and changes nothing: `done` tells that the queue moves and, with kDisk,
   // that the disk takes what is written.
@@ -100,7 +110,8 @@ class AtlasStore : public TileIndex {
   // The same as of an earlier revision: the keyframes that were there, in sessions that were live,
   // each with the pose it had. Some may not touch the tile. Errors as CheckRevision.
   virtual Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) = 0;
-  // kInvalidArgument: the atlas is not there yet. kNotFound: so old that its history is gone.
+  // kInvalidArgument: the atlas is not there yet. kNotFound: so old that its history is gone, or
+  // lost to a restore.
   virtual Status CheckRevision(std::uint64_t revision) = 0;
   virtual Result<Bytes> ReadKeyframeBlob(std::int64_t id) = 0;
   // Row, session and pose, without a look at its tiles.

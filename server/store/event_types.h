@@ -25,6 +25,7 @@ enum class EventKind : std::uint8_t {
   kUpgraded = 14,  // from an earlier version of the schema
   kCountersRestored = 15,
   kTablesRepaired = 16,  // by who asked for repairs
+  kBackup = 17,          // of the atlas as it was
 };
 
 // The author of what nobody asked for.
@@ -65,6 +66,8 @@ constexpr std::string_view EventName(EventKind kind) {
       return "counters_restored";
     case EventKind::kTablesRepaired:
       return "tables_repaired";
+    case EventKind::kBackup:
+      return "backup";
   }
   return "unknown";  // of a later version
 }

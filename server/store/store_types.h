@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/bytes.h"
+#include "core/base/status.h"
 #include "core/geometry/grid_geometry.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/map_profile.h"
@@ -25,6 +26,12 @@ struct StoreIdentity {
   MapProfile profile;
   std::array<std::uint8_t, 16> atlas_id{};
   std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup
+  // At which revisions it went on after that. Those left out before each may have been given to
+  // what is lost.
+  std::vector<std::uint64_t> restores = {};
+
+  // kNotFound: a revision that is lost.
+  Status CheckNotLost(std::uint64_t revision) const;
 };
 
 // The atlas was opened and changed: what it was given until it was opened next goes on from this

@@ -78,6 +78,7 @@ bool CallAll(AtlasClient& client) {
   static_cast<void>(client.Digest(milliseconds(1)));
   static_cast<void>(client.Verify(false, milliseconds(1)));
   static_cast<void>(client.Compact(1, "me", milliseconds(1)));
+  static_cast<void>(client.Backup("it", "me", milliseconds(1), [](const BackupStage&) {}));
   static_cast<void>(client.ChangeSession(kKey.session, SessionAction::kRetract, "me"));
   const std::vector<PoseCorrection> corrections{{kKey, {}}};
   const bool is_corrected = client.UpdatePoses(corrections, "me").has_value();

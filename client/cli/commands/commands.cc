@@ -24,6 +24,9 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeDigestCommand());
   commands.push_back(MakeVerifyCommand());
   commands.push_back(MakeLogCommand());
+  commands.push_back(MakeBackupCommand());
+  commands.push_back(MakeBackupsCommand());
+  commands.push_back(MakeRestoreCommand());
   commands.push_back(MakeSegmentCommand());
   commands.push_back(MakeLocalizeCommand());
   commands.push_back(MakePlanCommand());

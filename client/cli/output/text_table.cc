@@ -92,4 +92,14 @@ std::string UtcText(std::uint32_t seconds) {
   return text.str();
 }
 
+std::string HexText(ByteSpan bytes) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : bytes) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 0xF];
+  }
+  return text;
+}
+
 }  // namespace atlas

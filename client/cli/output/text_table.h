@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/bytes.h"
+
 namespace atlas {
 
 class TextTable {
@@ -35,6 +37,7 @@ class FactList {
 std::string FixedText(double value, int decimals);
 // "12.4 MB": powers of 1000.
 std::string BytesText(std::uint64_t bytes);
+std::string HexText(ByteSpan bytes);
 // "2026-03-01 12:30:05", UTC, of seconds since 1970.
 std::string UtcText(std::uint32_t seconds);
 

@@ -99,6 +99,11 @@ class AtlasClient:
         return self.hello.role
 
     @property
+    def epoch(self) -> int:
+        """Another number after the atlas was restored from a backup."""
+        return self.hello.epoch
+
+    @property
     def last_sequence(self) -> int | None:
         """Of the session to be resumed, when the connection began; None: nothing of it is there."""
         return self.hello.last_sequence if self.hello.HasField("last_sequence") else None

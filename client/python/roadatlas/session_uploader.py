@@ -59,6 +59,7 @@ class SessionUploader:
         """Why something is left, if it may pass."""
         try:
             with self._connect(resume=(self._vehicle, self._session)) as client:
+                work.begin(client.epoch)
                 work.skip(client.last_sequence)
                 work.send(client)
         except RequestRefused as error:
@@ -90,6 +91,17 @@ class _Work:
                 raise ValueError(f"keyframe {upload.key.vehicle}/{upload.key.session}/{upload.key.sequence} comes "
                                  f"twice or is not of {vehicle}/{session}")
             self.waiting[upload.key.sequence] = upload
+        self._all = dict(self.waiting)
+        self._epoch: int | None = None
+
+    def begin(self, epoch: int) -> None:
+        """On each connection. An atlas that was restored from a backup lacks some of what was acknowledged before: it is
+        asked for all again, but for what it refused for good."""
+        if self._epoch not in (None, epoch):
+            self.waiting = {number: upload for number, upload in self._all.items() if number not in self.report.refused}
+            self.report.acknowledged.clear()
+            self.report.there_already.clear()
+        self._epoch = epoch
 
     def skip(self, last_sequence: int | None) -> None:
         if last_sequence is None or not self._rising:

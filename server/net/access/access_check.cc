@@ -54,6 +54,8 @@ Status CheckMayAsk(const Identity& identity, const wire::Envelope& request) {
       return Deny(identity, "change sessions");
     case wire::Envelope::kCompactRequest:
       return Deny(identity, "compact the atlas");
+    case wire::Envelope::kBackupRequest:
+      return Deny(identity, "back the atlas up");
     case wire::Envelope::kVerifyRequest:
       if (request.verify_request().repair()) {
         return Deny(identity, "repair the atlas");

@@ -188,6 +188,32 @@ void CompactionToWire(const CompactionReport& report, wire::CompactReply& out) {
   out.set_revision(report.stored.revision);
 }
 
+void ProgressToWire(const BackupProgress& progress, wire::BackupReply& out) {
+  out.set_stage(progress.stage == BackupProgress::Stage::kCopying ? wire::BackupReply::COPYING
+                                                                  : wire::BackupReply::VERIFYING);
+  out.set_done_bytes(progress.done_bytes);
+  out.set_total_bytes(progress.total_bytes);
+}
+
+void BackupToWire(const AtlasFacts& facts, wire::BackupReply& out) {
+  out.set_stage(wire::BackupReply::DONE);
+  out.set_done_bytes(facts.bytes);
+  out.set_total_bytes(facts.bytes);
+  out.set_revision(facts.revision);
+  out.set_keyframes(facts.keyframes);
+  out.set_tiles(facts.tiles);
+  out.set_sha256(BytesToWire(facts.sha256));
+}
+
+void BackupsToWire(const std::vector<StoredBackup>& backups, wire::BackupReply& out) {
+  for (const StoredBackup& backup : backups) {
+    wire::BackupReply::Backup& line = *out.add_backups();
+    line.set_name(backup.name);
+    line.set_bytes(backup.bytes);
+    line.set_time_ms(backup.time_ms);
+  }
+}
+
 void EventsToWire(const std::vector<Event>& events, wire::LogReply& out) {
   for (const Event& event : events) {
     wire::LogReply::Event& item = *out.add_events();

@@ -29,6 +29,9 @@ void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out);
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out);
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out);
 void CompactionToWire(const CompactionReport& report, wire::CompactReply& out);
+void ProgressToWire(const BackupProgress& progress, wire::BackupReply& out);
+void BackupToWire(const AtlasFacts& facts, wire::BackupReply& out);
+void BackupsToWire(const std::vector<StoredBackup>& backups, wire::BackupReply& out);
 void EventsToWire(const std::vector<Event>& events, wire::LogReply& out);
 VerifyRequest VerifyFromWire(const wire::VerifyRequest& message);
 // Who did it: `known` by a certificate or a token, or else who it says.

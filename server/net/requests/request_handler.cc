@@ -8,6 +8,7 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
+#include "server/net/requests/backup_requests.h"
 #include "server/net/requests/on_pool.h"
 #include "server/net/requests/read_requests.h"
 #include "server/net/requests/request_conversion.h"
@@ -144,6 +145,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& pee
       return AnswerVerify(context_, whole, peer.out);
     case Envelope::kCompactRequest:
       return AnswerCompact(context_, whole, peer.out);
+    case Envelope::kBackupRequest:
+      return AnswerBackup(context_, whole, peer.out);
     default:
       return Refuse(request);
   }

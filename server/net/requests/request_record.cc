@@ -46,6 +46,8 @@ RequestKind KindOf(const Envelope& request) {
       return RequestKind::kCancel;
     case Envelope::kLogRequest:
       return RequestKind::kLog;
+    case Envelope::kBackupRequest:
+      return RequestKind::kBackup;
     default:
       return RequestKind::kUnknown;
   }
@@ -62,6 +64,7 @@ bool MayWait(const Envelope& request) {
     case Envelope::kDigestRequest:
     case Envelope::kVerifyRequest:
     case Envelope::kCompactRequest:
+    case Envelope::kBackupRequest:
     case Envelope::kWatchRequest:
       return true;
     default:

@@ -81,7 +81,9 @@ Status SyncReply::TakeOrder() {
     return order.error();
   }
   const std::uint64_t now = service_.revision();
-  if (order->request.after && order->request.after->revision > now) {
+  const bool is_lost = order->request.after &&
+                       !service_.identity().CheckNotLost(order->request.after->revision).ok();
+  if (is_lost || (order->request.after && order->request.after->revision > now)) {
     return {StatusCode::kInvalidArgument,
             StrCat("sync: the cursor is of revision ", order->request.after->revision,
                    " and the atlas at ", now, ", an earlier copy: ask without it")};

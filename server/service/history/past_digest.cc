@@ -5,7 +5,7 @@
 
 #include "core/tile/tile_codec.h"
 #include "server/service/history/scratch_file.h"
-#include "server/service/verification/tile_hasher.h"
+#include "server/store/tile_hasher.h"
 
 namespace atlas {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
-#include "server/service/verification/tile_hasher.h"
+#include "server/store/tile_hasher.h"
 
 namespace atlas {
 namespace {

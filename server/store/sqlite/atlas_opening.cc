@@ -1,6 +1,8 @@
 #include "server/store/sqlite/atlas_opening.h"
 
 #include <exception>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -41,6 +43,23 @@ Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& opt
   return directory.Publish();
 }
 
+// What an interrupted restore left. An empty atlas must not take the place of one that waits under
+// another name.
+Status SettleRestore(const DataDirectory& directory) {
+  std::error_code error;
+  if (!std::filesystem::exists(directory.restored_file(), error)) {
+    return {};
+  }
+  if (!directory.has_atlas()) {
+    return {
+        StatusCode::kConflict,
+        StrCat("a restore was interrupted in ", directory.database_file().parent_path().string(),
+               ": restore the backup again, or give the atlas that was there its name back")};
+  }
+  std::filesystem::remove(directory.restored_file(), error);  // it takes room, and nothing else
+  return {};
+}
+
 // What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
 // marked again.
 void Mend(Connection& writer, std::uint8_t levels) {
@@ -62,6 +81,9 @@ void Mend(Connection& writer, std::uint8_t levels) {
 }  // namespace
 
 Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
+  if (Status status = SettleRestore(directory); !status.ok()) {
+    return Error(std::move(status));
+  }
   if (!directory.has_atlas()) {
     if (Status status = CreateAtlas(directory, options); !status.ok()) {
       return Error(std::move(status));
@@ -84,6 +106,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     KeepTableSums(*writer);
     DropAllLeases(*writer);
     Mend(*writer, identity->profile.levels);
+    identity->restores = RevisionsOf(*writer, EventKind::kBackupRestored);
     return OpenedAtlas{std::move(*identity), std::move(writer)};
   } catch (const std::exception& error) {
     return Error(StatusFromException(error).WithContext(directory.database_file().string()));

@@ -26,6 +26,9 @@ class DataDirectory {
   // Where a new atlas is made, so that atlas.db is whole from its first moment.
   std::filesystem::path unfinished_file() const { return directory_ / "atlas.db.new"; }
   void RemoveUnfinished() const;
+  // What a restore makes, that becomes database_file(). Where it is and that is not, the restore
+  // was interrupted: the atlas that was there has another name.
+  std::filesystem::path restored_file() const { return directory_ / "atlas.db.partial"; }
   // unfinished_file() becomes database_file(), durably.
   Status Publish() const;
   std::uint64_t StoreBytes() const;

@@ -5,6 +5,7 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/atlas_opening.h"
+#include "server/store/sqlite/backup/backup_writing.h"
 #include "server/store/sqlite/connection/log_copier.h"
 #include "server/store/sqlite/connection/reader_pool.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
@@ -28,6 +29,7 @@
 #include "server/store/sqlite/transactions/history_reads.h"
 #include "server/store/sqlite/transactions/session_transactions.h"
 #include "server/store/sqlite/transactions/transactions.h"
+#include "server/store/sqlite/transactions/upload_turn.h"
 #include "server/store/tile_directory.h"
 
 namespace atlas {
@@ -43,32 +45,6 @@ DatabaseOptions CopierOptions(std::filesystem::path file) {
 
 std::uint64_t ReadRevision(Connection& connection) {
   return ReadCounter(connection, Counter::kRevision);
-}
-
-// In its turn; how it ends is noted at once, for those behind it in the same group. Where that does
-// not come to the disk, it fails with all of them, and Noting() takes it back.
-Result<PutKeyframeResult> PutInTurn(Connection& connection, const NewKeyframe& keyframe) {
-  if (Status status = keyframe.missing->CheckTurn(keyframe.key); !status.ok()) {
-    return Error(std::move(status));
-  }
-  try {
-    auto result = PutKeyframeInStore(connection, keyframe);
-    keyframe.missing->NoteEnd(keyframe.key, result ? Status() : result.error());
-    return result;
-  } catch (const std::exception& error) {
-    keyframe.missing->NoteEnd(keyframe.key, StatusFromException(error));
-    throw;
-  }
-}
-
-// Notes what became of it, then calls `done`.
-AtlasStore::Done<PutKeyframeResult> Noting(const NewKeyframe& keyframe,
-                                           AtlasStore::Done<PutKeyframeResult> done) {
-  return [missing = keyframe.missing, key = keyframe.key,
-          done = std::move(done)](Result<PutKeyframeResult> result) {
-    missing->NoteEnd(key, result ? Status() : result.error());
-    done(std::move(result));
-  };
 }
 
 class SqliteStore final : public AtlasStore {
@@ -176,6 +152,17 @@ class SqliteStore final : public AtlasStore {
                          });
   }
 
+  Result<AtlasFacts> WriteBackup(const std::filesystem::path& file,
+                                 const BackupWork& work) override {
+    return WriteAtlasBackup(directory_.database_file(), file, work);
+  }
+  void NoteBackup(BackupNote note, Done<bool> done) override {
+    Write<bool>(std::move(done), [n = std::move(note)](Connection& connection) {
+      AddEvent(connection, {EventKind::kBackup, n.author, n.name, n.detail});
+      return Result<bool>(true);
+    });
+  }
+
   void Probe(ProbeDepth depth, Done<bool> done) override {
     writes_.SubmitProbe(MakeWrite<bool>(std::move(done), [depth](Connection& connection) {
       if (depth == ProbeDepth::kDisk) {
@@ -208,6 +195,7 @@ class SqliteStore final : public AtlasStore {
     });
   }
   Status CheckRevision(std::uint64_t revision) override {
+    ATLAS_RETURN_IF_ERROR(identity_.CheckNotLost(revision));
     return ReadStatus(
         [revision](Connection& connection) { return CheckRevisionKept(connection, revision); });
   }

@@ -9,12 +9,13 @@ import tempfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
 import atlas_cases
+import backup_cases
 import daemon_cases
 import drive_cases
 import usage_cases
 from harness import SMALL, Cases, Daemon, Report
 
-GROUPS = {"atlas": atlas_cases, "daemon": daemon_cases, "drives": drive_cases, "usage": usage_cases}
+GROUPS = {"atlas": atlas_cases, "backups": backup_cases, "daemon": daemon_cases, "drives": drive_cases, "usage": usage_cases}
 
 
 def main():

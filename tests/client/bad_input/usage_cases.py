@@ -51,6 +51,10 @@ USAGE = {
     "compact": [[], ["more"], ["--before"], ["--before", "yesterday"], ["--before", "-1"], ["--before", "nan"],
                 ["--before", "1e13"], ["--before", "1", "--timeout", "-1"], ["--before", "1", "--before", "2"],
                 ["--before", "1", "more"]],
+    "backup": [[], ["a", "b"], ["monday", "--timeout", "-1"], ["monday", "--to", "x"], ["monday", "--atlas", "WORK/x.db"]],
+    "backups": [["more"]],
+    "restore": [[], ["WORK/x"], ["WORK/x", "--to"], ["--to", "WORK/atlas.db"], ["WORK/x", "WORK/y", "--to", "WORK/atlas.db"],
+                ["WORK/x", "--to", "WORK/atlas.db", "--timeout", "5"]],
     "digest": [["more"], ["--timeout", "-1"], ["--at"], ["--at", "-1"], ["--at", "first"], ["--at", "1", "--at", "2"]],
     "verify": [["more"], ["--rebuild=often"], ["--timeout", "x"]],
     "segment": [

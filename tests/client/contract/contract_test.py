@@ -28,6 +28,9 @@ KEYS = {
     "vehicle": "vehicle sessions changed tiles_marked revision",
     "watch": "type revision",
     "log": "events",
+    "backup": "name bytes revision keyframes tiles digest",
+    "backups": "backups",
+    "restore": "backup_revision keyframes tiles bytes digest epoch revision kept",
     "compact": "dropped bytes tiles_checked horizon revision",
     "digest": "digest tiles revision",
     "verify": "checked damaged mismatched restored given_up",
@@ -135,6 +138,31 @@ def stream_cases(cases, found, work):
                            scan["health"] in ("good", "weak", "lost"), scan)
 
 
+def backup_cases(cases, work):
+    """Each line can be run once."""
+    found = {}
+    for name, plain, line in (
+            ("backup", ["backup", "monday"], ["backup", "tuesday"]),
+            ("backups", ["backups"], ["backups"]),
+            ("restore", ["restore", f"{work}/backups/monday", "--to", f"{work}/plain/atlas.db"],
+             ["restore", f"{work}/backups/tuesday", "--to", f"{work}/json/atlas.db"])):
+        done = cases.call(*plain)
+        cases.report.equal(f"{name}: exit code without --json ({done.stderr})", done.returncode, 0)
+        cases.report.check(f"{name}: text on stdout alone", done.stdout and not done.stderr, done)
+        [found[name]] = objects(cases, name, cases.call(*line, "--json"))
+        has_keys(cases, name, found[name], KEYS[name])
+    for line in found["backups"]["backups"]:
+        has_keys(cases, "a line of backups", line, "name bytes time_ms")
+    cases.report.equal("backup and restore: digest", found["restore"]["digest"], found["backup"]["digest"])
+    for name, line, label in (
+            ("backup", ["backup", "wednesday"], "copying"),
+            ("restore", ["restore", f"{work}/backups/monday", "--to", f"{work}/json/atlas.db", "--replace"], "restoring")):
+        done, seen = on_terminal(cases, *line, "--json")
+        cases.report.equal(f"{name} on a terminal: exit code", done.returncode, 0)
+        cases.report.check(f"{name} on a terminal: a bar, wiped at the end",
+                           "\r" + label in seen and seen.endswith("\r\x1b[K"), repr(seen[-80:]))
+
+
 def unlabelled_case(cases, drives):
     folder = drives.copy("unlabelled")
     for label in (folder / "labels").iterdir():
@@ -212,13 +240,16 @@ def main():
     bin_dir, source = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
     report = Report()
     with tempfile.TemporaryDirectory() as work:
-        with Daemon(bin_dir, work + "/atlas", *SMALL, "--preset", "bounded") as daemon:
+        pathlib.Path(work, "backups").mkdir()
+        flags = [*SMALL, "--preset", "bounded", "--backup-folder", work + "/backups"]
+        with Daemon(bin_dir, work + "/atlas", *flags) as daemon:
             cases = Cases(report, bin_dir, daemon.server)
             drives = Drives(source, work + "/drives")
             lines = lines_of(cases, work, drives.good)
             found = key_cases(cases, lines)
             content_cases(cases, found)
             stream_cases(cases, found, work)
+            backup_cases(cases, work)
             unlabelled_case(cases, drives)
             progress_cases(cases, lines, work)
             help_cases(cases)

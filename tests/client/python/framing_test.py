@@ -14,6 +14,7 @@ from support import ROOT
 
 DOCUMENT = (ROOT / "docs/protocol.md").read_text(encoding="utf-8")
 HELLO = atlas_pb2.Envelope(request_id=1, hello=atlas_pb2.Hello(protocol_major=1, client_name="demo"))
+BACKUP = atlas_pb2.Envelope(request_id=5, backup_request=atlas_pb2.BackupRequest(name="monday", timeout_ms=3_600_000))
 SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
     area=geometry.disc(1.5, -2, 100), sections=[2], budget_bytes=65536,
     held=[atlas_pb2.Held(keys=[geometry.tile_key(0, 0, 0)], payload_hashes=[0x1122334455667788])]))
@@ -40,7 +41,7 @@ MANIFEST = atlas_pb2.Envelope(request_id=2, sync_manifest=atlas_pb2.SyncManifest
 TILE = atlas_pb2.Envelope(request_id=2, tile=atlas_pb2.TileMessage(
     key=geometry.tile_key(1, 1, 1), revision=42, payload_hash=0x0807060504030201, blob=b"\xaa\xbb\xcc"))
 END = atlas_pb2.Envelope(request_id=2, sync_end=atlas_pb2.SyncEnd(tiles=1, bytes=116, revision=42))
-ENVELOPES = [HELLO, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, SESSIONS, PAGE, MANIFEST, TILE, END]
+ENVELOPES = [HELLO, BACKUP, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, SESSIONS, PAGE, MANIFEST, TILE, END]
 
 
 def leading_bytes(line):

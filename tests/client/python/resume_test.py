@@ -187,6 +187,8 @@ class BusyDaemon:
         self.taken = []
         self.sent = []
 
+    epoch = 1
+
     def __call__(self, resume):
         self.last_sequence = max(self.taken, default=None)
         self.missing.clear()
@@ -212,6 +214,23 @@ class BusyDaemon:
         return Reply()
 
 
+class RestoredDaemon(BusyDaemon):
+    """Refuses 5 for now, and comes back as it was when it had 0 to 2."""
+
+    def __init__(self):
+        super().__init__({5})
+
+    def submit(self, upload):
+        if self.epoch == 1 and upload.key.sequence > 5:
+            raise ConnectionLost("gone")
+        return super().submit(upload)
+
+    def __exit__(self, *_):
+        if self.epoch == 1:
+            self.epoch = 2
+            self.taken = [0, 1, 2]
+
+
 class Reply:
     duplicate = False
 
@@ -224,6 +243,12 @@ class PostponedTest(unittest.TestCase):
         report = SessionUploader(daemon, "car", "near", first_pause_s=0.001).upload(uploads)
         self.assertEqual(daemon.sent, [*range(8), *range(2, 8)])
         self.assertEqual((report.acknowledged, report.refused), (list(range(8)), {}))
+
+    def test_what_was_acknowledged_before_a_restore_is_sent_again(self):
+        daemon = RestoredDaemon()
+        report = SessionUploader(daemon, "car", "near", rising=True, first_pause_s=0.001).upload(map(self.named, range(8)))
+        self.assertEqual(daemon.sent, [*range(6), *range(3, 8)])
+        self.assertEqual((report.acknowledged, report.there_already), ([3, 4, 5, 6, 7], [0, 1, 2]))
 
     @staticmethod
     def named(sequence):

@@ -12,7 +12,7 @@ NOBODY = 65534
 SMALL = ("--cell-size", "0.2")  # a daemon's flags: few cells, quick to fuse
 NEAR = ("--max-range", "12", "--every", "0")  # an ingest's flags: the same
 EXIT = {"invalid_argument": 2, "not_found": 3, "conflict": 4, "unavailable": 5, "timeout": 5,
-        "invalid_data": 6, "resource_exhausted": 1, "permission_denied": 1, "internal": 1}
+        "invalid_data": 6, "resource_exhausted": 1, "unsupported": 1, "permission_denied": 1, "internal": 1}
 
 
 def unprivileged(bin_dir):

@@ -111,6 +111,7 @@ std::vector<wire::Envelope> ReplySeeds() {
   next().mutable_digest_reply()->set_sha256(std::string(32, 'd'));
   next().mutable_verify_reply()->add_findings("none");
   next().mutable_compact_reply()->set_dropped(1);
+  next().mutable_backup_reply()->set_stage(wire::BackupReply::DONE);
   next().mutable_change_session_reply()->set_state("retracted");
   next().mutable_update_poses_reply()->set_updated(1);
   next().mutable_upload_reply()->set_revision(10);

@@ -100,6 +100,8 @@ std::vector<wire::Envelope> RequestSeeds(const MapProfile& profile) {
   all.emplace_back().mutable_verify_request()->set_timeout_ms(20);
   all.emplace_back().mutable_compact_request()->set_timeout_ms(20);
   all.back().mutable_compact_request()->set_before_ms(1'200);
+  all.emplace_back().mutable_backup_request()->set_name("monday");
+  all.back().mutable_backup_request()->set_timeout_ms(20);
   all.emplace_back().mutable_cancel_request()->set_request_id(9);
   std::uint64_t id = 2;
   for (wire::Envelope& envelope : all) {

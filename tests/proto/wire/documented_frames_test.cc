@@ -89,6 +89,13 @@ wire::Envelope Watch() {
   return envelope;
 }
 
+wire::Envelope Backup() {
+  wire::Envelope envelope = Of(5);
+  envelope.mutable_backup_request()->set_name("monday");
+  envelope.mutable_backup_request()->set_timeout_ms(3'600'000);
+  return envelope;
+}
+
 wire::Envelope HelloReply() {
   wire::Envelope envelope = Of(1);
   wire::HelloReply& reply = *envelope.mutable_hello_reply();
@@ -196,9 +203,10 @@ TEST(DocumentedFramesTest, AreWhatThisBuildWrites) {
     return EncodeEnvelopeFrame(envelope).value();
   };
   const std::vector<Bytes> written = {
-      frame(Hello()),         frame(Sync()),        frame(Watch()), frame(HelloReply()),
-      frame(Upload()),        frame(UploadReply()), frame(Busy()),  frame(Sessions()),
-      frame(SessionsReply()), frame(Manifest()),    TileFrame(),    frame(SyncEnd())};
+      frame(Hello()),      frame(Backup()),        frame(Sync()),        frame(Watch()),
+      frame(HelloReply()), frame(Upload()),        frame(UploadReply()), frame(Busy()),
+      frame(Sessions()),   frame(SessionsReply()), frame(Manifest()),    TileFrame(),
+      frame(SyncEnd())};
   EXPECT_EQ(DocumentedFrames(), written);
 }
 

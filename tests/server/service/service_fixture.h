@@ -87,6 +87,7 @@ class ServiceTest : public ::testing::Test {
     service.fusion.building.survey_files = survey_files_;
     service.past_cache_bytes = 1u << 20;
     service.scratch_directory = directory_;
+    service.backup = backups_;
     service_ = std::make_unique<AtlasService>(
         *store_, [this] { return now_ms_.load(); }, [](LogLevel, const std::string&) {}, service);
   }
@@ -131,6 +132,7 @@ class ServiceTest : public ::testing::Test {
   std::size_t max_queued_writes_ = SqliteStoreOptions().max_queued_writes;
   SurveyCacheLimits surveys_{100'000, 100'000};
   SurveyFilesOptions survey_files_;  // none
+  BackupOptions backups_;            // none
   std::filesystem::path directory_;
   std::atomic<std::int64_t> now_ms_{kTestNow_ms};
   std::unique_ptr<AtlasStore> store_;

@@ -5,6 +5,9 @@
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <utility>
+
+#include <sys/stat.h>
 
 namespace atlas {
 namespace {
@@ -25,6 +28,12 @@ void Write(const fs::path& file, const Bytes& content) {
   if (!out.flush()) {
     throw std::runtime_error("cannot write " + file.string());
   }
+}
+
+// 0: there is none.
+std::uint64_t InodeOf(const fs::path& file) {
+  struct stat found {};
+  return ::stat(file.c_str(), &found) == 0 ? found.st_ino : 0;
 }
 
 bool Coin(std::mt19937& random) {
@@ -52,6 +61,7 @@ void VolatileFiles::NoteOpen(const fs::path& file) {
     files_.erase(before);
     return;
   }
+  state.inode = InodeOf(file);
   if (!state.durable && state.changes.empty() && fs::exists(file) && fs::file_size(file) > 0) {
     state.durable = ContentOf(file);
   }
@@ -76,7 +86,9 @@ void VolatileFiles::NoteSync(const fs::path& file) {
   for (const Change& change : state.changes) {
     Apply(change, Loss::kAll, unused, content);
   }
-  state = {std::move(content), {}, false};
+  state.durable = std::move(content);
+  state.changes.clear();
+  state.is_deleted = false;
   if (is_new_log) {  // SQLite syncs its folder then: who was deleted does not come back
     std::erase_if(files_, [](const auto& other) { return other.second.is_deleted; });
   }
@@ -118,8 +130,25 @@ void VolatileFiles::Apply(const Change& change, Loss loss, std::mt19937& random,
   }
 }
 
+// Nobody tells of a file that is given another name once it is whole.
+void VolatileFiles::FollowRenames() {
+  const std::string suffix = ".partial";
+  std::map<fs::path, State> followed;
+  for (auto& [file, state] : files_) {
+    const std::string name = file.string();
+    fs::path now = file;
+    if (name.ends_with(suffix)) {
+      const fs::path whole = name.substr(0, name.size() - suffix.size());
+      now = InodeOf(whole) == state.inode ? whole : file;
+    }
+    followed[now] = std::move(state);
+  }
+  files_ = std::move(followed);
+}
+
 void VolatileFiles::LosePower(Loss loss, std::uint32_t seed) {
   const std::lock_guard lock(mutex_);
+  FollowRenames();
   std::mt19937 random(seed);
   for (const auto& [file, state] : files_) {
     const bool stays_deleted = state.is_deleted && (loss == Loss::kAll || Coin(random));

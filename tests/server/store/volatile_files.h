@@ -47,8 +47,10 @@ class VolatileFiles {
     std::optional<Bytes> durable;  // none: nobody would find it
     std::vector<Change> changes;   // since
     bool is_deleted = false;
+    std::uint64_t inode = 0;
   };
 
+  void FollowRenames();
   static void Apply(const Change& change, Loss loss, std::mt19937& random, Bytes& content);
 
   std::mutex mutex_;

@@ -8,10 +8,13 @@
 
 namespace atlas {
 
+std::unique_ptr<Command> MakeBackupCommand();
+std::unique_ptr<Command> MakeBackupsCommand();
 std::unique_ptr<Command> MakeCompactCommand();
 std::unique_ptr<Command> MakeDigestCommand();
 std::unique_ptr<Command> MakeLogCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
+std::unique_ptr<Command> MakeRestoreCommand();
 std::unique_ptr<Command> MakeSessionRestoreCommand();
 std::unique_ptr<Command> MakeSessionRetractCommand();
 std::unique_ptr<Command> MakeSessionsCommand();

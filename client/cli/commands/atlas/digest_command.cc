@@ -1,19 +1,10 @@
 // `atlas digest`: one number for the whole atlas; equal atlases, equal digests.
 #include "client/cli/commands/atlas/atlas_commands.h"
 #include "client/cli/commands/atlas/timeout_flag.h"
+#include "client/cli/output/text_table.h"
 
 namespace atlas {
 namespace {
-
-std::string Hex(ByteSpan bytes) {
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string text;
-  for (const std::uint8_t byte : bytes) {
-    text += kDigits[byte >> 4];
-    text += kDigits[byte & 0xF];
-  }
-  return text;
-}
 
 class DigestCommand : public Command {
  public:
@@ -33,11 +24,11 @@ class DigestCommand : public Command {
     const Result<DigestSummary> digest = client->Digest(timeout_, at_revision_);
     if (!digest) return digest.error();
     if (context.is_json) {
-      context.PrintJson({{"digest", Hex(digest->sha256)},
+      context.PrintJson({{"digest", HexText(digest->sha256)},
                          {"tiles", digest->tiles},
                          {"revision", digest->revision}});
     } else {
-      context.out << Hex(digest->sha256) << "  " << digest->tiles << " tiles, revision "
+      context.out << HexText(digest->sha256) << "  " << digest->tiles << " tiles, revision "
                   << digest->revision << '\n';
     }
     return {};

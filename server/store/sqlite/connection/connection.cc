@@ -156,6 +156,15 @@ std::optional<int> Connection::CopyLog() {
   return copied;
 }
 
+void Connection::InterruptWhen(std::function<bool()> is_over) {
+  constexpr int kSteps = 100'000;  // of SQLite's machine, about a millisecond
+  is_over_ = std::move(is_over);
+  const auto ask = [](void* self) {
+    return static_cast<Connection*>(self)->is_over_() ? 1 : 0;
+  };
+  sqlite3_progress_handler(database_.getHandle(), kSteps, ask, this);
+}
+
 Snapshot::~Snapshot() {
   try {
     if (connection_.is_in_transaction()) {

@@ -100,10 +100,16 @@ class Connection {
   // Copies as much of the log as readers let it, beside them and a writer. How many of its pages
   // are in the database now; none: another connection is at it.
   std::optional<int> CopyLog();
+  // Asked now and then while a statement runs: true ends it with SQLITE_INTERRUPT. It must not
+  // throw.
+  void InterruptWhen(std::function<bool()> is_over);
 
  private:
+  friend class PageCopy;
+
   std::array<std::uint8_t, 16> id_{};
   std::function<void(int)> on_commit_;
+  std::function<bool()> is_over_;
   SQLite::Database database_;
   std::unordered_map<const char*, std::unique_ptr<SQLite::Statement>> statements_;
 };

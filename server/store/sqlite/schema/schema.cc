@@ -172,6 +172,14 @@ void CreateSchema(Connection& connection, const StoreIdentity& identity) {
                          .c_str());
 }
 
+void WriteEpoch(Connection& connection, const StoreIdentity& identity, std::uint64_t epoch) {
+  const Bytes profile = identity.profile.Encode();
+  connection.Prepare("UPDATE meta SET epoch = ?, checksum = ? WHERE id = 1")
+      .Bind(epoch)
+      .Bind(MetaHash(profile, identity.atlas_id, epoch))
+      .Run();
+}
+
 Result<std::int64_t> ReadSchemaVersion(Connection& connection) {
   const std::int64_t application = connection.Ask("PRAGMA application_id");
   if (application != kStoreApplicationId) {

@@ -18,7 +18,9 @@ void CreateSchema(Connection& connection, const StoreIdentity& identity);
 Result<std::int64_t> ReadSchemaVersion(Connection& connection);
 // Of whichever version: what all of them have. kInvalidData where it is damaged.
 Result<StoreIdentity> ReadMeta(Connection& connection);
-// The same, but kUnsupported on an earlier version, too.
+// Of an atlas of today's version, inside a transaction.
+void WriteEpoch(Connection& connection, const StoreIdentity& identity, std::uint64_t epoch);
+// The same as ReadMeta, but kUnsupported on an earlier version, too.
 Result<StoreIdentity> ReadIdentity(Connection& connection);
 
 }  // namespace atlas

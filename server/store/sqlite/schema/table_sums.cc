@@ -143,6 +143,19 @@ void KeepTableSums(Connection& connection) {
   }
 }
 
+std::uint64_t HashOfTableSums(Connection& connection) {
+  Query row =
+      connection.Prepare("SELECT id, row_count, checksums FROM main.table_sums ORDER BY id");
+  ByteWriter out;
+  while (row.Step()) {
+    row.Rewind();
+    for (int column = 0; column < 3; ++column) {
+      out.I64(row.Int());
+    }
+  }
+  return Hash64(out.bytes());
+}
+
 Status CheckTableSums(Connection& connection) {
   for (const SummedTable& table : kTables) {
     ATLAS_RETURN_IF_ERROR(Check(connection, table));

@@ -3,6 +3,7 @@
 // that keeps them is found out.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 
 #include "core/base/status.h"
@@ -20,6 +21,9 @@ void KeepTableSums(Connection& connection);
 // Runs `restore`, which makes rows what they were written as: their table holds what it should
 // then, and nothing is counted.
 void WithoutCounting(Connection& connection, RowKind table, const std::function<void()>& restore);
+
+// One number for what all tables should hold.
+std::uint64_t HashOfTableSums(Connection& connection);
 
 // Reads the checksums of all rows, without their blobs. kInvalidData names the table that lost rows
 // or has others than were written.

@@ -1,6 +1,7 @@
 #include "server/store/sqlite/tables/event_table.h"
 
 #include <chrono>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -27,6 +28,20 @@ std::int64_t NowMs() {
   using std::chrono::milliseconds;
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<milliseconds>(now).count();
+}
+
+// The columns of a row in order; nothing if its checksum is another.
+std::optional<Event> ReadEvent(Query& row) {
+  row.Rewind();
+  Event event;
+  event.id = row.Unsigned();
+  event.revision = row.Unsigned();
+  event.time_ms = row.Int();
+  event.kind = static_cast<EventKind>(row.Int());
+  event.author = row.Text();
+  event.subject = row.Text();
+  event.detail = row.Text();
+  return row.Int() == HashOf(event) ? std::optional(std::move(event)) : std::nullopt;
 }
 
 }  // namespace
@@ -63,22 +78,29 @@ Result<std::vector<Event>> ReadEvents(Connection& connection,
   row.Bind(after_id).Bind(limit);
   std::vector<Event> events;
   while (row.Step()) {
-    row.Rewind();
-    Event event;
-    event.id = row.Unsigned();
-    event.revision = row.Unsigned();
-    event.time_ms = row.Int();
-    event.kind = static_cast<EventKind>(row.Int());
-    event.author = row.Text();
-    event.subject = row.Text();
-    event.detail = row.Text();
-    if (row.Int() != HashOf(event)) {
+    std::optional<Event> event = ReadEvent(row);
+    if (!event) {
+      row.Rewind();
       return Error(StatusCode::kInvalidData,
-                   StrCat("store: event ", event.id, " is damaged: wrong checksum"));
+                   StrCat("store: event ", row.Unsigned(), " is damaged: wrong checksum"));
     }
-    events.push_back(std::move(event));
+    events.push_back(*std::move(event));
   }
   return events;
+}
+
+std::vector<std::uint64_t> RevisionsOf(Connection& connection, EventKind kind) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events "
+      "WHERE kind = ? ORDER BY id");
+  row.Bind(static_cast<std::int64_t>(kind));
+  std::vector<std::uint64_t> revisions;
+  while (row.Step()) {
+    if (const auto event = ReadEvent(row)) {
+      revisions.push_back(event->revision);
+    }
+  }
+  return revisions;
 }
 
 }  // namespace atlas

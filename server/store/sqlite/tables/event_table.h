@@ -26,4 +26,7 @@ Result<std::vector<Event>> ReadEvents(Connection& connection,
                                       std::uint64_t after_id,
                                       std::uint32_t limit);
 
+// Of all of a kind, in order; damaged ones are left out.
+std::vector<std::uint64_t> RevisionsOf(Connection& connection, EventKind kind);
+
 }  // namespace atlas

@@ -101,6 +101,20 @@ Result<PoseChange> ReadHistoryRow(Query& row) {
   return stored;
 }
 
+std::int64_t HashOfBatch(std::uint64_t id,
+                         std::uint64_t revision,
+                         std::string_view author,
+                         std::uint64_t updated,
+                         std::uint64_t if_revision) {
+  return RowHash(RowKind::kPoseBatch)
+      .Unsigned(id)
+      .Unsigned(revision)
+      .Text(author)
+      .Unsigned(updated)
+      .Unsigned(if_revision)
+      .value();
+}
+
 }  // namespace
 
 Result<QuantizedPose> ReadPose(Connection& connection, std::int64_t keyframe_id) {
@@ -209,9 +223,6 @@ void DeletePoses(Connection& connection, std::int64_t keyframe_id) {
 }
 
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result) {
-  RowHash hash(RowKind::kPoseBatch);
-  hash.Unsigned(result.batch).Unsigned(result.revision).Text(batch.author);
-  hash.Unsigned(result.updated).Unsigned(batch.if_revision);
   connection
       .Prepare(
           "INSERT INTO pose_batches (id, revision, author, updated, if_revision, checksum) "
@@ -221,8 +232,27 @@ void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBa
       .Bind(std::string_view(batch.author))
       .Bind(result.updated)
       .Bind(batch.if_revision)
-      .Bind(hash.value())
+      .Bind(HashOfBatch(result.batch, result.revision, batch.author, result.updated,
+                        batch.if_revision))
       .Run();
+}
+
+Status CheckPoseBatches(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, author, updated, if_revision, checksum FROM pose_batches");
+  while (row.Step()) {
+    row.Rewind();
+    const std::uint64_t id = row.Unsigned();
+    const std::uint64_t revision = row.Unsigned();
+    const std::string author = row.Text();
+    const std::uint64_t updated = row.Unsigned();
+    const std::uint64_t if_revision = row.Unsigned();
+    if (row.Int() != HashOfBatch(id, revision, author, updated, if_revision)) {
+      return Status(StatusCode::kInvalidData,
+                    StrCat("store: pose batch ", id, " is damaged: wrong checksum"));
+    }
+  }
+  return {};
 }
 
 }  // namespace atlas

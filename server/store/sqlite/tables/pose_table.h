@@ -47,5 +47,7 @@ int DeleteDamagedPoses(Connection& connection, std::int64_t keyframe_id);
 void DeletePoses(Connection& connection, std::int64_t keyframe_id);
 
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
+// kInvalidData names the first batch whose row is damaged.
+Status CheckPoseBatches(Connection& connection);
 
 }  // namespace atlas

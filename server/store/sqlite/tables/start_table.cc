@@ -67,4 +67,11 @@ std::vector<AtlasStart> ReadStarts(Connection& connection) {
   return starts;
 }
 
+Status CheckStarts(Connection& connection) {
+  const auto rows = static_cast<std::size_t>(connection.Ask("SELECT count(*) FROM starts"));
+  return ReadStarts(connection).size() == rows
+             ? Status()
+             : Status(StatusCode::kInvalidData, "store: a start is damaged: wrong checksum");
+}
+
 }  // namespace atlas

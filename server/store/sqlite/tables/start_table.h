@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/status.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/store_types.h"
 
@@ -15,5 +16,7 @@ std::uint64_t NextRevision(Connection& connection);
 
 // Oldest first, those before a damaged one left out.
 std::vector<AtlasStart> ReadStarts(Connection& connection);
+// kInvalidData when a row is damaged.
+Status CheckStarts(Connection& connection);
 
 }  // namespace atlas

@@ -1,4 +1,4 @@
-#include "server/service/verification/tile_hasher.h"
+#include "server/store/tile_hasher.h"
 
 #include <openssl/evp.h>
 

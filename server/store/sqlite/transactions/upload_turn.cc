@@ -1,0 +1,34 @@
+#include "server/store/sqlite/transactions/upload_turn.h"
+
+#include <exception>
+#include <utility>
+
+#include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/transactions/transactions.h"
+
+namespace atlas {
+
+Result<PutKeyframeResult> PutInTurn(Connection& connection, const NewKeyframe& keyframe) {
+  if (Status status = keyframe.missing->CheckTurn(keyframe.key); !status.ok()) {
+    return Error(std::move(status));
+  }
+  try {
+    auto result = PutKeyframeInStore(connection, keyframe);
+    keyframe.missing->NoteEnd(keyframe.key, result ? Status() : result.error());
+    return result;
+  } catch (const std::exception& error) {
+    keyframe.missing->NoteEnd(keyframe.key, StatusFromException(error));
+    throw;
+  }
+}
+
+std::function<void(Result<PutKeyframeResult>)> Noting(
+    const NewKeyframe& keyframe, std::function<void(Result<PutKeyframeResult>)> done) {
+  return [missing = keyframe.missing, key = keyframe.key,
+          done = std::move(done)](Result<PutKeyframeResult> result) {
+    missing->NoteEnd(key, result ? Status() : result.error());
+    done(std::move(result));
+  };
+}
+
+}  // namespace atlas
