@@ -54,15 +54,20 @@ class Reading {
 
  private:
   Status CheckSessions() {
-    const auto sessions = ReadSessions(connection_);
-    if (!sessions) {
-      return sessions.error();
+    for (SessionKey after;;) {
+      const auto sessions = ReadSessions(connection_, after, kPage);
+      if (!sessions) {
+        return sessions.error();
+      }
+      if (sessions->empty()) {
+        return {};
+      }
+      for (const SessionRecord& session : *sessions) {
+        ATLAS_RETURN_IF_ERROR(work_.check_stop());
+        ATLAS_RETURN_IF_ERROR(CheckSessionHistory(connection_, session.key));
+      }
+      after = sessions->back().key;
     }
-    for (const SessionRecord& session : *sessions) {
-      ATLAS_RETURN_IF_ERROR(work_.check_stop());
-      ATLAS_RETURN_IF_ERROR(CheckSessionHistory(connection_, session.key));
-    }
-    return {};
   }
 
   Status CheckEvents() {
