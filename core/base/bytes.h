@@ -15,6 +15,7 @@ using ByteSpan = std::span<const std::uint8_t>;
 // Appends to an owned buffer.
 class ByteWriter {
  public:
+  void Reserve(std::size_t bytes) { bytes_.reserve(bytes); }  // for all that is to be written
   void U8(std::uint8_t value) { bytes_.push_back(value); }
   void U16(std::uint16_t value) { Fixed(value, 2); }
   void U32(std::uint32_t value) { Fixed(value, 4); }

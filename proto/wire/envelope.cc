@@ -44,6 +44,8 @@ class ShapeCheck {
     return in_.ConsumedEntireMessage() ? Status() : Malformed();
   }
 
+  bool has_unknown() const { return unknown_ > 0; }
+
  private:
   Status Field(const Descriptor& type, std::uint32_t tag) {
     const auto wire_type = WireFormatLite::GetTagWireType(tag);
@@ -52,6 +54,9 @@ class ShapeCheck {
       return Malformed();
     }
     const FieldDescriptor* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+    if (field != nullptr && !CanBe(*field, wire_type)) {
+      field = nullptr;  // Protobuf keeps it as one that it does not know
+    }
     if (field == nullptr && ++unknown_ > kMaxUnknownFields) {
       return TooMany("unknown fields", kMaxUnknownFields);
     }
@@ -76,10 +81,18 @@ class ShapeCheck {
                             : Status(StatusCode::kResourceExhausted, "envelope: more than blobs");
   }
 
+  static WireFormatLite::WireType WireTypeOf(const FieldDescriptor& field) {
+    return WireFormatLite::WireTypeForFieldType(
+        static_cast<WireFormatLite::FieldType>(field.type()));
+  }
+
+  static bool CanBe(const FieldDescriptor& field, WireFormatLite::WireType wire_type) {
+    return wire_type == WireTypeOf(field) ||
+           (field.is_packable() && wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED);
+  }
+
   static bool HasVarints(const FieldDescriptor& field) {
-    return field.is_packable() && WireFormatLite::WireTypeForFieldType(
-                                      static_cast<WireFormatLite::FieldType>(field.type())) ==
-                                      WireFormatLite::WIRETYPE_VARINT;
+    return field.is_packable() && WireTypeOf(field) == WireFormatLite::WIRETYPE_VARINT;
   }
 
   // Numbers of one byte take up to eight in memory. Those of fixed size take what they came in.
@@ -121,10 +134,16 @@ class ShapeCheck {
   std::uint32_t repeated_ = 0;
 };
 
-Status CheckShape(ByteSpan payload, std::size_t max_bytes) {
+// Whether it has fields that are not known.
+Result<bool> CheckShape(ByteSpan payload, std::size_t max_bytes) {
   CodedInputStream in(payload.data(), static_cast<int>(payload.size()));
   in.SetRecursionLimit(kMaxDepth);
-  return ShapeCheck(in, max_bytes).Message(*wire::Envelope::descriptor());
+  ShapeCheck check(in, max_bytes);
+  Status status = check.Message(*wire::Envelope::descriptor());
+  if (!status.ok()) {
+    return Error(std::move(status));
+  }
+  return check.has_unknown();
 }
 
 }  // namespace
@@ -134,8 +153,9 @@ Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
     return Error(StatusCode::kInvalidData,
                  StrCat("envelope: ", payload.size(), " bytes, expected at most ", kMaxFrameBytes));
   }
-  if (Status status = CheckShape(payload, payload.size()); !status.ok()) {
-    return Error(std::move(status));
+  const Result<bool> has_unknown = CheckShape(payload, payload.size());
+  if (!has_unknown) {
+    return Error(has_unknown.error());
   }
   CodedInputStream in(payload.data(), static_cast<int>(payload.size()));
   in.SetRecursionLimit(kMaxDepth);
@@ -143,12 +163,14 @@ Result<wire::Envelope> ParseEnvelope(ByteSpan payload) {
   if (!envelope.ParseFromCodedStream(&in) || !in.ConsumedEntireMessage()) {
     return Error(Malformed());
   }
-  envelope.DiscardUnknownFields();
+  if (*has_unknown) {  // else looking for them takes as long as reading it did
+    envelope.DiscardUnknownFields();
+  }
   return envelope;
 }
 
 bool IsSmallBesidesBlobs(ByteSpan payload, std::size_t max_bytes) {
-  return CheckShape(payload, max_bytes).ok();
+  return CheckShape(payload, max_bytes).has_value();
 }
 
 Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope) {

@@ -37,6 +37,7 @@ Status BadMagic() {
 Bytes EncodeHeader(const FrameHeader& header) {
   assert(header.payload_bytes <= kMaxFrameBytes);
   ByteWriter out;
+  out.Reserve(kFrameHeaderBytes);
   out.Raw(kMagic);
   out.U32(header.payload_bytes);
   out.U32(header.checksum);

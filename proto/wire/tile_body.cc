@@ -51,14 +51,17 @@ Result<TileBody> TileBody::Create(const TileBodyId& id, ByteSpan blob) {
 
 Bytes TileBody::FrameAround(std::uint64_t request_id) const {
   ByteWriter tail;
+  tail.Reserve(kMaxTailBytes);
   tail.Varint(Tag(wire::Envelope::kRequestIdFieldNumber, kVarint));
   tail.Varint(request_id);
   Hash64Stream hash = hash_;
   hash.Add(tail.bytes());
-  Bytes around = EncodeHeader({static_cast<std::uint32_t>(bytes_.size() + tail.size()),
-                               static_cast<std::uint32_t>(hash.value())});
-  around.insert(around.end(), tail.bytes().begin(), tail.bytes().end());
-  return around;
+  ByteWriter around;
+  around.Reserve(kFrameHeaderBytes + kMaxTailBytes);
+  around.Raw(EncodeHeader({static_cast<std::uint32_t>(bytes_.size() + tail.size()),
+                           static_cast<std::uint32_t>(hash.value())}));
+  around.Raw(tail.bytes());
+  return around.Take();
 }
 
 }  // namespace atlas

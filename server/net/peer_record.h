@@ -35,6 +35,11 @@ struct PeerRecord {
   // Of its name or address; null: it may have all there is.
   std::shared_ptr<PeerShare> share = nullptr;
 
+  // For whom it takes a turn with the others.
+  const void* whose() const {
+    return share != nullptr ? share.get() : static_cast<const void*>(this);
+  }
+
   LogLine Line(std::string_view message) const {
     LogLine line(StrCat(address, ": ", message), message);
     line.Add("peer", address);

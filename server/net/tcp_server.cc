@@ -69,8 +69,10 @@ class TcpServer::Impl {
         service_(service),
         security_(std::move(security)),
         pool_(static_cast<std::size_t>(options.service_threads)),
-        reading_pool_(static_cast<std::size_t>(options.reading_threads)),
-        handler_(service, pool_, reading_pool_, options_),
+        reply_pool_(static_cast<std::size_t>(options.reply_threads),
+                    static_cast<std::size_t>(std::max(1, options.reply_threads / 2))),
+        reading_pool_(static_cast<std::size_t>(options.reading_threads), 1),
+        handler_(service, pool_, reply_pool_, reading_pool_, options_),
         limits_(options),
         places_(options.max_connections),
         pace_(PaceFrom(options, security_.tls != nullptr)),
@@ -93,7 +95,8 @@ class TcpServer::Impl {
     }
     handler_.Join();
     pool_.join();
-    reading_pool_.join();
+    reply_pool_.Join();
+    reading_pool_.Join();
     service_.Flush();
   }
 
@@ -295,7 +298,8 @@ class TcpServer::Impl {
   AtlasService& service_;
   ServerSecurity security_;
   asio::thread_pool pool_;
-  asio::thread_pool reading_pool_;
+  FairPool reply_pool_;
+  FairPool reading_pool_;
   RequestHandler handler_;
   SharedLimits limits_;
   Places places_;  // of connections

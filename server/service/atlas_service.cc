@@ -119,7 +119,7 @@ Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
 
 std::function<Status()> AtlasService::CheckPast(std::uint64_t revision,
                                                 const Patience& patience) const {
-  return wait_.Check(FusionWait::Limit(patience),
+  return wait_.Check(patience,
                      StrCat("the atlas of revision ", revision, " was not fused in time"));
 }
 
@@ -203,7 +203,7 @@ Result<AtlasFacts> AtlasService::Backup(
     const Patience& patience,
     const std::function<void(const BackupProgress&)>& on_progress) {
   BackupWork work;
-  work.check_stop = wait_.Check(FusionWait::Limit(patience), "the backup was not written in time");
+  work.check_stop = wait_.Check(patience, "the backup was not written in time");
   work.on_progress = on_progress;
   return backups_.Write(request, std::move(work));
 }

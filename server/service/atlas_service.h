@@ -77,10 +77,10 @@ class AtlasService {
 
   // fusion_wait.h
   Result<WaitOutcome> WaitUntilClean(const Patience& patience) {
-    return wait_.UntilClean(FusionWait::Limit(patience));
+    return wait_.UntilClean(patience);
   }
   Status WaitForRevision(std::uint64_t revision, const Patience& patience) {
-    return wait_.ForRevision(revision, FusionWait::Limit(patience));
+    return wait_.ForRevision(revision, patience);
   }
 
   // A query of an earlier revision fuses what it sends: `patience` bounds all of it, kTimeout.

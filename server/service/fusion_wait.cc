@@ -35,7 +35,7 @@ bool FusionWait::IsStuck(const DirtyState& state) const {
 }
 
 Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtyState&)>& is_done,
-                                          const Limit& limit,
+                                          const Patience& patience,
                                           DirtyState& state) const {
   while (true) {
     const auto begin = Clock::now();
@@ -53,8 +53,8 @@ Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtySt
       return End::kDamaged;
     }
     const auto end = Clock::now();
-    if (!changes_.WaitPast(seen, limit.deadline, limit.stop)) {
-      if (Status status = CheckRunning(limit.stop); !status.ok()) {
+    if (!changes_.WaitPast(seen, patience.deadline, patience.stop)) {
+      if (Status status = CheckRunning(patience.stop); !status.ok()) {
         return Error(std::move(status));
       }
       if (!start.ok()) {
@@ -63,14 +63,14 @@ Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtySt
       return End::kTimedOut;
     }
     if (state.dirty_tiles > kMany) {
-      std::this_thread::sleep_until(std::min(end + kRest * (end - begin), limit.deadline));
+      std::this_thread::sleep_until(std::min(end + kRest * (end - begin), patience.deadline));
     }
   }
 }
 
-Result<WaitOutcome> FusionWait::UntilClean(const Limit& limit) const {
+Result<WaitOutcome> FusionWait::UntilClean(const Patience& patience) const {
   DirtyState state;
-  const auto end = Until([](const DirtyState& s) { return s.dirty_tiles == 0; }, limit, state);
+  const auto end = Until([](const DirtyState& s) { return s.dirty_tiles == 0; }, patience, state);
   if (!end) {
     return Error(end.error());
   }
@@ -81,8 +81,8 @@ Result<WaitOutcome> FusionWait::UntilClean(const Limit& limit) const {
   return outcome;
 }
 
-Result<WaitOutcome> FusionWait::UntilCleanInTime(const Limit& limit) const {
-  auto outcome = UntilClean(limit);
+Result<WaitOutcome> FusionWait::UntilCleanInTime(const Patience& patience) const {
+  auto outcome = UntilClean(patience);
   if (outcome && outcome->is_timed_out) {
     return Error(StatusCode::kTimeout, StrCat("the atlas is not clean: ", outcome->dirty_tiles,
                                               " tiles are to be fused"));
@@ -90,7 +90,7 @@ Result<WaitOutcome> FusionWait::UntilCleanInTime(const Limit& limit) const {
   return outcome;
 }
 
-Status FusionWait::ForRevision(std::uint64_t revision, const Limit& limit) const {
+Status FusionWait::ForRevision(std::uint64_t revision, const Patience& patience) const {
   if (const std::uint64_t current = store_.revision(); revision > current) {
     return Status(StatusCode::kInvalidArgument,
                   StrCat("cannot wait for revision ", revision, ", the atlas is at ", current));
@@ -99,7 +99,7 @@ Status FusionWait::ForRevision(std::uint64_t revision, const Limit& limit) const
   DirtyState state;
   const auto end = Until(
       [revision](const DirtyState& s) { return s.dirty_tiles == 0 || s.oldest_since > revision; },
-      limit, state);
+      patience, state);
   if (!end) {
     return end.error();
   }
@@ -113,10 +113,10 @@ Status FusionWait::ForRevision(std::uint64_t revision, const Limit& limit) const
   return {};
 }
 
-std::function<Status()> FusionWait::Check(const Limit& limit, std::string too_late) const {
-  return [this, limit, too_late = std::move(too_late)] {
-    ATLAS_RETURN_IF_ERROR(CheckRunning(limit.stop));
-    return limit.is_over() ? Status(StatusCode::kTimeout, too_late) : Status();
+std::function<Status()> FusionWait::Check(const Patience& patience, std::string too_late) const {
+  return [this, patience, too_late = std::move(too_late)] {
+    ATLAS_RETURN_IF_ERROR(CheckRunning(patience.stop));
+    return patience.is_over() ? Status(StatusCode::kTimeout, too_late) : Status();
   };
 }
 

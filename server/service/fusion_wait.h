@@ -8,6 +8,7 @@
 #include <functional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "core/base/status.h"
 #include "server/service/change_signal.h"
@@ -16,9 +17,20 @@
 
 namespace atlas {
 
-// How long a call may wait, and what ends it earlier.
+// Until when a call may wait and work, however often it is handed on, and what ends it earlier.
 struct Patience {
-  std::chrono::milliseconds timeout{0};
+  using Clock = std::chrono::steady_clock;
+
+  Patience() = default;  // none: it looks once
+  Patience(Clock::time_point latest, std::stop_token token)
+      : deadline(latest), stop(std::move(token)) {}
+  // From now on.
+  Patience(Clock::duration timeout, std::stop_token token)
+      : Patience(Clock::now() + timeout, std::move(token)) {}
+
+  bool is_over() const { return Clock::now() >= deadline; }
+
+  Clock::time_point deadline;
   std::stop_token stop;
 };
 
@@ -32,39 +44,27 @@ struct WaitOutcome {
 
 class FusionWait {
  public:
-  // The time of a call that may wait several times.
-  class Limit {
-   public:
-    explicit Limit(const Patience& patience)
-        : deadline(std::chrono::steady_clock::now() + patience.timeout), stop(patience.stop) {}
-
-    bool is_over() const { return std::chrono::steady_clock::now() >= deadline; }
-
-    const ChangeSignal::TimePoint deadline;
-    const std::stop_token stop;
-  };
-
   FusionWait(AtlasStore& store, ChangeSignal& changes, const FusionScheduler& fusion)
       : store_(store), changes_(changes), fusion_(fusion), damage_(fusion.damage()) {}
 
   // Until nothing is dirty but what damage keeps from being fused.
-  Result<WaitOutcome> UntilClean(const Limit& limit) const;
+  Result<WaitOutcome> UntilClean(const Patience& patience) const;
   // The same; kTimeout when it is not in time.
-  Result<WaitOutcome> UntilCleanInTime(const Limit& limit) const;
+  Result<WaitOutcome> UntilCleanInTime(const Patience& patience) const;
   // Until the tiles reflect every change up to `revision`. kTimeout if they do not in time,
   // kInvalidData if damage keeps them from it, kInvalidArgument when the atlas has no such revision
   // yet, kNotFound when it is lost (StoreIdentity).
-  Status ForRevision(std::uint64_t revision, const Limit& limit) const;
+  Status ForRevision(std::uint64_t revision, const Patience& patience) const;
 
   // For long work to ask now and then: a failed status ends it. kTimeout, in the words of
   // `too_late`, when the time is up.
-  std::function<Status()> Check(const Limit& limit, std::string too_late) const;
+  std::function<Status()> Check(const Patience& patience, std::string too_late) const;
 
  private:
   enum class End { kDone, kDamaged, kTimedOut };
 
   Result<End> Until(const std::function<bool(const DirtyState&)>& is_done,
-                    const Limit& limit,
+                    const Patience& patience,
                     DirtyState& state) const;
   bool IsStuck(const DirtyState& state) const;
   Status CheckRunning(const std::stop_token& stop) const;

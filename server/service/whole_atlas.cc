@@ -4,8 +4,8 @@
 
 namespace atlas {
 
-Result<std::uint64_t> WholeAtlas::CleanRevision(const FusionWait::Limit& limit) const {
-  const auto clean = wait_.UntilCleanInTime(limit);
+Result<std::uint64_t> WholeAtlas::CleanRevision(const Patience& patience) const {
+  const auto clean = wait_.UntilCleanInTime(patience);
   if (!clean) {
     return Error(clean.error());
   }
@@ -16,10 +16,9 @@ Result<std::uint64_t> WholeAtlas::CleanRevision(const FusionWait::Limit& limit) 
 }
 
 Result<AtlasDigest> WholeAtlas::Digest(const Patience& patience) const {
-  const FusionWait::Limit limit(patience);
-  const auto check_stop = wait_.Check(limit, "the digest was not computed in time");
+  const auto check_stop = wait_.Check(patience, "the digest was not computed in time");
   while (true) {
-    const auto revision = CleanRevision(limit);
+    const auto revision = CleanRevision(patience);
     if (!revision) {
       return Error(revision.error());
     }
@@ -35,7 +34,7 @@ Result<AtlasDigest> WholeAtlas::Digest(const Patience& patience) const {
       digest->revision = *revision;
       return digest;
     }
-    if (limit.is_over()) {
+    if (patience.is_over()) {
       return Error(StatusCode::kTimeout, "the atlas changes while its digest is computed");
     }
   }
@@ -43,22 +42,21 @@ Result<AtlasDigest> WholeAtlas::Digest(const Patience& patience) const {
 
 Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
                                         const Patience& patience) const {
-  const FusionWait::Limit limit(patience);
   if (!request.repair) {
-    return VerifyInTime(request.rebuild, limit);
+    return VerifyInTime(request.rebuild, patience);
   }
   AtlasVerifier::Options options;
   options.request = request;
-  options.check_stop = wait_.Check(limit, "the atlas was not repaired in time");
+  options.check_stop = wait_.Check(patience, "the atlas was not repaired in time");
   auto repaired = AtlasVerifier(store_, options).Run();
   changes_.Notify();  // what was marked can be built
   if (!repaired) {
     return repaired;
   }
-  if (const auto clean = wait_.UntilCleanInTime(limit); !clean) {
+  if (const auto clean = wait_.UntilCleanInTime(patience); !clean) {
     return Error(clean.error());
   }
-  auto left = VerifyInTime(request.rebuild, limit);
+  auto left = VerifyInTime(request.rebuild, patience);
   if (left) {
     left->restored = repaired->restored;
     left->given_up = repaired->given_up;
@@ -68,14 +66,14 @@ Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
   return left;
 }
 
-Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const FusionWait::Limit& limit) const {
+Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const Patience& patience) const {
   AtlasVerifier::Options options;
   options.request.rebuild = rebuild;
-  options.check_stop = wait_.Check(limit, "the atlas was not verified in time");
+  options.check_stop = wait_.Check(patience, "the atlas was not verified in time");
   while (true) {
     std::uint64_t clean_revision = 0;
     if (rebuild) {
-      const auto clean = wait_.UntilCleanInTime(limit);
+      const auto clean = wait_.UntilCleanInTime(patience);
       if (!clean) {
         return Error(clean.error());
       }
@@ -103,7 +101,7 @@ Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const FusionWait::Li
     if (!is_in_doubt) {
       return report;
     }
-    if (limit.is_over()) {
+    if (patience.is_over()) {
       return Error(StatusCode::kTimeout, "the atlas changes while it is verified");
     }
   }
@@ -114,16 +112,15 @@ Result<CompactionReport> WholeAtlas::Compact(const CompactionRequest& request,
   if (Status status = CheckCompaction(request, store_.identity().profile); !status.ok()) {
     return Error(std::move(status));
   }
-  const FusionWait::Limit limit(patience);
   const std::unique_lock only_one(compacting_, std::try_to_lock);
   if (!only_one) {
     return Error(StatusCode::kUnavailable, "another compaction is under way");
   }
   const std::uint64_t revision = store_.revision();
-  if (Status status = wait_.ForRevision(revision, limit); !status.ok()) {
+  if (Status status = wait_.ForRevision(revision, patience); !status.ok()) {
     return Error(std::move(status));
   }
-  const auto check_stop = wait_.Check(limit, "the atlas was not compacted in time");
+  const auto check_stop = wait_.Check(patience, "the atlas was not compacted in time");
   auto report = CompactAt(store_, revision, request, check_stop);
   changes_.Notify();
   return report;

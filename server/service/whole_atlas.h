@@ -35,9 +35,9 @@ class WholeAtlas {
   Result<CompactionReport> Compact(const CompactionRequest& request, const Patience& patience);
 
  private:
-  Result<VerifyReport> VerifyInTime(bool rebuild, const FusionWait::Limit& limit) const;
+  Result<VerifyReport> VerifyInTime(bool rebuild, const Patience& patience) const;
   // Of an atlas without dirty tiles, nor damage.
-  Result<std::uint64_t> CleanRevision(const FusionWait::Limit& limit) const;
+  Result<std::uint64_t> CleanRevision(const Patience& patience) const;
 
   AtlasStore& store_;
   ChangeSignal& changes_;

@@ -20,10 +20,8 @@ constexpr std::chrono::milliseconds kLongestTimeout{86'400'000};
 // Pauses between two looks at what is still dirty.
 class Pauses {
  public:
-  Pauses(const asio::any_io_executor& executor, std::chrono::milliseconds timeout)
-      : timer_(executor), deadline_(std::chrono::steady_clock::now() + timeout) {}
+  explicit Pauses(const asio::any_io_executor& executor) : timer_(executor) {}
 
-  bool is_over() const { return std::chrono::steady_clock::now() >= deadline_; }
   asio::awaitable<void> Next() {
     timer_.expires_after(pause_);
     pause_ = std::min(2 * pause_, kLongest);
@@ -34,7 +32,6 @@ class Pauses {
   static constexpr std::chrono::milliseconds kLongest{100};
 
   asio::steady_timer timer_;
-  std::chrono::steady_clock::time_point deadline_;
   std::chrono::milliseconds pause_{2};
 };
 
@@ -44,17 +41,21 @@ std::chrono::milliseconds TimeoutFromWire(std::uint32_t timeout_ms) {
   return std::min(std::chrono::milliseconds(timeout_ms), kLongestTimeout);
 }
 
+Patience PatienceOf(const Request& request, std::uint32_t timeout_ms, const ReplyWriter& out) {
+  return {request.began + TimeoutFromWire(timeout_ms), out.peer_left()};
+}
+
 asio::awaitable<Result<WaitOutcome>> WaitUntilClean(AtlasService& service,
                                                     asio::thread_pool& pool,
                                                     Patience patience) {
-  Pauses pauses(co_await asio::this_coro::executor, patience.timeout);
-  const Patience no_wait{std::chrono::milliseconds(0), patience.stop};
+  Pauses pauses(co_await asio::this_coro::executor);
+  const Patience no_wait(Patience::Clock::time_point{}, patience.stop);
   const Blocking<WaitOutcome> look = [&service, no_wait] {
     return service.WaitUntilClean(no_wait);
   };
   while (true) {
     Result<WaitOutcome> outcome = co_await OnPool(pool, look);
-    if (!outcome || !outcome->is_timed_out || pauses.is_over()) {
+    if (!outcome || !outcome->is_timed_out || patience.is_over()) {
       co_return outcome;
     }
     co_await pauses.Next();
@@ -66,9 +67,8 @@ asio::awaitable<Result<WaitOutcome>> RequireSettled(AtlasService& service,
                                                     Patience patience) {
   Result<WaitOutcome> outcome = co_await WaitUntilClean(service, pool, patience);
   if (outcome && outcome->is_timed_out) {
-    co_return Error(StatusCode::kTimeout,
-                    StrCat(outcome->dirty_tiles, " tiles are still to be fused after ",
-                           patience.timeout.count(), " ms"));
+    co_return Error(StatusCode::kTimeout, StrCat("the time is over, and ", outcome->dirty_tiles,
+                                                 " tiles are still to be fused"));
   }
   co_return outcome;
 }
@@ -77,8 +77,8 @@ asio::awaitable<Status> WaitForRevision(AtlasService& service,
                                         asio::thread_pool& pool,
                                         std::uint64_t revision,
                                         Patience patience) {
-  Pauses pauses(co_await asio::this_coro::executor, patience.timeout);
-  const Patience no_wait{std::chrono::milliseconds(0), patience.stop};
+  Pauses pauses(co_await asio::this_coro::executor);
+  const Patience no_wait(Patience::Clock::time_point{}, patience.stop);
   const Blocking<bool> look = [&service, no_wait, revision]() -> Result<bool> {
     const Status status = service.WaitForRevision(revision, no_wait);
     if (status.ok() || status.code() == StatusCode::kTimeout) {
@@ -94,9 +94,10 @@ asio::awaitable<Status> WaitForRevision(AtlasService& service,
     if (*is_reached) {
       co_return Status();
     }
-    if (pauses.is_over()) {
-      co_return Status(StatusCode::kTimeout, StrCat("the tiles do not reflect revision ", revision,
-                                                    " after ", patience.timeout.count(), " ms"));
+    if (patience.is_over()) {
+      co_return Status(
+          StatusCode::kTimeout,
+          StrCat("the time is over, and the tiles do not reflect revision ", revision, " yet"));
     }
     co_await pauses.Next();
   }

@@ -8,12 +8,16 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/thread_pool.hpp>
 
+#include "server/net/requests/request.h"
+#include "server/net/stream/reply_writer.h"
 #include "server/service/atlas_service.h"
 
 namespace atlas {
 
-// How long a request with this `timeout_ms` may wait: 0 does not, more than a day is a day.
+// How long a request with this `timeout_ms` may take: 0 does not wait, more than a day is a day.
 std::chrono::milliseconds TimeoutFromWire(std::uint32_t timeout_ms);
+// The same from when it was read on, or until its peer leaves.
+Patience PatienceOf(const Request& request, std::uint32_t timeout_ms, const ReplyWriter& out);
 
 // Until nothing is dirty but damaged tiles, or until the time is up: the outcome tells. Each look
 // runs on `pool`.

@@ -7,7 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include <boost/asio/post.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/this_coro.hpp>
 
 #include "server/net/requests/answer.h"
@@ -63,17 +64,23 @@ class Writing {
   std::optional<Result<AtlasFacts>> result_;
 };
 
-void Write(AtlasService& service,
-           const BackupRequest& request,
-           const Patience& patience,
-           Writing& writing) {
-  try {
+// Writes it when a thread is free for it; always ends `writing`.
+asio::awaitable<void> Write(RequestContext& context,
+                            BackupRequest request,
+                            Patience patience,
+                            const void* whose,
+                            std::shared_ptr<Writing> writing) {
+  const Blocking<AtlasFacts> write = [&context, request, patience, writing] {
     const auto note = [&writing](const BackupProgress& progress) {
-      writing.Note(progress);
+      writing->Note(progress);
     };
-    writing.End(service.Backup(request, patience, note));
-  } catch (const std::exception& error) {  // on the pool's thread it would end the process
-    writing.End(Error(StatusCode::kInternal, error.what()));
+    return context.service.Backup(request, patience, note);
+  };
+  try {
+    Result<AtlasFacts> result = co_await context.reading_pool.Run(whose, patience.deadline, write);
+    writing->End(std::move(result));
+  } catch (const std::exception& error) {  // somebody waits for its end
+    writing->End(Error(StatusCode::kInternal, error.what()));
   }
 }
 
@@ -91,8 +98,9 @@ asio::awaitable<Status> AnswerList(RequestContext& context,
 }  // namespace
 
 asio::awaitable<Status> AnswerBackup(RequestContext& context,
-                                     const wire::Envelope& request,
+                                     const Request& whole,
                                      ReplyWriter& out) {
+  const wire::Envelope& request = *whole.message;
   const wire::BackupRequest& message = request.backup_request();
   if (message.name().empty()) {
     co_return co_await AnswerList(context, request, out);
@@ -105,11 +113,11 @@ asio::awaitable<Status> AnswerBackup(RequestContext& context,
   if (!place) {
     co_return place.error();
   }
-  const Patience patience{TimeoutFromWire(message.timeout_ms()), out.peer_left()};
-  const auto writing = std::make_shared<Writing>(co_await asio::this_coro::executor);
-  asio::post(context.reading_pool, [&context, backup, patience, writing] {
-    Write(context.service, backup, patience, *writing);
-  });
+  const Patience patience = PatienceOf(whole, message.timeout_ms(), out);
+  const auto executor = co_await asio::this_coro::executor;
+  const auto writing = std::make_shared<Writing>(executor);
+  asio::co_spawn(executor, Write(context, backup, patience, out.peer().whose(), writing),
+                 asio::detached);
   const std::shared_ptr<WakeUp> wake_up = writing->wake_up();
   std::optional<Result<AtlasFacts>> result;
   while (true) {

@@ -3,7 +3,7 @@
 
 #include <boost/asio/awaitable.hpp>
 
-#include "proto/wire/envelope.h"
+#include "server/net/requests/request.h"
 #include "server/net/requests/request_context.h"
 #include "server/net/stream/reply_writer.h"
 
@@ -12,7 +12,7 @@ namespace atlas {
 // Sends its replies, or returns an error for the peer, whose leaving ends it. Takes a place of
 // those who may wait long. All arguments outlive the call.
 boost::asio::awaitable<Status> AnswerBackup(RequestContext& context,
-                                            const wire::Envelope& request,
+                                            const Request& whole,
                                             ReplyWriter& out);
 
 }  // namespace atlas

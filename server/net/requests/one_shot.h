@@ -32,6 +32,17 @@ class OneShot : public std::enable_shared_from_this<OneShot<T>> {
                       });
   }
 
+  // Whether it is there by then.
+  boost::asio::awaitable<bool> WaitUntil(boost::asio::steady_timer::time_point deadline) {
+    timer_.expires_at(deadline);
+    while (!value_ && boost::asio::steady_timer::clock_type::now() < deadline) {
+      boost::system::error_code ignored;  // the time is over, or it is there
+      co_await timer_.async_wait(boost::asio::redirect_error(boost::asio::use_awaitable, ignored));
+    }
+    timer_.expires_at(boost::asio::steady_timer::time_point::max());
+    co_return value_.has_value();
+  }
+
   boost::asio::awaitable<Result<T>> Take() {
     while (!value_) {
       boost::system::error_code ignored;  // the timer only ever ends by being cancelled

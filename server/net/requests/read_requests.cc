@@ -1,6 +1,7 @@
 #include "server/net/requests/read_requests.h"
 
-#include <chrono>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/net/requests/answer.h"
@@ -26,35 +27,38 @@ void SessionsToWire(const std::vector<SessionRecord>& sessions, wire::SessionsRe
 asio::awaitable<Status> QueryThePast(RequestContext& context,
                                      const wire::Envelope& request,
                                      const RegionRequest& region,
+                                     Patience patience,
                                      ReplyWriter& out) {
   const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
-  co_return co_await SendRegion(context.service, context.reading_pool, request, region, out);
+  co_return co_await SendRegion(context.service, context.reading_pool, request, region,
+                                std::move(patience), out);
 }
 
 }  // namespace
 
-asio::awaitable<Status> AnswerQuery(RequestContext& context,
-                                    const wire::Envelope& request,
-                                    Peer& peer) {
+asio::awaitable<Status> AnswerQuery(RequestContext& context, const Request& whole, Peer& peer) {
   ReplyWriter& out = peer.out;
+  const wire::Envelope& request = *whole.message;
   const wire::QueryRegion& query = request.query_region();
+  const Patience patience = PatienceOf(whole, query.timeout_ms(), out);
   const Result<RegionRequest> region = RegionFromWire(query);
   if (!region) {
     co_return region.error();
   }
   if (query.has_at_revision()) {
-    co_return co_await QueryThePast(context, request, *region, out);
+    co_return co_await QueryThePast(context, request, *region, patience, out);
   }
-  Status status = co_await AwaitRevision(context, query.wait_revision(), query.timeout_ms(), out);
+  Status status = co_await AwaitRevision(context, query.wait_revision(), patience, out);
   if (!status.ok()) {
     co_return status;
   }
   TurnOrder::Turn turn(peer.streams);
   co_await turn.Come();
-  co_return co_await SendRegion(context.service, context.pool, request, *region, out);
+  co_return co_await SendRegion(context.service, context.reply_pool, request, *region, std::nullopt,
+                                out);
 }
 
 asio::awaitable<Status> AnswerStatus(RequestContext& context,
@@ -106,21 +110,20 @@ asio::awaitable<Status> AnswerSessions(RequestContext& context,
 
 asio::awaitable<Status> AwaitRevision(RequestContext& context,
                                       std::uint64_t revision,
-                                      std::uint32_t timeout_ms,
+                                      Patience patience,
                                       const ReplyWriter& out) {
   if (revision == 0) {
     co_return Status();
   }
-  Patience patience{std::chrono::milliseconds(0), out.peer_left()};
-  Status now = co_await WaitForRevision(context.service, context.pool, revision, patience);
-  if (now.code() != StatusCode::kTimeout || timeout_ms == 0) {
+  const Patience no_wait(Patience::Clock::time_point{}, out.peer_left());
+  Status now = co_await WaitForRevision(context.service, context.pool, revision, no_wait);
+  if (now.code() != StatusCode::kTimeout || patience.is_over()) {
     co_return now;  // whoever does not wait takes no place
   }
   const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
-  patience.timeout = TimeoutFromWire(timeout_ms);
   co_return co_await WaitForRevision(context.service, context.pool, revision, patience);
 }
 

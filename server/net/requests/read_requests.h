@@ -7,6 +7,7 @@
 
 #include "proto/wire/envelope.h"
 #include "server/net/requests/peer.h"
+#include "server/net/requests/request.h"
 #include "server/net/requests/request_context.h"
 #include "server/net/stream/reply_writer.h"
 
@@ -15,7 +16,7 @@ namespace atlas {
 // Each sends its reply, or returns an error for the peer. All arguments outlive the call.
 
 boost::asio::awaitable<Status> AnswerQuery(RequestContext& context,
-                                           const wire::Envelope& request,
+                                           const Request& request,
                                            Peer& peer);
 boost::asio::awaitable<Status> AnswerStatus(RequestContext& context,
                                             const wire::Envelope& request,
@@ -28,10 +29,10 @@ boost::asio::awaitable<Status> AnswerSessions(RequestContext& context,
                                               Peer& peer);
 
 // Until the tiles reflect `revision` (0: at once). If they do not yet it takes a place of those who
-// wait: kUnavailable when there is none, kTimeout after `timeout_ms`.
+// wait: kUnavailable when there is none, kTimeout.
 boost::asio::awaitable<Status> AwaitRevision(RequestContext& context,
                                              std::uint64_t revision,
-                                             std::uint32_t timeout_ms,
+                                             Patience patience,
                                              const ReplyWriter& out);
 
 }  // namespace atlas

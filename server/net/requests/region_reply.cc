@@ -8,8 +8,6 @@
 
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
-#include "server/net/requests/atlas_wait.h"
-#include "server/net/requests/on_pool.h"
 
 namespace atlas {
 namespace {
@@ -141,19 +139,22 @@ Result<RegionRequest> RegionFromWire(const wire::QueryRegion& query) {
 }
 
 asio::awaitable<Status> SendRegion(AtlasService& service,
-                                   asio::thread_pool& pool,
+                                   FairPool& pool,
                                    const wire::Envelope& request,
                                    RegionRequest region,
+                                   std::optional<Patience> patience,
                                    ReplyWriter& out) {
   // Tiles of the past are fused one by one: each is sent when it is there, and nobody who has his
   // at once waits for its room meanwhile.
   const std::size_t batch_bytes = region.at_revision ? 0 : kReplyBatchBytes;
   const std::uint64_t request_id = request.request_id();
-  const Patience patience{TimeoutFromWire(request.query_region().timeout_ms()), out.peer_left()};
+  const FairPool::Whose whose = out.peer().whose();
+  const FairPool::Deadline deadline =
+      patience ? FairPool::Deadline(patience->deadline) : std::nullopt;
   const Blocking<std::shared_ptr<Cursor>> open = [&service, region, patience] {
-    return OpenCursor(service, region, patience);
+    return OpenCursor(service, region, patience.value_or(Patience()));
   };
-  const Result<std::shared_ptr<Cursor>> opened = co_await OnPool(pool, open);
+  const Result<std::shared_ptr<Cursor>> opened = co_await pool.Run(whose, deadline, open);
   if (!opened) {
     co_return opened.error();
   }
@@ -174,7 +175,7 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
     const Blocking<TileBatch> read = [&service, cursor, bytes = room.bytes()] {
       return NextBatch(service, cursor->query, bytes);
     };
-    const Result<TileBatch> batch = co_await OnPool(pool, read);
+    const Result<TileBatch> batch = co_await pool.Run(whose, deadline, read);
     if (!batch) {
       co_return batch.error();
     }

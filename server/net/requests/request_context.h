@@ -3,6 +3,7 @@
 
 #include <boost/asio/thread_pool.hpp>
 
+#include "server/net/requests/fair_pool.h"
 #include "server/net/requests/wait_places.h"
 #include "server/service/atlas_service.h"
 
@@ -11,9 +12,10 @@ namespace atlas {
 // All outlive the requests.
 struct RequestContext {
   AtlasService& service;
-  boost::asio::thread_pool& pool;          // for what may block
-  boost::asio::thread_pool& reading_pool;  // for what reads the whole store, or fuses
-  WaitPlaces places;                       // for what may wait long
+  boost::asio::thread_pool& pool;  // for what is short and may block
+  FairPool& reply_pool;            // for replies of many frames, their plans above all
+  FairPool& reading_pool;          // for what reads the whole store, or fuses
+  WaitPlaces places;               // for what may wait long
 };
 
 }  // namespace atlas

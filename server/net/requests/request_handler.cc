@@ -129,23 +129,23 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& pee
     case Envelope::kChangeSession:
       return AnswerChangeSession(context_, request, peer.out);
     case Envelope::kQueryRegion:
-      return AnswerQuery(context_, request, peer);
+      return AnswerQuery(context_, whole, peer);
     case Envelope::kStatusRequest:
       return AnswerStatus(context_, request, peer.out);
     case Envelope::kSessionsRequest:
       return AnswerSessions(context_, request, peer);
     case Envelope::kWaitRequest:
-      return AnswerWait(context_, request, peer.out);
+      return AnswerWait(context_, whole, peer.out);
     case Envelope::kDigestRequest:
-      return AnswerDigest(context_, request, peer.out);
+      return AnswerDigest(context_, whole, peer.out);
     case Envelope::kLogRequest:
       return AnswerLog(context_, request, peer);
     case Envelope::kVerifyRequest:
-      return AnswerVerify(context_, request, peer.out);
+      return AnswerVerify(context_, whole, peer.out);
     case Envelope::kCompactRequest:
-      return AnswerCompact(context_, request, peer.out);
+      return AnswerCompact(context_, whole, peer.out);
     case Envelope::kBackupRequest:
-      return AnswerBackup(context_, request, peer.out);
+      return AnswerBackup(context_, whole, peer.out);
     default:
       return Refuse(request);
   }
@@ -209,15 +209,16 @@ asio::awaitable<Status> RequestHandler::WaitAndSync(std::shared_ptr<SyncReply> r
                                                     Peer& peer) {
   if (turn == nullptr) {
     const wire::SyncRequest& message = reply->message();
-    Status status =
-        co_await AwaitRevision(context_, message.wait_revision(), message.timeout_ms(), peer.out);
+    const Patience patience(reply->deadline().value_or(SyncReply::Clock::time_point{}),
+                            peer.out.peer_left());
+    Status status = co_await AwaitRevision(context_, message.wait_revision(), patience, peer.out);
     if (!status.ok()) {
       co_return status;
     }
     turn = std::make_unique<TurnOrder::Turn>(peer.streams);
   }
   co_await turn->Come();
-  co_return co_await SendSync(std::move(reply), std::move(hold), context_.pool, peer.out);
+  co_return co_await SendSync(std::move(reply), std::move(hold), context_.reply_pool, peer.out);
 }
 
 }  // namespace atlas

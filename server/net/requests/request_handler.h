@@ -27,17 +27,18 @@
 
 namespace atlas {
 
-// Shared by all connections and their threads. What may block runs on `pool`, what reads the whole
-// store on `reading_pool`. All arguments outlive this.
+// Shared by all connections and their threads. Where what may block runs, RequestContext says. All
+// arguments outlive this.
 class RequestHandler {
   using Envelope = wire::Envelope;
 
  public:
   RequestHandler(AtlasService& service,
                  boost::asio::thread_pool& pool,
-                 boost::asio::thread_pool& reading_pool,
+                 FairPool& reply_pool,
+                 FairPool& reading_pool,
                  const NetOptions& options)
-      : context_{service, pool, reading_pool, WaitPlaces(options.max_waits)},
+      : context_{service, pool, reply_pool, reading_pool, WaitPlaces(options.max_waits)},
         options_(options),
         large_(freed_),
         watches_(service, large_, freed_, options),

@@ -9,7 +9,6 @@
 
 #include "core/base/str_cat.h"
 #include "server/net/requests/atlas_wait.h"
-#include "server/net/requests/on_pool.h"
 #include "server/net/requests/request_conversion.h"
 #include "server/net/requests/sync_conversion.h"
 
@@ -37,17 +36,17 @@ SyncReply::SyncReply(AtlasService& service, TileFrames& frames, const Request& r
       envelope_(request.message),
       is_large_(request.is_large) {
   if (message().timeout_ms() > 0) {
-    deadline_ = Clock::now() + TimeoutFromWire(message().timeout_ms());
+    deadline_ = request.began + TimeoutFromWire(message().timeout_ms());
   }
 }
 
 Result<SyncReply::Step> SyncReply::Next(bool may_block,
                                         std::vector<ReplyFrame>& out,
                                         const Room& room) {
-  if (is_large_ && !may_block) {
+  if (is_large_ && !may_block && !(has_begun() && IsLate())) {
     return Step::kBlocked;
   }
-  if (!has_begun_) {
+  if (!has_planned_) {
     Result<Step> begun = Begin(may_block, room);
     if (!begun || *begun == Step::kBlocked) {
       return begun;
@@ -115,7 +114,7 @@ Result<SyncReply::Step> SyncReply::Begin(bool may_block, const Room& room) {
         StrCat("sync: a budget of ", message().budget_bytes(), " bytes, expected at least the ",
                least, " that it takes without any tile"));
   }
-  has_begun_ = true;
+  has_planned_ = true;
   return Step::kMore;
 }
 
@@ -149,6 +148,10 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, const Room& room, Batch&
   const std::size_t max_tiles = sent_bytes_ == 0 ? kFirstTiles : kTilesPerBatch;
   // One tile in any case: a reply that makes no step would be asked for the next one for ever.
   while (batch.tiles.empty() || (batch.tiles.size() < max_tiles && batch.tile_bytes < room.bytes)) {
+    if (IsLate() && (next_ < plan_.items.size() || plan_.is_cut)) {
+      batch.end = End::kCut;
+      return Step::kDone;
+    }
     if (next_ == plan_.items.size() && plan_.is_cut) {
       request_->after = last_;
       Result<Step> planned = Plan(may_block, room);
@@ -159,10 +162,6 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, const Room& room, Batch&
     }
     if (next_ == plan_.items.size()) {
       batch.end = End::kWhole;
-      return Step::kDone;
-    }
-    if (IsLate()) {
-      batch.end = End::kCut;
       return Step::kDone;
     }
     const SyncItem& item = plan_.items[next_];
@@ -235,7 +234,7 @@ Result<Bytes> SyncReply::EndFrame(End how) const {
 
 asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
                                  SyncHold hold,
-                                 asio::thread_pool& pool,
+                                 FairPool& pool,
                                  ReplyWriter& out) {
   const auto executor = co_await asio::this_coro::executor;
   const auto frames = std::make_shared<std::vector<ReplyFrame>>();
@@ -253,7 +252,10 @@ asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
         return reply->Next(true, *frames, next);
       };
       kept.Set(reply->kept_bytes() + std::min(next.plan_bytes, SyncReply::kMaxPlanBytes));
-      step = co_await OnPool(pool, read);
+      step = co_await pool.Run(out.peer().whose(), reply->deadline(), read);
+      if (!step && step.error().code() == StatusCode::kTimeout && reply->has_begun()) {
+        step = reply->Next(false, *frames, next);  // its end
+      }
     }
     if (!step) {
       co_return step.error();

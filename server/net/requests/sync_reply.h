@@ -9,9 +9,9 @@
 #include <vector>
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/thread_pool.hpp>
 
 #include "proto/wire/envelope.h"
+#include "server/net/requests/fair_pool.h"
 #include "server/net/requests/reply_tiles.h"
 #include "server/net/requests/request.h"
 #include "server/net/stream/reply_writer.h"
@@ -28,6 +28,8 @@ class SyncReply {
     kBlocked,  // nothing was done: the next frames take the disk, or long
   };
 
+  using Clock = std::chrono::steady_clock;
+
   // Of the next frames: tiles of so many bytes and up to one more, and of the plan for them.
   struct Room {
     std::size_t bytes = kReplyBatchBytes;
@@ -35,18 +37,21 @@ class SyncReply {
   };
   static constexpr std::size_t kMaxPlanBytes = SyncLimits().max_items * sizeof(SyncItem);
 
-  // Its time runs from now on. Of a large request every step takes long. `service` and `frames`
-  // outlive this.
+  // Its time runs from when it was read. Of a large request every step takes long. `service` and
+  // `frames` outlive this.
   SyncReply(AtlasService& service, TileFrames& frames, const Request& request);
 
   const wire::SyncRequest& message() const { return envelope_->sync_request(); }
   std::uint64_t request_id() const { return envelope_->request_id(); }
+  const std::optional<Clock::time_point>& deadline() const { return deadline_; }
+  // Some of it was sent: it can be cut where it is.
+  bool has_begun() const { return sent_bytes_ > 0; }
 
   // What it keeps until it goes on.
   std::size_t kept_bytes() const { return plan_.item_bytes(); }
   // What was asked is still there, and takes more than a small request does.
   bool is_held() const {
-    return !has_begun_ || request_->held.bytes() + request_->area.bytes() > kSmallBytes;
+    return !has_planned_ || request_->held.bytes() + request_->area.bytes() > kSmallBytes;
   }
 
   // Appends the next frames; the first one of all is as large as what is held makes it. An error
@@ -58,7 +63,6 @@ class SyncReply {
 
  private:
   static constexpr std::size_t kSmallBytes = 16u << 10;
-  using Clock = std::chrono::steady_clock;
   using Body = ReplyTiles::Body;
   enum class End { kWhole, kCut };
   struct Batch {
@@ -92,7 +96,7 @@ class SyncReply {
   std::size_t next_ = 0;         // item of the plan
   SyncCursor last_;              // of the items so far
   wire::SyncManifest holdings_;  // until they are told
-  bool has_begun_ = false;
+  bool has_planned_ = false;
   bool is_for_pool_ = false;  // the plan takes the disk, or long: known from trying
   std::uint32_t sent_tiles_ = 0;
   std::uint64_t sent_bytes_ = 0;
@@ -105,10 +109,11 @@ struct SyncHold {
   std::shared_ptr<const void> reply;
 };
 
-// What is left of it. What takes long, or the disk, runs on `pool`.
+// What is left of it. What takes long, or the disk, runs on `pool`; kTimeout: its time was over
+// before that had begun.
 boost::asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
                                         SyncHold hold,
-                                        boost::asio::thread_pool& pool,
+                                        FairPool& pool,
                                         ReplyWriter& out);
 
 }  // namespace atlas

@@ -1,5 +1,6 @@
 #include "server/net/requests/tile_frames.h"
 
+#include <array>
 #include <utility>
 
 #include "core/base/bytes.h"
@@ -30,13 +31,9 @@ void TileFrames::Insert(const Content& content, std::shared_ptr<const TileBody> 
 
 // Two with the same number only put each other out.
 std::uint64_t TileFrames::NumberOf(const Content& content) {
-  ByteWriter out;
-  out.U64(content.key);
-  out.U64(content.payload_hash);
-  out.U64(content.sections);
-  out.U64(content.base_hash);
-  out.U64(content.base_sections);
-  return Hash64(out.bytes());
+  const std::array<std::uint64_t, 5> parts = {content.key, content.payload_hash, content.sections,
+                                              content.base_hash, content.base_sections};
+  return Hash64(ByteSpan(reinterpret_cast<const std::uint8_t*>(parts.data()), sizeof parts));
 }
 
 }  // namespace atlas

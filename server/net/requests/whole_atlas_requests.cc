@@ -21,12 +21,14 @@ asio::awaitable<Status> RequireUndamaged(RequestContext& context, const Patience
 
 asio::awaitable<Result<AtlasDigest>> ComputeDigest(RequestContext& context,
                                                    const wire::DigestRequest& message,
-                                                   const Patience& patience) {
+                                                   const Patience& patience,
+                                                   FairPool::Whose whose) {
+  FairPool& pool = context.reading_pool;
   if (message.has_at_revision()) {
     const Blocking<AtlasDigest> compute = [&context, revision = message.at_revision(), patience] {
       return context.service.DigestAt(revision, patience);
     };
-    co_return co_await OnPool(context.reading_pool, compute);
+    co_return co_await pool.Run(whose, patience.deadline, compute);
   }
   const Status settled = co_await RequireUndamaged(context, patience);
   if (!settled.ok()) {
@@ -35,7 +37,7 @@ asio::awaitable<Result<AtlasDigest>> ComputeDigest(RequestContext& context,
   const Blocking<AtlasDigest> compute = [&context, patience] {
     return context.service.Digest(patience);
   };
-  co_return co_await OnPool(context.reading_pool, compute);
+  co_return co_await pool.Run(whose, patience.deadline, compute);
 }
 
 Result<CompactionRequest> ReadCompaction(const AtlasService& service,
@@ -50,13 +52,14 @@ Result<CompactionRequest> ReadCompaction(const AtlasService& service,
 }  // namespace
 
 asio::awaitable<Status> AnswerWait(RequestContext& context,
-                                   const wire::Envelope& request,
+                                   const Request& whole,
                                    ReplyWriter& out) {
   const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
-  const Patience patience{TimeoutFromWire(request.wait_request().timeout_ms()), out.peer_left()};
+  const wire::Envelope& request = *whole.message;
+  const Patience patience = PatienceOf(whole, request.wait_request().timeout_ms(), out);
   const Result<WaitOutcome> outcome =
       co_await WaitUntilClean(context.service, context.pool, patience);
   if (outcome && !outcome->damage.ok()) {
@@ -66,32 +69,35 @@ asio::awaitable<Status> AnswerWait(RequestContext& context,
 }
 
 asio::awaitable<Status> AnswerDigest(RequestContext& context,
-                                     const wire::Envelope& request,
+                                     const Request& whole,
                                      ReplyWriter& out) {
   const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
+  const wire::Envelope& request = *whole.message;
   const wire::DigestRequest& message = request.digest_request();
-  const Patience patience{TimeoutFromWire(message.timeout_ms()), out.peer_left()};
-  const Result<AtlasDigest> digest = co_await ComputeDigest(context, message, patience);
+  const Patience patience = PatienceOf(whole, message.timeout_ms(), out);
+  const Result<AtlasDigest> digest =
+      co_await ComputeDigest(context, message, patience, out.peer().whose());
   co_return co_await Answer(request, digest, &wire::Envelope::mutable_digest_reply, DigestToWire,
                             out);
 }
 
 asio::awaitable<Status> AnswerVerify(RequestContext& context,
-                                     const wire::Envelope& request,
+                                     const Request& whole,
                                      ReplyWriter& out) {
   const Result<Places::Place> place = context.places.Take(out.peer().share.get());
   if (!place) {
     co_return place.error();
   }
-  VerifyRequest verify = VerifyFromWire(request.verify_request());
+  VerifyRequest verify = VerifyFromWire(whole.message->verify_request());
   verify.author = AuthorOf(out.peer().name, std::move(verify.author));
   if (Status status = CheckAuthor(verify.author); !status.ok()) {
     co_return status;
   }
-  const Patience patience{TimeoutFromWire(request.verify_request().timeout_ms()), out.peer_left()};
+  const wire::Envelope& request = *whole.message;
+  const Patience patience = PatienceOf(whole, request.verify_request().timeout_ms(), out);
   if (verify.rebuild && !verify.repair) {  // damage is what it is to report
     const Result<WaitOutcome> settled =
         co_await RequireSettled(context.service, context.pool, patience);
@@ -102,14 +108,16 @@ asio::awaitable<Status> AnswerVerify(RequestContext& context,
   const Blocking<VerifyReport> check = [&context, &verify, patience] {
     return context.service.Verify(verify, patience);
   };
-  const Result<VerifyReport> report = co_await OnPool(context.reading_pool, check);
+  const Result<VerifyReport> report =
+      co_await context.reading_pool.Run(out.peer().whose(), patience.deadline, check);
   co_return co_await Answer(request, report, &wire::Envelope::mutable_verify_reply, VerifyToWire,
                             out);
 }
 
 asio::awaitable<Status> AnswerCompact(RequestContext& context,
-                                      const wire::Envelope& request,
+                                      const Request& whole,
                                       ReplyWriter& out) {
+  const wire::Envelope& request = *whole.message;
   const Blocking<CompactionRequest> read = [&context, &request] {
     return ReadCompaction(context.service, request.compact_request());
   };
@@ -122,7 +130,7 @@ asio::awaitable<Status> AnswerCompact(RequestContext& context,
   if (!place) {
     co_return place.error();
   }
-  const Patience patience{TimeoutFromWire(request.compact_request().timeout_ms()), out.peer_left()};
+  const Patience patience = PatienceOf(whole, request.compact_request().timeout_ms(), out);
   const Result<WaitOutcome> settled =
       co_await RequireSettled(context.service, context.pool, patience);
   if (!settled) {
@@ -131,7 +139,8 @@ asio::awaitable<Status> AnswerCompact(RequestContext& context,
   const Blocking<CompactionReport> compact = [&context, &compaction, patience] {
     return context.service.Compact(*compaction, patience);
   };
-  const Result<CompactionReport> report = co_await OnPool(context.reading_pool, compact);
+  const Result<CompactionReport> report =
+      co_await context.reading_pool.Run(out.peer().whose(), patience.deadline, compact);
   co_return co_await Answer(request, report, &wire::Envelope::mutable_compact_reply,
                             CompactionToWire, out);
 }

@@ -4,7 +4,7 @@
 
 #include <boost/asio/awaitable.hpp>
 
-#include "proto/wire/envelope.h"
+#include "server/net/requests/request.h"
 #include "server/net/requests/request_context.h"
 #include "server/net/stream/reply_writer.h"
 
@@ -13,16 +13,16 @@ namespace atlas {
 // Each sends its reply, or returns an error for the peer. All arguments outlive the call.
 
 boost::asio::awaitable<Status> AnswerWait(RequestContext& context,
-                                          const wire::Envelope& request,
+                                          const Request& request,
                                           ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerDigest(RequestContext& context,
-                                            const wire::Envelope& request,
+                                            const Request& request,
                                             ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerVerify(RequestContext& context,
-                                            const wire::Envelope& request,
+                                            const Request& request,
                                             ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerCompact(RequestContext& context,
-                                             const wire::Envelope& request,
+                                             const Request& request,
                                              ReplyWriter& out);
 
 }  // namespace atlas

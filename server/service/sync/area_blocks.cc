@@ -19,7 +19,12 @@ class BlockSearch {
         rect_(rect),
         work_(work),
         side_m_(area.tile_side_m(rect.level) * kTileBlockSide),
-        is_found_(static_cast<std::size_t>(rect.count()), false) {}
+        is_found_(static_cast<std::size_t>(rect.count()), false),
+        next_(static_cast<std::size_t>((rect.width + 1) * rect.height)) {
+    for (std::size_t i = 0; i < next_.size(); ++i) {
+      next_[i] = static_cast<std::int64_t>(i) % (rect.width + 1);
+    }
+  }
 
   // Each returns false when that is too much.
   bool Everywhere() {
@@ -59,38 +64,58 @@ class BlockSearch {
 
  private:
   // Of the leg only what is beside the row is near its blocks: p_m = from_m + t * step_m with
-  // min_y_m <= p_m.y <= max_y_m, widened by the reach.
+  // min_y_m <= p_m.y <= max_y_m, widened by the reach. Where the row lies beside the whole leg,
+  // less of the reach is left along the row.
   bool InRow(const SyncArea::Leg& leg, std::int64_t y) {
     const double reach_m = area_.reach_m() + kMargin_m;
-    const double min_y_m = static_cast<double>(rect_.min_y + y) * side_m_ - reach_m;
-    const double max_y_m = static_cast<double>(rect_.min_y + y + 1) * side_m_ + reach_m;
+    const double min_y_m = static_cast<double>(rect_.min_y + y) * side_m_;
+    const double max_y_m = static_cast<double>(rect_.min_y + y + 1) * side_m_;
     const Eigen::Vector2d step_m = leg.to_m - leg.from_m;
     double enter = 0.0;
     double leave = 1.0;
     if (step_m.y() != 0.0) {
-      const double a = (min_y_m - leg.from_m.y()) / step_m.y();
-      const double b = (max_y_m - leg.from_m.y()) / step_m.y();
+      const double a = (min_y_m - reach_m - leg.from_m.y()) / step_m.y();
+      const double b = (max_y_m + reach_m - leg.from_m.y()) / step_m.y();
       enter = std::clamp(std::min(a, b), 0.0, 1.0);
       leave = std::clamp(std::max(a, b), 0.0, 1.0);
     }
     const double a_m = leg.from_m.x() + enter * step_m.x();
     const double b_m = leg.from_m.x() + leave * step_m.x();
-    const std::int64_t last = Place(std::max(a_m, b_m) + reach_m, rect_.min_x, rect_.width);
-    for (std::int64_t x = Place(std::min(a_m, b_m) - reach_m, rect_.min_x, rect_.width); x <= last;
-         ++x) {
+    const double beside_m = std::max({min_y_m - std::max(leg.from_m.y(), leg.to_m.y()),
+                                      std::min(leg.from_m.y(), leg.to_m.y()) - max_y_m, 0.0});
+    const double along_m =
+        std::sqrt(std::max(reach_m * reach_m - beside_m * beside_m, 0.0)) + kMargin_m;
+    const std::int64_t last = Place(std::max(a_m, b_m) + along_m, rect_.min_x, rect_.width);
+    for (std::int64_t x =
+             NextLeft(Place(std::min(a_m, b_m) - along_m, rect_.min_x, rect_.width), y);
+         x <= last; x = NextLeft(x + 1, y)) {
       if (!work_.Take(1)) {
         return false;
       }
-      if (!is_found_[IndexOf(x, y)] &&
-          area_.IsWithinReach(leg, CornerOf(x, y), kTileBlockSideBits) && !Note(x, y)) {
+      if (area_.IsWithinReach(leg, CornerOf(x, y), kTileBlockSideBits) && !Note(x, y)) {
         return false;
       }
     }
     return true;
   }
 
+  // The first from `x` on that was not found yet, or the end of the row. Each look halves the way
+  // for the next one: legs that lie side by side do not look at the same blocks again.
+  std::int64_t NextLeft(std::int64_t x, std::int64_t y) {
+    const auto row = static_cast<std::size_t>(y * (rect_.width + 1));
+    const auto next = [&](std::int64_t at) -> std::int64_t& {
+      return next_[row + static_cast<std::size_t>(at)];
+    };
+    while (next(x) != x) {
+      next(x) = next(next(x));
+      x = next(x);
+    }
+    return x;
+  }
+
   bool Note(std::int64_t x, std::int64_t y) {
     is_found_[IndexOf(x, y)] = true;
+    next_[static_cast<std::size_t>(y * (rect_.width + 1) + x)] = x + 1;
     return work_.Take(WorkOfBlock(area_));
   }
 
@@ -111,6 +136,8 @@ class BlockSearch {
   PlanWork& work_;
   const double side_m_;
   std::vector<bool> is_found_;  // row by row
+  // By row, and one more at its end: a block that is found points to one behind it.
+  std::vector<std::int64_t> next_;
 };
 
 }  // namespace

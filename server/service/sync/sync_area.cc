@@ -16,8 +16,7 @@ using Eigen::Vector2d;
 
 // Beyond the world: positions are within 10,000 km.
 constexpr double kMaxExtent_m = 1e8;
-// So much more to drive counts as this much farther off.
-constexpr double kAlongWeight = 0.25;
+constexpr double kRounded_m = 1e-6;  // at most, of distances there
 
 Status Refuse(const std::string& why) {
   return {StatusCode::kInvalidArgument, StrCat("sync area: ", why)};
@@ -147,8 +146,10 @@ MapSquare SyncArea::SquareOf(const TileId& id, int bits) const {
 
 bool SyncArea::IsWithinReach(const Leg& leg, const TileId& id, int bits) const {
   const MapSquare square = SquareOf(id, bits);
-  return GapOfBoxes(leg.from_m, leg.to_m, square).maxCoeff() <= reach_m_ &&
-         NearestTo(leg.from_m, leg.to_m, square).distance_m <= reach_m_;
+  if (GapOfBoxes(leg.from_m, leg.to_m, square).norm() > reach_m_ + kRounded_m) {
+    return false;  // cheap, and most are
+  }
+  return NearestTo(leg.from_m, leg.to_m, square).distance_m <= reach_m_;
 }
 
 bool SyncArea::Touches(const TileId& id, int bits) const {
@@ -211,6 +212,17 @@ std::size_t SyncArea::bytes() const {
   return bytes;
 }
 
+double SyncArea::Nearer(double best_m, const Leg& leg, const MapSquare& square) {
+  const double start_m = kAlongWeight * leg.along_m;
+  const double gap_m = GapOfBoxes(leg.from_m, leg.to_m, square).norm();
+  if (start_m + gap_m - kRounded_m >= best_m) {
+    return best_m;  // cheap, and most are
+  }
+  const Nearest nearest = NearestTo(leg.from_m, leg.to_m, square);
+  const double part_m = nearest.part * (leg.to_m - leg.from_m).norm();
+  return std::min(best_m, start_m + kAlongWeight * part_m + nearest.distance_m);
+}
+
 double SyncArea::Distance(const TileId& id) const {
   if (legs_.empty()) {
     return 0.0;
@@ -218,16 +230,10 @@ double SyncArea::Distance(const TileId& id) const {
   const MapSquare square = SquareOf(id, 0);
   double best_m = std::numeric_limits<double>::infinity();
   for (const Leg& leg : legs_) {
-    const double start_m = kAlongWeight * leg.along_m;
-    if (start_m >= best_m) {
+    if (kAlongWeight * leg.along_m >= best_m) {
       break;  // nor is any other leg nearer
     }
-    if (start_m + GapOfBoxes(leg.from_m, leg.to_m, square).maxCoeff() >= best_m) {
-      continue;
-    }
-    const Nearest nearest = NearestTo(leg.from_m, leg.to_m, square);
-    const double part_m = nearest.part * (leg.to_m - leg.from_m).norm();
-    best_m = std::min(best_m, start_m + kAlongWeight * part_m + nearest.distance_m);
+    best_m = Nearer(best_m, leg, square);
   }
   return best_m;
 }

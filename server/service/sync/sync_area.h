@@ -30,6 +30,8 @@ class SyncArea {
 
   static constexpr std::size_t kMaxRoutePoints = 256;
   static constexpr std::size_t kMaxTiles = 65'536;
+  // So much more to drive counts as this much farther off.
+  static constexpr double kAlongWeight = 0.25;
 
   // kInvalidArgument: not finite, a box or a width below nothing, a route without points or with
   // too many, too many tiles or not in key order.
@@ -56,6 +58,9 @@ class SyncArea {
   // How far a tile is from the vehicle and its way, metres; what lies farther along the way counts
   // as farther off. 0 where the area says nothing of a vehicle.
   double Distance(const TileId& id) const;
+  MapSquare SquareOf(const TileId& id, int bits) const;
+  // The same by one leg alone, unless that is `best_m` or more: then `best_m`.
+  static double Nearer(double best_m, const Leg& leg, const MapSquare& square);
 
  private:
   struct Tiles {
@@ -64,7 +69,6 @@ class SyncArea {
   using Shape = std::variant<DiscArea, BoxArea, CorridorArea, Tiles>;
 
   SyncArea(Shape shape, const MapProfile& profile);
-  MapSquare SquareOf(const TileId& id, int bits) const;
 
   Shape shape_;
   double tile_m_ = 0.0;  // side of a level-0 tile

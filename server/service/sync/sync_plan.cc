@@ -9,6 +9,7 @@
 
 #include "core/base/str_cat.h"
 #include "server/service/sync/area_blocks.h"
+#include "server/service/sync/local_area.h"
 #include "server/service/sync/plan_work.h"
 
 namespace atlas {
@@ -176,8 +177,12 @@ class Planner {
         plan_.differing.push_back(block);
       }
     }
+    if (tiles.empty()) {
+      return {};
+    }
+    LookAt(block);
     for (const TileSummary& tile : tiles) {
-      if (!request_.area.Touches(tile.id)) {
+      if (!local_->Touches(tile.id)) {
         continue;
       }
       if (++tiles_ > limits_.max_tiles) {
@@ -195,6 +200,12 @@ class Planner {
       }
     }
     return {};
+  }
+
+  void LookAt(std::uint64_t block) {
+    local_.emplace(request_.area, TileId::FromKey(FirstKeyOf(block)).value(), kTileBlockSideBits);
+    most_worth_ = WorthAt(level_, local_->least_m());
+    least_worth_ = WorthAt(level_, local_->most_m());
   }
 
   static bool IsSame(const HeldBlock& held, std::span<const TileSummary> tiles) {
@@ -225,13 +236,18 @@ class Planner {
       ++plan_.not_modified;
       return;
     }
+    const bool has_moved = request_.after && tile.revision > request_.after->revision;
+    const double bytes = std::clamp<double>(tile.blob_bytes, kLeastBytes, kMostBytes);
+    if (!has_moved && IsElsewhere(bytes)) {
+      return;
+    }
     SyncItem item{tile, missing};
     if (held != nullptr && !is_same) {
       item.held_hash = held->payload_hash;
       item.held_sections = held->sections;
     }
-    const double worth = WorthOf(tile.id);
-    if (request_.after && tile.revision > request_.after->revision) {
+    const double worth = WorthAt(tile.id.level, DistanceOf(tile.id));
+    if (has_moved) {
       // Where it stood before is not known any more, but not behind the last place that it can
       // have, which is before its children. If that is over it was sent, as it was.
       item.priority = Banded(worth / kMostBytes);
@@ -239,7 +255,7 @@ class Planner {
         item.priority = worth / kMostBytes * kLater;
       }
     } else {
-      item.priority = Banded(worth / std::clamp<double>(tile.blob_bytes, kLeastBytes, kMostBytes));
+      item.priority = Banded(worth / bytes);
     }
     if (IsNew(item)) {
       plan_.items.push_back(item);
@@ -247,6 +263,17 @@ class Planner {
         Cut();
       }
     }
+  }
+
+  // Wherever in its block it is, a tile of so many bytes was sent before, or comes after all that
+  // there is room for: exactly where need not be known.
+  bool IsElsewhere(double bytes) {
+    if (request_.after && Banded(least_worth_ / bytes) > request_.after->priority) {
+      return true;
+    }
+    const bool is_later = Banded(most_worth_ / bytes) < left_out_;
+    plan_.is_cut = plan_.is_cut || is_later;
+    return is_later;
   }
 
   void NoteSeen(const HeldTile* held, bool is_current) {
@@ -265,11 +292,12 @@ class Planner {
     return level_ == coarsest_ ? priority * kOfTheCover : priority;
   }
 
-  // The error that it removes, over its area; a parent's is at least eight times its children's.
-  double WorthOf(const TileId& id) {
-    const double side_m = std::ldexp(profile_.tile_size_m(), id.level);
-    const double near = 1.0 + DistanceOf(id) / kNear_m;
-    return GeometricError(id.level, profile_) * (side_m * side_m / (near * near * near));
+  // The error that a tile removes, over its area; a parent's is at least eight times its
+  // children's.
+  double WorthAt(std::uint8_t level, double distance_m) const {
+    const double side_m = std::ldexp(profile_.tile_size_m(), level);
+    const double near = 1.0 + distance_m / kNear_m;
+    return GeometricError(level, profile_) * (side_m * side_m / (near * near * near));
   }
 
   // Never less than its parent's: that may be nearest to the way where more is to be driven.
@@ -278,7 +306,9 @@ class Planner {
     const std::uint64_t key = id.Key();
     if (known.key != key) {
       const double above_m = id.level < coarsest_ ? DistanceOf(id.Parent()) : 0.0;
-      known = {key, std::max(above_m, request_.area.Distance(id))};
+      const bool is_within = id.level <= level_ + kTileBlockSideBits;
+      const double own_m = is_within ? local_->Distance(id) : request_.area.Distance(id);
+      known = {key, std::max(above_m, own_m)};
     }
     return known.distance_m;
   }
@@ -301,6 +331,7 @@ class Planner {
     if (items.size() > limits_.max_items) {
       const auto end = items.begin() + static_cast<std::ptrdiff_t>(limits_.max_items);
       std::nth_element(items.begin(), end, items.end(), &ComesBefore);
+      left_out_ = end->priority;
       items.erase(end, items.end());
       plan_.is_cut = true;
     }
@@ -342,6 +373,10 @@ class Planner {
   std::uint32_t coarsest_ = 0;
   std::uint8_t level_ = 0;
   std::vector<KnownDistance> distances_;  // by level
+  std::optional<LocalArea> local_;        // of the block at hand, as are the next two
+  double least_worth_ = 0.0;
+  double most_worth_ = 0.0;
+  double left_out_ = 0.0;  // of the best item that there was no room for
   std::size_t tiles_ = 0;
   SyncPlan plan_;
 };

@@ -192,6 +192,17 @@ TEST(EnvelopeTest, IgnoresAndDropsAFewUnknownFields) {
   EXPECT_EQ(ParseCode(Repeat(unknown, kMaxUnknownFields + 1)), StatusCode::kInvalidData);
 }
 
+// Whatever the schema says of the number: as text where a number belongs, and within a body.
+TEST(EnvelopeTest, DropsUnknownFieldsWhereverTheyAre) {
+  const Bytes id_as_text = {1 << 3 | 2, 3, 'a', 'b', 'c'};
+  for (const Bytes& payload : {id_as_text, EnvelopeWithPoses({0xF8, 0x07, 0x01})}) {
+    const auto envelope = ParseEnvelope(payload);
+    ASSERT_TRUE(envelope.has_value()) << envelope.error().message();
+    EXPECT_LE(envelope->ByteSizeLong(), 2u) << "no more than an empty body";
+  }
+  EXPECT_EQ(ParseCode(Repeat(id_as_text, kMaxUnknownFields + 1)), StatusCode::kInvalidData);
+}
+
 TEST(EnvelopeTest, RefusesAMessageLargerThanAFrame) {
   wire::Envelope envelope;
   envelope.mutable_tile()->set_blob(std::string(kMaxFrameBytes, 'x'));

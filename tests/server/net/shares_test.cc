@@ -65,6 +65,32 @@ class SharesTest : public NetTest {
     }
     return sent > most / 2 ? "" : StrCat("only ", sent, " bytes");
   }
+  wire::Envelope PastDigestOf(std::uint64_t id, std::uint32_t timeout_ms) const {
+    wire::Envelope envelope;
+    envelope.set_request_id(id);
+    envelope.mutable_digest_request()->set_at_revision(service_->revision());
+    envelope.mutable_digest_request()->set_timeout_ms(timeout_ms);
+    return envelope;
+  }
+  // Each takes some 10 ms: all of them are read long before the last one is answered.
+  static constexpr std::uint64_t kMany = 60;
+  void ServeDigests() {
+    net_.max_waits = 2 * kMany;
+    net_.of_name.waits = kMany + 1;
+    ServeAliceAndBob(0);
+    UploadDrive(6);
+  }
+  // Returns when nearly all of them are read.
+  void SendManyDigests(const BlockingPeer& peer) const {
+    for (std::uint64_t id = 1; id <= kMany; ++id) {
+      peer.Send(PastDigestOf(id, 60'000));
+    }
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (server_->ReadFigures().in_flight < kMany - 10 &&
+           std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::yield();
+    }
+  }
   static std::string ErrorOf(const std::optional<wire::Envelope>& reply) {
     EXPECT_EQ(CodeOf(reply), StatusCode::kUnavailable);
     return reply ? reply->error().message() : "";
@@ -89,6 +115,26 @@ TEST_F(SharesTest, TheWaitsOfOneNameLeavePlacesForOthers) {
   const auto busy = bob->Receive();
   EXPECT_EQ(busy->request_id(), 5u) << "the first one has a place";
   EXPECT_THAT(ErrorOf(busy), HasSubstr("of bob"));
+}
+
+TEST_F(SharesTest, OneNamesDigestsOfThePastLeaveAThreadForOthers) {
+  ServeDigests();
+  const auto alice = ConnectAs("alice");
+  const auto bob = ConnectAs("bob");
+  SendManyDigests(*alice);
+  bob->Send(PastDigestOf(1, 60'000));
+  EXPECT_TRUE(bob->Receive()->has_digest_reply());
+  EXPECT_GT(server_->ReadFigures().in_flight, kMany / 2) << "hers come one after the other";
+}
+
+TEST_F(SharesTest, WhoseTimeIsOverBeforeAThreadIsFreeIsTold) {
+  ServeDigests();
+  const auto alice = ConnectAs("alice");
+  const auto again = ConnectAs("alice");
+  SendManyDigests(*alice);
+  again->Send(PastDigestOf(1, 5));
+  EXPECT_EQ(CodeOf(again->Receive()), StatusCode::kTimeout);
+  EXPECT_GT(server_->ReadFigures().in_flight, kMany / 2) << "those before it go on";
 }
 
 TEST_F(SharesTest, TheWatchesOfOneNameLeavePlacesForOthers) {

@@ -227,7 +227,7 @@ TEST_F(CompactionTest, ItEndsInTimeAndWithTheService) {
   EXPECT_EQ(Compact(kAll_ms, {}).error().code(), StatusCode::kTimeout);
   std::stop_source gone;
   gone.request_stop();
-  EXPECT_EQ(Compact(kAll_ms, {Long().timeout, gone.get_token()}).error().code(),
+  EXPECT_EQ(Compact(kAll_ms, {Long().deadline, gone.get_token()}).error().code(),
             StatusCode::kUnavailable);
   service_->EndWaits();
   EXPECT_EQ(Compact(kAll_ms).error().code(), StatusCode::kUnavailable);

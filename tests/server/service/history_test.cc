@@ -354,7 +354,7 @@ TEST_F(HistoryTest, WorkOnThePastEndsInTimeAndWithTheService) {
   EXPECT_EQ(service_->DigestAt(revision, {}).error().code(), StatusCode::kTimeout);
   std::stop_source gone;
   gone.request_stop();
-  EXPECT_EQ(service_->DigestAt(revision, {Long().timeout, gone.get_token()}).error().code(),
+  EXPECT_EQ(service_->DigestAt(revision, {Long().deadline, gone.get_token()}).error().code(),
             StatusCode::kUnavailable);
   RegionRequest request;
   request.at_revision = revision;
