@@ -63,16 +63,24 @@ class Writing {
   std::optional<Result<AtlasFacts>> result_;
 };
 
+// Writes it when a thread is free for it; always ends `writing`.
 asio::awaitable<void> Write(RequestContext& context,
-                            FairPool::Whose whose,
                             BackupRequest request,
                             Patience patience,
+                            const void* whose,
                             std::shared_ptr<Writing> writing) {
   const Blocking<AtlasFacts> write = [&context, request, patience, writing] {
-    return context.service.Backup(
-        request, patience, [&writing](const BackupProgress& progress) { writing->Note(progress); });
+    const auto note = [&writing](const BackupProgress& progress) {
+      writing->Note(progress);
+    };
+    return context.service.Backup(request, patience, note);
   };
-  writing->End(co_await context.reading_pool.Run(whose, patience.deadline, write));
+  try {
+    Result<AtlasFacts> result = co_await context.reading_pool.Run(whose, patience.deadline, write);
+    writing->End(std::move(result));
+  } catch (const std::exception& error) {  // somebody waits for its end
+    writing->End(Error(StatusCode::kInternal, error.what()));
+  }
 }
 
 asio::awaitable<Status> AnswerList(RequestContext& context,
@@ -107,7 +115,7 @@ asio::awaitable<Status> AnswerBackup(RequestContext& context,
   const Patience patience = PatienceOf(whole, message.timeout_ms(), out);
   const auto executor = co_await asio::this_coro::executor;
   const auto writing = std::make_shared<Writing>(executor);
-  asio::co_spawn(executor, Write(context, out.peer().whose(), backup, patience, writing),
+  asio::co_spawn(executor, Write(context, backup, patience, out.peer().whose(), writing),
                  asio::detached);
   const std::shared_ptr<WakeUp> wake_up = writing->wake_up();
   std::optional<Result<AtlasFacts>> result;
