@@ -126,6 +126,33 @@ TEST(AtlasWatchTest, WhatComesDuringOtherRequestsIsKeptAsOne) {
   EXPECT_EQ((*changes)->removed, (std::set<TileId>{{1, 4, 0}}));
 }
 
+TEST(AtlasWatchTest, WhatIsToldWithoutItsTilesIsToldOn) {
+  TestPeer peer([](PeerSocket& socket) {
+    Greet(socket);
+    const std::uint64_t id = socket.ReadRequest()->request_id();
+    wire::Envelope below = Beginning(8);
+    below.mutable_watch_event()->add_below(TileId{2, 1, 1}.Key());
+    socket.Reply(id, std::move(below));
+    AnswerStatus(socket);
+    wire::Envelope anything = Beginning(9);
+    anything.mutable_watch_event()->set_anything(true);
+    socket.Reply(id, std::move(anything));
+    socket.Drain();
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  auto watch = client->Watch(kAround, kPatience);
+  ASSERT_TRUE(watch);
+  auto changes = watch->Next(kPatience);
+  ASSERT_TRUE(changes && *changes);
+  EXPECT_EQ((*changes)->below, (std::set<TileId>{{2, 1, 1}}));
+  EXPECT_FALSE((*changes)->is_anything);
+  ASSERT_TRUE(client->ReadStatus());
+  changes = watch->Next(kPatience);
+  ASSERT_TRUE(changes && *changes);
+  EXPECT_TRUE((*changes)->is_anything);
+}
+
 TEST(AtlasWatchTest, MoreThanIsKeptBecomesAnything) {
   AreaChanges kept;
   for (int i = 0; i < 1'024; ++i) {

@@ -68,8 +68,10 @@ TEST_F(WatchedFeedTest, AsksForNothingUntilSomethingIsToldToHaveChanged) {
 }
 
 TEST_F(WatchedFeedTest, DrivesAsFarAsTheMarginWithoutAsking) {
+  world_.Set(25, 3, 50);  // 35 m from the place
   Settle();
   EXPECT_EQ(Ask(kPlace_m + Eigen::Vector2d(29.5, 0.0)), 0);
+  EXPECT_NE(store_.Find({0, 25, 3}), nullptr) << "it came before it was asked for";
   EXPECT_EQ(Ask(kPlace_m + Eigen::Vector2d(-29.5, 0.0)), 0);
   EXPECT_EQ(peer_.watches(), 1);
   EXPECT_EQ(Ask(kPlace_m + Eigen::Vector2d(30.5, 0.0)), 1);
@@ -130,6 +132,19 @@ TEST_F(WatchedFeedTest, WithoutAWatchEveryCallAsksAndAfterAPauseForAWatchToo) {
   EXPECT_EQ(Ask(kPlace_m), 0);
 }
 
+TEST_F(WatchedFeedTest, ADaemonWithoutAWatchToGiveIsNotAskedForOneInAnotherPlaceEither) {
+  WatchedFeed feed(link_, {.watch_pause = seconds(3'600)});
+  AtlasView view(store_, feed);
+  peer_.SetWatches(SyncPeer::Watches::kRefused);
+  for (int i = 0; i < 4; ++i) {
+    const auto map = view.Around(kPlace_m + Eigen::Vector2d(100.0 * i, 0.0), kRadius_m);
+    ASSERT_TRUE(map);
+    EXPECT_TRUE(map->is_current);
+  }
+  EXPECT_EQ(peer_.syncs(), 4);
+  EXPECT_EQ(peer_.watches(), 1);
+}
+
 TEST_F(WatchedFeedTest, AWatchThatTheDaemonEndsIsNoSilence) {
   Settle();
   peer_.SetWatches(SyncPeer::Watches::kRefused);
@@ -141,6 +156,19 @@ TEST_F(WatchedFeedTest, AWatchThatTheDaemonEndsIsNoSilence) {
     EXPECT_EQ(Ask(kPlace_m), 1);
   }
   EXPECT_GE(Clock::now() - start, kSoon);
+}
+
+// Nothing of it came, and there is more.
+TEST_F(WatchedFeedTest, WhatABudgetCutIsNotAll) {
+  AroundOptions small;
+  small.budget_bytes = 500;
+  for (int call = 1; call <= 3; ++call) {
+    const auto map = view_.Around(kPlace_m, kRadius_m, small);
+    ASSERT_TRUE(map);
+    EXPECT_FALSE(map->is_current);
+    EXPECT_EQ(store_.size(), 0u);
+    EXPECT_GE(peer_.syncs(), call);
+  }
 }
 
 // It may be that nothing is told yet.
