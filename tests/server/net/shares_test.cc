@@ -240,6 +240,10 @@ TEST_F(SharesTest, NobodyPausesWhileTheServerStops) {
   alice->Send(SyncOf(1));
   alice->Send(SyncOf(2));
   ASSERT_TRUE(alice->Receive()->has_sync_manifest());
+  const auto latest = Clock::now() + std::chrono::seconds(30);
+  while (server_->ReadFigures().in_flight < 2 && Clock::now() < latest) {
+    std::this_thread::yield();  // what is not read yet is not answered any more
+  }
   const auto begin = Clock::now();
   server_->Stop();
   int ends = 0;
