@@ -15,10 +15,10 @@ class SessionsTest : public NetTest {
  protected:
   // Sessions of `vehicle`, each of one keyframe.
   void Begin(const std::string& vehicle, const std::vector<std::string>& sessions) {
-    UploadRequest upload = DriveUpload(0);
+    NewKeyframe keyframe = service_->CheckUpload(DriveUpload(0)).value();
     for (const std::string& session : sessions) {
-      upload.key.session = {vehicle, session};
-      service_->Upload(upload, [](const Result<PutKeyframeResult>& put) {
+      keyframe.key.session = {vehicle, session};
+      service_->PutKeyframe(keyframe, [](const Result<PutKeyframeResult>& put) {
         EXPECT_TRUE(put.has_value()) << put.error().message();
       });
     }
