@@ -11,6 +11,7 @@
 #include "core/base/str_cat.h"
 #include "server/base/line_budget.h"
 #include "server/base/log_line.h"
+#include "server/net/access/access_control.h"
 #include "server/net/net_counters.h"
 #include "server/net/peer_share.h"
 
@@ -34,6 +35,12 @@ struct PeerRecord {
   std::chrono::milliseconds slow_request;
   // Of its name or address; null: it may have all there is.
   std::shared_ptr<PeerShare> share = nullptr;
+  Role role = Role::kNone;  // as it was greeted
+
+  void KnowAs(const Identity& identity) {
+    name = identity.name;
+    role = identity.role;
+  }
 
   // For whom it takes a turn with the others.
   const void* whose() const {

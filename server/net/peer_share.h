@@ -17,12 +17,14 @@ struct PeerShare {
   PeerShare(std::string name, const NameLimits& limits)
       : whose(std::move(name)),
         waits(limits.waits),
+        works(limits.waits),
         watches(limits.watches),
         watched(limits.watched_bytes),
         served(limits.served_bytes_per_s) {}
 
   const std::string whose;  // for messages
   Places waits;
+  Places works;  // digests and the like
   Places watches;
   ByteBudget watched;
   ServedRate served;

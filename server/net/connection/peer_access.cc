@@ -42,6 +42,9 @@ Status PeerAccess::IdentifyAgain(std::int64_t now_ms) {
   if (!identity) {
     return identity.error();
   }
+  if (allowance_ != nullptr && identity->name != identity_.name) {
+    return {StatusCode::kPermissionDenied, StrCat("it is called ", identity->name, " now")};
+  }
   identity_ = *std::move(identity);
   return {};
 }

@@ -242,7 +242,7 @@ PeerConnection::MaybeAwaited PeerConnection::Greet(wire::Envelope hello) {
 
 Status PeerConnection::ComeIn(const wire::Envelope& hello) {
   ATLAS_RETURN_IF_ERROR(access_.Identify(hello.hello().token(), handler_.NowMs()));
-  peer_.name = access_.identity().name;
+  peer_.KnowAs(access_.identity());
   ATLAS_RETURN_IF_ERROR(handler_.CheckGreeting(hello));
   ATLAS_RETURN_IF_ERROR(access_.TakePlace());
   if (access_.allowance() == nullptr) {

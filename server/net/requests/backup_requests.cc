@@ -108,7 +108,7 @@ asio::awaitable<Status> AnswerBackup(RequestContext& context,
   if (Status status = CheckAuthor(backup.author); !status.ok()) {
     co_return status;
   }
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.works.Take(out.peer());
   if (!place) {
     co_return place.error();
   }

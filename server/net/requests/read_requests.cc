@@ -28,7 +28,7 @@ asio::awaitable<Status> QueryThePast(RequestContext& context,
                                      const RegionRequest& region,
                                      Patience patience,
                                      ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.works.Take(out.peer());
   if (!place) {
     co_return place.error();
   }
@@ -105,7 +105,7 @@ asio::awaitable<Status> AwaitRevision(RequestContext& context,
   if (now.code() != StatusCode::kTimeout || patience.is_over()) {
     co_return now;  // whoever does not wait takes no place
   }
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.waits.Take(out.peer());
   if (!place) {
     co_return place.error();
   }

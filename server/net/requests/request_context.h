@@ -15,7 +15,8 @@ struct RequestContext {
   boost::asio::thread_pool& pool;  // for what is short and may block
   FairPool& reply_pool;            // for replies of many frames, their plans above all
   FairPool& reading_pool;          // for what reads the whole store, or fuses
-  WaitPlaces places;               // for what may wait long
+  WaitPlaces waits;                // for what only waits
+  WaitPlaces works;                // for what reads the whole store, or fuses
 };
 
 }  // namespace atlas

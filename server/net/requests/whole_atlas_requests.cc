@@ -54,7 +54,7 @@ Result<CompactionRequest> ReadCompaction(const AtlasService& service,
 asio::awaitable<Status> AnswerWait(RequestContext& context,
                                    const Request& whole,
                                    ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.waits.Take(out.peer());
   if (!place) {
     co_return place.error();
   }
@@ -71,7 +71,7 @@ asio::awaitable<Status> AnswerWait(RequestContext& context,
 asio::awaitable<Status> AnswerDigest(RequestContext& context,
                                      const Request& whole,
                                      ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.works.Take(out.peer());
   if (!place) {
     co_return place.error();
   }
@@ -87,7 +87,7 @@ asio::awaitable<Status> AnswerDigest(RequestContext& context,
 asio::awaitable<Status> AnswerVerify(RequestContext& context,
                                      const Request& whole,
                                      ReplyWriter& out) {
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.works.Take(out.peer());
   if (!place) {
     co_return place.error();
   }
@@ -126,7 +126,7 @@ asio::awaitable<Status> AnswerCompact(RequestContext& context,
     co_return compaction.error();  // before any wait
   }
   compaction->author = AuthorOf(out.peer().name, std::move(compaction->author));
-  const Result<Places::Place> place = context.places.Take(out.peer().share.get());
+  const Result<Places::Place> place = context.works.Take(out.peer());
   if (!place) {
     co_return place.error();
   }

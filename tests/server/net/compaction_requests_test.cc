@@ -91,7 +91,7 @@ TEST_F(CompactionRequestTest, OtherPresetsAreRefusedAtOnce) {
 }
 
 TEST_F(CompactionRequestTest, ItTakesAPlace) {
-  net_.max_waits = 0;
+  net_.max_works = 0;
   Serve();
   const auto peer = Connect();
   peer->Send(CompactBefore(1));

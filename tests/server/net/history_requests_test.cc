@@ -149,7 +149,7 @@ TEST_F(HistoryRequestTest, RevisionsToComeAndNoTimeAreTyped) {
 }
 
 TEST_F(HistoryRequestTest, RequestsForThePastTakePlaces) {
-  net_.max_waits = 0;
+  net_.max_works = 0;
   Serve();
   UploadDrive(1);
   const auto peer = Connect();

@@ -65,17 +65,21 @@ class SharesTest : public NetTest {
     }
     return sent > most / 2 ? "" : StrCat("only ", sent, " bytes");
   }
-  wire::Envelope PastDigestOf(std::uint64_t id, std::uint32_t timeout_ms) const {
+  static wire::Envelope DigestOf(std::uint64_t id, std::uint32_t timeout_ms) {
     wire::Envelope envelope;
     envelope.set_request_id(id);
-    envelope.mutable_digest_request()->set_at_revision(service_->revision());
     envelope.mutable_digest_request()->set_timeout_ms(timeout_ms);
+    return envelope;
+  }
+  wire::Envelope PastDigestOf(std::uint64_t id, std::uint32_t timeout_ms) const {
+    wire::Envelope envelope = DigestOf(id, timeout_ms);
+    envelope.mutable_digest_request()->set_at_revision(service_->revision());
     return envelope;
   }
   // Each takes some 10 ms: all of them are read long before the last one is answered.
   static constexpr std::uint64_t kMany = 60;
   void ServeDigests() {
-    net_.max_waits = 2 * kMany;
+    net_.max_works = 2 * kMany;
     net_.of_name.waits = kMany + 1;
     ServeAliceAndBob(0);
     UploadDrive(6);
@@ -115,6 +119,26 @@ TEST_F(SharesTest, TheWaitsOfOneNameLeavePlacesForOthers) {
   const auto busy = bob->Receive();
   EXPECT_EQ(busy->request_id(), 5u) << "the first one has a place";
   EXPECT_THAT(ErrorOf(busy), HasSubstr("of bob"));
+}
+
+TEST_F(SharesTest, WhoReadsLeavesPlacesForWhoeverLooksAfterTheAtlas) {
+  net_.max_waits = 1;
+  net_.max_works = 4;   // of which one is kept
+  ServeAliceAndBob(0);  // nothing is ever fused
+  UploadDrive(1);
+  const auto alice = ConnectAs("alice");
+  alice->Send(WaitOf(1, 60'000));
+  for (std::uint64_t id = 2; id <= 4; ++id) {
+    alice->Send(DigestOf(id, 60'000));
+  }
+  alice->Send(StatusOf(5));
+  EXPECT_EQ(alice->Receive()->request_id(), 5u);
+  const auto bob = ConnectAs("bob");
+  bob->Send(DigestOf(1, 60'000));
+  EXPECT_THAT(ErrorOf(bob->Receive()), HasSubstr("3 digests"));
+  const auto admin = Connect();
+  admin->Send(PastDigestOf(1, 60'000));
+  EXPECT_TRUE(admin->Receive()->has_digest_reply());
 }
 
 TEST_F(SharesTest, OneNamesDigestsOfThePastLeaveAThreadForOthers) {

@@ -272,6 +272,17 @@ TEST_F(TlsTest, ARoleThatChangedHoldsAtOnce) {
   EXPECT_EQ(Ask(alice, Verification()), StatusCode::kOk);
 }
 
+// Else it would be one name to its limits and to the atlas's log, and another to its rights.
+TEST_F(TlsTest, WhoseNameChangedComesAgain) {
+  ServeTls("reader");
+  BlockingPeer alice(port_, Anonymous());
+  ASSERT_TRUE(alice.Greet(kProtocolMajor, "", "open sesame").has_hello_reply());
+  server_->ChangeSecurity({security_.tls, AccessOf(std::string("alicia reader") + kTokenLine)});
+  EXPECT_TRUE(alice.IsClosed());
+  BlockingPeer again(port_, Anonymous());
+  EXPECT_EQ(again.Greet(kProtocolMajor, "", "open sesame").hello_reply().name(), "alicia");
+}
+
 TEST_F(TlsTest, ANameHasSoManyConnectionsAndOthersHaveTheirOwn) {
   net_.of_name.connections = 2;
   ServeTls();

@@ -4,6 +4,7 @@
 #include <future>
 #include <random>
 #include <set>
+#include <string>
 
 #include "tests/server/store/store_fixture.h"
 
@@ -43,6 +44,30 @@ TEST(MissingUploadsTest, IsBounded) {
   }
   EXPECT_FALSE(missing.CheckTurn(KeyOf(0, "night")).ok());  // it may be one that was not noted
   EXPECT_TRUE(missing.CheckTurn(KeyOf(0)).ok());
+  const KeyframeKey of_other{{"tram", "day"}, 7};
+  EXPECT_TRUE(missing.CheckTurn(of_other).ok()) << "another vehicle, on this connection";
+  for (std::uint32_t i = 0; i < 10'000; ++i) {
+    missing.NoteEnd(KeyOf(i), {});
+  }
+  EXPECT_FALSE(missing.CheckTurn(KeyOf(20'000)).ok()) << "nobody knows what else was refused";
+}
+
+TEST(MissingUploadsTest, SoAreItsVehicles) {
+  MissingUploads missing;
+  const auto key_of = [](int vehicle) {
+    return KeyframeKey{{"bus" + std::to_string(vehicle), "day"}, 0};
+  };
+  for (int i = 0; i < 10'000; ++i) {
+    missing.NoteEnd(key_of(i), kBusy);
+  }
+  EXPECT_FALSE(missing.CheckTurn(key_of(20'000)).ok()) << "it may be one that was not noted";
+  EXPECT_TRUE(missing.CheckTurn(key_of(0)).ok());
+  MissingUploads again;
+  for (int i = 0; i < 10'000; ++i) {
+    again.NoteEnd(key_of(i), kBusy);
+    again.NoteEnd(key_of(i), {});
+  }
+  EXPECT_TRUE(again.CheckTurn(key_of(20'000)).ok()) << "nothing is missing";
 }
 
 class InTurnTest : public StoreTest {
