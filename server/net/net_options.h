@@ -55,8 +55,8 @@ struct NetOptions {
   std::size_t max_watched_bytes = 64u << 20;            // areas of these
   std::size_t max_connection_watched_bytes = 2u << 20;  // of one connection
   std::size_t max_waits = 16;  // for the map to reflect something, all connections
-  std::size_t max_works =
-      16;  // digests, verifications and the like; a quarter of them for merges and admins
+  // Digests, verifications and the like; a quarter of them for merges and administrators alone.
+  std::size_t max_works = 16;
   int service_threads = 4;  // for what is short and may block on the disk
   int reply_threads = 4;    // for syncs and queries; half of them of one name
   int reading_threads = 2;  // for digests and verifications, which read all; one of one name

@@ -1,6 +1,7 @@
 #include "server/net/requests/backup_requests.h"
 
 #include <chrono>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>

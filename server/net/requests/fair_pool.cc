@@ -1,7 +1,5 @@
 #include "server/net/requests/fair_pool.h"
 
-#include <algorithm>
-
 #include <boost/asio/post.hpp>
 
 namespace atlas {

@@ -1,6 +1,8 @@
 // The reply to a request for sessions: a page of them (docs/protocol.md).
 #pragma once
 
+#include <cstdint>
+
 #include <boost/asio/awaitable.hpp>
 
 #include "proto/wire/envelope.h"

@@ -1,71 +1,16 @@
 // Where settings come from, which goes before which, and what a mistake says.
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <stdexcept>
-#include <utility>
+#include <string>
 #include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "server/config/daemon_command.h"
+#include "tests/server/config/config_fixture.h"
 
 namespace atlas {
 namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
-
-class DaemonConfigTest : public testing::Test {
- protected:
-  DaemonConfigTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "atlas_config_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw std::runtime_error("cannot make " + name);
-    }
-    directory_ = name;
-  }
-  ~DaemonConfigTest() override {
-    for (const std::string& name : variables_) {
-      ::unsetenv(name.c_str());
-    }
-    std::filesystem::remove_all(directory_);
-  }
-
-  std::string File(const std::string& text) const {
-    std::string path = (directory_ / "atlasd.toml").string();
-    std::ofstream(path) << text;
-    return path;
-  }
-  void SetVariable(const std::string& name, const std::string& value) {
-    ::setenv(name.c_str(), value.c_str(), 1);
-    variables_.push_back(name);
-  }
-  static Result<DaemonCommand> Parse(const std::vector<std::string>& arguments) {
-    std::vector<const char*> argv = {"atlasd"};
-    for (const std::string& argument : arguments) {
-      argv.push_back(argument.c_str());
-    }
-    return ParseDaemonCommand(static_cast<int>(argv.size()), argv.data());
-  }
-  // The message of a refused configuration.
-  static std::string Refusal(const std::vector<std::string>& arguments) {
-    const auto command = Parse(arguments);
-    if (command) {
-      return "accepted";
-    }
-    EXPECT_EQ(command.error().code(), StatusCode::kInvalidArgument);
-    return command.error().message();
-  }
-  std::string RefusedFile(const std::string& text) const {
-    return Refusal({"--config", File(text)});
-  }
-
-  std::filesystem::path directory_;
-  std::vector<std::string> variables_;
-};
 
 TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
   const auto command = Parse({"--data", "/x"});
@@ -173,53 +118,6 @@ TEST_F(DaemonConfigTest, MalformedTomlIsAnErrorWithItsLine) {
   EXPECT_THAT(RefusedFile("data = '/x'\ndata = '/y'\n"), HasSubstr("line 2"));
 }
 
-TEST_F(DaemonConfigTest, InTheClearOnlyLoopbackIsListenedOn) {
-  for (const char* address : {"0.0.0.0:7447", "192.168.1.1:7447", "[::]:7447", "example:7447"}) {
-    EXPECT_THAT(
-        Refusal({"--data", "/x", "--listen", address}),
-        AllOf(HasSubstr("--listen"), HasSubstr(address), HasSubstr("loopback"), HasSubstr("TLS")));
-  }
-  EXPECT_THAT(RefusedFile("data = '/x'\nlisten = '10.0.0.1:7447'\n"),
-              AllOf(HasSubstr("line 2"), HasSubstr("loopback")));
-  for (const char* address : {"127.0.0.1:0", "127.1.2.3:1", "localhost:7447", "[::1]:7447"}) {
-    EXPECT_TRUE(Parse({"--data", "/x", "--listen", address}).has_value()) << address;
-  }
-}
-
-TEST_F(DaemonConfigTest, BeyondLoopbackItTakesTlsOrToBeTold) {
-  const std::vector<std::string> tls = {"--tls-certificate", "c.pem", "--tls-key", "k.pem"};
-  const std::vector<std::string> beyond = {"--data", "/x", "--listen", "0.0.0.0:7447"};
-  const auto with = [](std::vector<std::string> all, const std::vector<std::string>& more) {
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  };
-  EXPECT_THAT(Refusal(with(beyond, tls)), HasSubstr("nobody could come in"));
-  const auto vehicles = Parse(with(with(beyond, tls), {"--tls-client-ca", "ca.pem"}));
-  ASSERT_TRUE(vehicles.has_value()) << vehicles.error().message();
-  EXPECT_EQ(vehicles->config.AnonymousRole(), "none");
-  EXPECT_TRUE(Parse(with(with(beyond, tls), {"--tokens", "tokens.txt"})).has_value());
-  EXPECT_TRUE(Parse(with(with(beyond, tls), {"--anonymous", "reader"})).has_value());
-  EXPECT_TRUE(
-      Parse(with(beyond, {"--allow-plaintext", "true", "--anonymous", "reader"})).has_value());
-  EXPECT_THAT(Refusal(with(beyond, {"--allow-plaintext", "true"})),
-              HasSubstr("nobody could come in"));
-  EXPECT_THAT(Refusal(with(beyond, {"--allow-plaintext", "perhaps"})), HasSubstr("true or false"));
-}
-
-TEST_F(DaemonConfigTest, OnThisMachineWhoeverComesIsAdminUntilSomethingIsExpected) {
-  EXPECT_EQ(Parse({"--data", "/x"})->config.AnonymousRole(), "admin");
-  EXPECT_EQ(Parse({"--data", "/x", "--tokens", "t"})->config.AnonymousRole(), "none");
-  EXPECT_EQ(
-      Parse({"--data", "/x", "--tokens", "t", "--anonymous", "reader"})->config.AnonymousRole(),
-      "reader");
-}
-
-TEST_F(DaemonConfigTest, HalvesOfTlsAreRefused) {
-  EXPECT_THAT(Refusal({"--data", "/x", "--tls-certificate", "c"}), HasSubstr("tls.key"));
-  EXPECT_THAT(Refusal({"--data", "/x", "--tls-key", "k"}), HasSubstr("tls.certificate"));
-  EXPECT_THAT(Refusal({"--data", "/x", "--tls-client-ca", "a"}), HasSubstr("tls.client_ca"));
-}
-
 TEST_F(DaemonConfigTest, TablesOfTheFileAreRead) {
   const auto read = Parse(
       {"--config", File("data = '/x'\n[tls]\ncertificate = 'c'\nkey = 'k'\nclient_ca = 'a'\n"
@@ -242,25 +140,6 @@ TEST_F(DaemonConfigTest, FusionMayStandBackOrStandStill) {
   EXPECT_FALSE(read->config.is_fusing);
   EXPECT_EQ(read->config.fusion_nice, 3);
   EXPECT_THAT(Refusal({"--data", "/x", "--fusion-nice", "20"}), HasSubstr("from 0 to 19"));
-}
-
-TEST_F(DaemonConfigTest, WhatANameMayHaveIsRead) {
-  const auto read = Parse({"--config", File("data = '/x'\n[limits]\nconnections_per_name = 7\n"
-                                            "held_mib_per_name = 50\nmib_per_s_per_name = 0\n"
-                                            "served_mib_per_s_per_name = 3\n"
-                                            "requests_per_s_per_name = 9\n"
-                                            "sessions_per_hour_per_vehicle = 0\n")});
-  ASSERT_TRUE(read.has_value()) << read.error().message();
-  EXPECT_EQ(read->config.name_connections, 7);
-  EXPECT_EQ(read->config.name_held_mib, 50);
-  EXPECT_EQ(read->config.name_mib_per_s, 0);
-  EXPECT_EQ(read->config.name_served_mib_per_s, 3);
-  EXPECT_EQ(read->config.name_requests_per_s, 9);
-  EXPECT_EQ(read->config.vehicle_sessions_per_hour, 0);
-  EXPECT_TRUE(IsLiveSetting("limits.sessions_per_hour_per_vehicle"));
-  EXPECT_THAT(Refusal({"--data", "/x", "--connections-per-name", "0"}),
-              HasSubstr("limits.connections_per_name is '0'"));
-  EXPECT_TRUE(IsLiveSetting("limits.connections_per_name"));
 }
 
 TEST_F(DaemonConfigTest, TheOperationsPortIsOffUnlessItIsOfLoopback) {
