@@ -1,0 +1,1 @@
+// What the precompiled headers are built for: it holds nothing.
