@@ -92,15 +92,15 @@ Result<HeldTiles> HeldFromWire(const wire::SyncRequest& message) {
 
 // Another number when places are counted differently: a cursor of the daemon before is no place
 // then.
-constexpr std::uint64_t kOrderVersion = 2;
+constexpr std::uint64_t kOrderVersion = 3;
 
 // Of all that decides on the order.
 std::uint64_t HashOfOrder(const wire::SyncRequest& message) {
-  wire::SyncRequest order;
-  *order.mutable_area() = message.area();
-  order.set_finest_level(message.finest_level());
-  order.set_coarsest_level(message.coarsest_level());
-  return Hash64(BytesFromWire(order.SerializeAsString())) + kOrderVersion;
+  ByteWriter order;
+  order.U32(message.finest_level());
+  order.U32(message.coarsest_level());
+  order.Raw(BytesFromWire(message.area().SerializeAsString()));
+  return Hash64(order.bytes()) + kOrderVersion;
 }
 
 Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& message) {

@@ -12,14 +12,17 @@ TileId IdOf(std::uint64_t key) {
 }  // namespace
 
 TileWatch::TileWatch(Scope scope, std::function<void()> wake, std::size_t max_told)
-    : scope_(std::move(scope)), wake_(std::move(wake)), max_told_(max_told) {}
+    : coarsest_level_(scope.coarsest_level),
+      wake_(std::move(wake)),
+      max_told_(max_told),
+      asked_(std::move(scope.area), scope.finest_level, scope.coarsest_level) {}
 
 void TileWatch::Add(const TileId& id, std::uint64_t revision) {
-  if (!IsAsked(id)) {
-    return;
-  }
   {
     const std::lock_guard lock(mutex_);
+    if (!asked_.Has(id)) {
+      return;
+    }
     const bool is_first = revisions_.empty() && below_.empty() && !is_anything_;
     if (is_anything_ || IsBelow(id)) {
       return;
@@ -48,15 +51,10 @@ TileChanges TileWatch::Take() {
   return changes;
 }
 
-bool TileWatch::IsAsked(const TileId& id) const {
-  return id.level >= scope_.finest_level && id.level <= scope_.coarsest_level &&
-         scope_.area.Touches(id);
-}
-
 // One of its ancestors tells it already.
 bool TileWatch::IsBelow(const TileId& id) const {
   TileId ancestor = id;
-  while (!below_.empty() && ancestor.level < scope_.coarsest_level) {
+  while (!below_.empty() && ancestor.level < coarsest_level_) {
     ancestor = ancestor.Parent();
     if (below_.contains(ancestor.Key())) {
       return true;
@@ -86,7 +84,7 @@ void TileWatch::LoseDetail() {
 // The tiles of the finest level that there is.
 void TileWatch::CoarsenTiles() {
   const std::uint8_t level = IdOf(revisions_.begin()->first).level;
-  if (level >= scope_.coarsest_level) {
+  if (level >= coarsest_level_) {
     is_anything_ = true;
     return;
   }
@@ -98,7 +96,7 @@ void TileWatch::CoarsenTiles() {
 
 void TileWatch::CoarsenBelow() {
   const std::uint8_t level = IdOf(*below_.begin()).level;
-  if (level >= scope_.coarsest_level) {
+  if (level >= coarsest_level_) {
     is_anything_ = true;
     return;
   }

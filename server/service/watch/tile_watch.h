@@ -13,6 +13,7 @@
 
 #include "core/geometry/tile_id.h"
 #include "server/service/sync/sync_area.h"
+#include "server/service/sync/touched_tiles.h"
 
 namespace atlas {
 
@@ -47,16 +48,16 @@ class TileWatch {
   TileChanges Take();
 
  private:
-  bool IsAsked(const TileId& id) const;
   bool IsBelow(const TileId& id) const;
   void LoseDetail();
   void CoarsenTiles();
   void CoarsenBelow();
 
-  const Scope scope_;
+  const std::uint32_t coarsest_level_;
   const std::function<void()> wake_;
   const std::size_t max_told_;
   std::mutex mutex_;
+  TouchedTiles asked_;
   std::map<std::uint64_t, std::uint64_t> revisions_;  // by tile; finer levels have smaller keys
   std::set<std::uint64_t> below_;
   bool is_anything_ = false;
