@@ -31,7 +31,17 @@ std::string_view StatusCodeName(StatusCode code) {
 }
 
 Status Status::WithContext(std::string_view context) const {
-  return ok() ? *this : Status(code_, std::string(context) + ": " + message_);
+  Status status = *this;
+  if (!ok()) {
+    status.message_ = std::string(context) + ": " + message_;
+  }
+  return status;
+}
+
+Status Status::WithRetryAfter(std::int64_t retry_after_ms) const {
+  Status status = *this;
+  status.retry_after_ms_ = retry_after_ms;
+  return status;
 }
 
 }  // namespace atlas

@@ -2,6 +2,8 @@
 // A message says what failed, on which id, and what was expected.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,14 +45,21 @@ class [[nodiscard]] Status {
   StatusCode code() const { return code_; }
   const std::string& message() const { return message_; }
 
-  // The same code with "context: " before the message.
+  // Milliseconds: the caller may try again after them; none: after what is usual for the code. They
+  // travel in error replies where the code IsTemporary.
+  std::optional<std::int64_t> retry_after_ms() const { return retry_after_ms_; }
+
+  // The same with "context: " before the message.
   Status WithContext(std::string_view context) const;
+  // The same, to be tried again after so long.
+  Status WithRetryAfter(std::int64_t retry_after_ms) const;
 
   friend bool operator==(const Status&, const Status&) = default;
 
  private:
   StatusCode code_ = StatusCode::kOk;
   std::string message_;
+  std::optional<std::int64_t> retry_after_ms_;
 };
 
 template <typename T>

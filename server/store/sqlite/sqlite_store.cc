@@ -72,9 +72,7 @@ class SqliteStore final : public AtlasStore {
   }
 
   void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) override {
-    if (keyframe.missing != nullptr) {
-      done = Noting(keyframe, std::move(done));
-    }
+    done = Noting(keyframe, std::move(done));
     Write<PutKeyframeResult>(std::move(done), [k = std::move(keyframe)](Connection& connection) {
       return k.missing == nullptr ? PutKeyframeInStore(connection, k) : PutInTurn(connection, k);
     });

@@ -13,7 +13,7 @@ namespace atlas {
 // not come to the disk, it fails with all of them, and Noting() takes it back.
 Result<PutKeyframeResult> PutInTurn(Connection& connection, const NewKeyframe& keyframe);
 
-// Notes what became of it, then calls `done`.
+// Notes what became of it, and of the session that it began, then calls `done`.
 std::function<void(Result<PutKeyframeResult>)> Noting(
     const NewKeyframe& keyframe, std::function<void(Result<PutKeyframeResult>)> done);
 
