@@ -1,10 +1,12 @@
 // What the operations port tells of a daemon at work, one that hangs and one that stops.
 #include "server/operations_port.h"
 
+#include <chrono>
 #include <future>
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -120,6 +122,17 @@ TEST_F(OperationsPortTest, ADaemonAtWorkIsWellAndReady) {
 TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
   ServeWithOperations();
   EXPECT_EQ(Metrics().at(Requests("hello", "ok")), 0);
+TEST_F(OperationsPortTest, ManyWhoSayNothingKeepNobodyOut) {
+  ServeWithOperations();
+  std::vector<std::unique_ptr<HttpPeer>> silent;
+  for (int i = 0; i < 200; ++i) {
+    silent.push_back(std::make_unique<HttpPeer>(http_));
+  }
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_EQ(Ask(http_, "/healthz").status, 200);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(1));
+}
+
   CountingPeer peer(port_);
   EXPECT_TRUE(peer.Call(HelloOf(1)).has_hello_reply());
   EXPECT_TRUE(peer.Call(UploadOf(0, 2)).has_upload_reply());
