@@ -67,6 +67,9 @@ class OperationsPortTest : public NetTest {
   static std::string Requests(const std::string& kind, const std::string& code) {
     return "roadatlas_requests_total{kind=\"" + kind + "\",code=\"" + code + "\"}";
   }
+  static std::string Late(const std::string& kind) {
+    return "roadatlas_requests_deadline_exceeded_total{kind=\"" + kind + "\"}";
+  }
   static std::string Count(const std::string& kind) {
     return "roadatlas_request_seconds_count{kind=\"" + kind + "\"}";
   }
@@ -119,9 +122,6 @@ TEST_F(OperationsPortTest, ADaemonAtWorkIsWellAndReady) {
   EXPECT_EQ(Ask(http_, "/").status, 404);
 }
 
-TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
-  ServeWithOperations();
-  EXPECT_EQ(Metrics().at(Requests("hello", "ok")), 0);
 TEST_F(OperationsPortTest, ManyWhoSayNothingKeepNobodyOut) {
   ServeWithOperations();
   std::vector<std::unique_ptr<HttpPeer>> silent;
@@ -133,6 +133,9 @@ TEST_F(OperationsPortTest, ManyWhoSayNothingKeepNobodyOut) {
   EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(1));
 }
 
+TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
+  ServeWithOperations();
+  EXPECT_EQ(Metrics().at(Requests("hello", "ok")), 0);
   CountingPeer peer(port_);
   EXPECT_TRUE(peer.Call(HelloOf(1)).has_hello_reply());
   EXPECT_TRUE(peer.Call(UploadOf(0, 2)).has_upload_reply());
@@ -169,6 +172,10 @@ TEST_F(OperationsPortTest, ManyWhoSayNothingKeepNobodyOut) {
   EXPECT_EQ(metrics.at("roadatlas_held_bytes"), 0);
   EXPECT_EQ(metrics.at("roadatlas_queued_reply_bytes"), 0);
   EXPECT_EQ(metrics.at("roadatlas_large_requests_closed_total"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_broken_frames_total"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_tls_handshakes_failed_total"), 0);
+  EXPECT_EQ(metrics.at(Late("wait")), 1);
+  EXPECT_EQ(metrics.at(Late("status")), 0);
   EXPECT_EQ(metrics.at("roadatlas_keyframes"), 1);
   EXPECT_EQ(metrics.at("roadatlas_revision"), 1);
   EXPECT_GT(metrics.at("roadatlas_dirty_tiles"), 0);
