@@ -97,6 +97,15 @@ std::string Joined(const std::vector<std::string>& keys) {
   return text;
 }
 
+// The names of those that took effect.
+std::string ChangesOf(const LiveConfig::Outcome& outcome) {
+  std::vector<std::string> changes = outcome.changed;
+  for (const std::string& key : outcome.renewed) {
+    changes.push_back("file of " + key);
+  }
+  return changes.empty() ? "no setting and no file" : Joined(changes);
+}
+
 void ReloadConfig(LiveConfig& config) {
   Result<LiveConfig::Outcome> outcome = Error(StatusCode::kInternal, "");
   try {
@@ -109,8 +118,7 @@ void ReloadConfig(LiveConfig& config) {
                   StatusCodeName(outcome.error().code()), outcome.error().message());
     return;
   }
-  spdlog::info("signal 1: configuration and its files read again, {} changed",
-               outcome->changed.empty() ? "no setting" : Joined(outcome->changed));
+  spdlog::info("signal 1: configuration and its files read again, {} changed", ChangesOf(*outcome));
   if (!outcome->waiting.empty()) {
     spdlog::warn("signal 1: changes that need a restart: {}", Joined(outcome->waiting));
   }

@@ -1,5 +1,6 @@
 #include "server/config/live_config.h"
 
+#include <algorithm>
 #include <set>
 
 #include "server/config/setting_table.h"
@@ -37,6 +38,21 @@ std::vector<std::string> Differences(const GivenSettings& before, const GivenSet
   return differing;
 }
 
+// Keys of files whose content is another, but for those that have another name.
+std::vector<std::string> Renewed(const std::map<std::string, std::uint64_t>& before,
+                                 const std::map<std::string, std::uint64_t>& after,
+                                 const std::vector<std::string>& renamed) {
+  std::vector<std::string> keys;
+  for (const auto& [key, hash] : after) {
+    const auto old = before.find(key);
+    const bool is_other = old == before.end() || old->second != hash;
+    if (is_other && std::find(renamed.begin(), renamed.end(), key) == renamed.end()) {
+      keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
 void TakeOver(const std::string& key, const GivenSettings& from, GivenSettings& to) {
   to.erase(key);
   if (const auto found = from.find(key); found != from.end()) {
@@ -66,6 +82,9 @@ Result<LiveConfig::Outcome> LiveConfig::Reload() {
   if (!config) {
     return Error(config.error());
   }
+  // Before the parts read them: what changes in between is told the next time.
+  auto hashes = HashNamedFiles(*config);
+  outcome.renewed = Renewed(file_hashes_, hashes, outcome.changed);
   const Result<std::vector<Commit>> commits = PrepareParts(*config);
   if (!commits) {
     return Error(commits.error());
@@ -75,6 +94,7 @@ Result<LiveConfig::Outcome> LiveConfig::Reload() {
   }
   running_.config = *config;
   running_.given = std::move(merged);
+  file_hashes_ = std::move(hashes);
   return outcome;
 }
 

@@ -2,13 +2,16 @@
 // others while they run. Either all of them take the new ones, or none does.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/status.h"
 #include "server/config/daemon_command.h"
+#include "server/config/named_files.h"
 
 namespace atlas {
 
@@ -23,11 +26,14 @@ class LiveConfig {
 
   struct Outcome {
     std::vector<std::string> changed;  // keys that are in effect now
+    std::vector<std::string> renewed;  // keys of files that have their old name and other content
     std::vector<std::string> waiting;  // keys that differ and need a restart
   };
 
   LiveConfig(DaemonCommand running, Read read)
-      : running_(std::move(running)), read_(std::move(read)) {}
+      : running_(std::move(running)),
+        read_(std::move(read)),
+        file_hashes_(HashNamedFiles(running_.config)) {}
 
   void AddPart(Prepare part) { parts_.push_back(std::move(part)); }
   // What is in effect.
@@ -41,6 +47,7 @@ class LiveConfig {
 
   DaemonCommand running_;
   Read read_;
+  std::map<std::string, std::uint64_t> file_hashes_;  // by key, of what is in effect
   std::vector<Prepare> parts_;
 };
 

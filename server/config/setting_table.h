@@ -2,6 +2,7 @@
 // configuration.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -22,6 +23,8 @@ struct Setting {              // NOLINT(clang-analyzer-optin.performance.Padding
   // kInvalidArgument says what was expected.
   Status (*apply)(const std::string& key, const std::string& text, DaemonConfig& config) = nullptr;
   bool is_live = false;  // may change while the daemon runs: a part of LiveConfig takes it
+  // It names a file, which is read again with the settings.
+  std::filesystem::path DaemonConfig::*file = nullptr;
 };
 
 std::span<const Setting> AllSettings();

@@ -29,6 +29,7 @@
 #include <boost/beast/http/write.hpp>
 #include <spdlog/spdlog.h>
 
+#include "server/http/silent_peers.h"
 #include "server/net/places.h"
 
 namespace atlas {
@@ -132,7 +133,8 @@ class HttpServer::Impl {
  public:
   Impl(ListenSocket socket, std::vector<HttpPage> pages, const HttpOptions& options)
       : options_(options),
-        places_(2 * options.max_connections),
+        request_places_(2 * options.max_requests),
+        silent_(options.max_silent),
         acceptor_(io_, socket.is_ip6() ? tcp::v6() : tcp::v4(), socket.Release()) {
     for (HttpPage& page : pages) {
       lanes_.push_back(std::make_unique<Lane>(std::move(page)));
@@ -178,19 +180,17 @@ class HttpServer::Impl {
       error_code error;
       tcp::socket socket =
           co_await acceptor_.async_accept(asio::redirect_error(asio::use_awaitable, error));
-      Places::Place place = places_.Take();
       if (error) {
         spdlog::warn("http: accept: {}", error.message());
         asio::steady_timer pause(io_, std::chrono::milliseconds(50));
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
-      } else if (place != nullptr) {
-        asio::co_spawn(io_, Converse(std::move(socket), std::move(place)), &LogFailure);
+      } else {
+        asio::co_spawn(io_, Converse(std::move(socket)), &LogFailure);
       }
     }
   }
 
-  asio::awaitable<void> Converse(tcp::socket socket, [[maybe_unused]] Places::Place place) {
-    const bool is_one_too_many = places_.taken() > options_.max_connections;
+  asio::awaitable<void> Converse(tcp::socket socket) {
     beast::tcp_stream stream(std::move(socket));
     Parser parser;
     parser.header_limit(options_.max_header_bytes);
@@ -200,8 +200,12 @@ class HttpServer::Impl {
     if (error && !reply) {
       co_return;
     }
-    if (is_one_too_many) {
-      reply = Plain(http::status::service_unavailable, "too many connections; try again later");
+    const Places::Place place = request_places_.Take();
+    if (place == nullptr) {
+      co_return;
+    }
+    if (request_places_.taken() > options_.max_requests) {
+      reply = Plain(http::status::service_unavailable, "too many requests; try again later");
     }
     if (!reply) {
       reply = co_await ReplyTo(parser);
@@ -211,7 +215,8 @@ class HttpServer::Impl {
     co_await Linger(stream);
   }
 
-  asio::awaitable<error_code> ReadHeader(beast::tcp_stream& stream, Parser& parser) const {
+  asio::awaitable<error_code> ReadHeader(beast::tcp_stream& stream, Parser& parser) {
+    const SilentPeers::Peer silent(silent_, [&stream] { stream.close(); });
     beast::flat_buffer buffer(options_.max_header_bytes + kReadAheadBytes);
     error_code error;
     stream.expires_after(options_.deadline);
@@ -229,7 +234,7 @@ class HttpServer::Impl {
     if (lane == lanes_.end()) {
       co_return Plain(http::status::not_found, "there is no such page");
     }
-    if ((*lane)->orders >= options_.max_connections) {  // it hangs
+    if ((*lane)->orders >= options_.max_requests) {  // it hangs
       co_return Late();
     }
     HttpReply reply = co_await PageOf(**lane);
@@ -288,7 +293,8 @@ class HttpServer::Impl {
   }
 
   HttpOptions options_;
-  Places places_;
+  Places request_places_;
+  SilentPeers silent_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   asio::io_context io_{1};  // after what its coroutines refer to
   tcp::acceptor acceptor_;

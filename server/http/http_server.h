@@ -14,7 +14,9 @@
 namespace atlas {
 
 struct HttpOptions {
-  std::size_t max_connections = 32;  // as many more are told 503, others are closed
+  std::size_t max_requests = 32;  // as many more are told 503, others are closed
+  // Connections whose request is not whole yet: for one more the oldest of them is closed.
+  std::size_t max_silent = 64;
   std::uint32_t max_header_bytes = 8u << 10;
   std::chrono::milliseconds deadline{5'000};  // for each of the request, the page and the reply
   std::chrono::milliseconds linger{1'000};    // for a peer that still sends to read its reply

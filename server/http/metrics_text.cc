@@ -92,6 +92,16 @@ void AddRequests(const NetFigures& net, Families& out) {
   }
 }
 
+void AddLateRequests(const NetFigures& net, Families& out) {
+  MetricFamily& family =
+      Begin(out, "requests_deadline_exceeded_total",
+            "Requests whose deadline passed before they were done.", MetricType::Counter);
+  for (std::size_t kind = 0; kind < kRequestKinds; ++kind) {
+    AddCount(family, {{"kind", std::string(kRequestKindNames[kind])}},
+             static_cast<double>(net.kinds[kind].late));
+  }
+}
+
 void AddRequestDurations(const NetFigures& net, Families& out) {
   MetricFamily& family =
       Begin(out, "request_seconds", "From the last byte of a request to its last reply.",
@@ -104,9 +114,16 @@ void AddRequestDurations(const NetFigures& net, Families& out) {
 
 void AddNet(const NetFigures& net, Families& out) {
   AddGauge(out, "connections", "Connections open.", net.connections);
-  AddCounter(out, "connections_refused_total", "Connections refused: too many were open.",
+  AddCounter(out, "connections_refused_total",
+             "Connections closed where they were accepted: too many were open, were not "
+             "greeted, or came of one address.",
              net.refused);
+  AddCounter(out, "tls_handshakes_failed_total",
+             "TLS handshakes that peers began and that did not succeed.", net.handshakes_failed);
+  AddCounter(out, "broken_frames_total",
+             "Frames that broke the protocol; each ended its connection.", net.broken_frames);
   AddRequests(net, out);
+  AddLateRequests(net, out);
   AddRequestDurations(net, out);
   AddGauge(out, "requests_in_flight", "Requests that were read and are not answered yet.",
            net.in_flight);

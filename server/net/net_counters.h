@@ -48,11 +48,14 @@ inline std::string_view RequestKindName(RequestKind kind) {
 struct NetFigures {
   struct Kind {
     std::array<std::uint64_t, kStatusCodes> requests{};  // that ended, by outcome
-    DurationFigures durations;                           // from their last byte to the last reply
+    std::uint64_t late = 0;     // of these, whose deadline passed before they were done
+    DurationFigures durations;  // from their last byte to the last reply
   };
 
   std::uint64_t connections = 0;
-  std::uint64_t refused = 0;  // connections since the start
+  std::uint64_t refused = 0;            // connections since the start
+  std::uint64_t handshakes_failed = 0;  // of TLS, that peers began
+  std::uint64_t broken_frames = 0;      // each of which ended its connection
   std::array<Kind, kRequestKinds> kinds;
   std::uint64_t received_bytes = 0;
   std::uint64_t sent_bytes = 0;
@@ -65,10 +68,13 @@ struct NetFigures {
 struct NetCounters {
   struct Kind {
     std::array<ThreadCounter, kStatusCodes> requests;
+    ThreadCounter late;
     DurationHistogram durations;
   };
 
   std::array<Kind, kRequestKinds> kinds;
+  ThreadCounter handshakes_failed;
+  ThreadCounter broken_frames;
   ThreadCounter received_bytes;
   ThreadCounter sent_bytes;
   ThreadCounter in_flight;
@@ -78,8 +84,11 @@ struct NetCounters {
       for (std::size_t code = 0; code < kStatusCodes; ++code) {
         figures.kinds[i].requests[code] += kinds[i].requests[code].value();
       }
+      figures.kinds[i].late += kinds[i].late.value();
       kinds[i].durations.AddTo(figures.kinds[i].durations);
     }
+    figures.handshakes_failed += handshakes_failed.value();
+    figures.broken_frames += broken_frames.value();
     figures.received_bytes += received_bytes.value();
     figures.sent_bytes += sent_bytes.value();
     figures.in_flight += in_flight.value();

@@ -10,6 +10,7 @@
 #include "core/base/str_cat.h"
 #include "server/net/access/access_check.h"
 #include "server/net/connection/completion.h"
+#include "server/net/connection/reading_end.h"
 #include "server/net/connection/reading_turn.h"
 
 namespace atlas {
@@ -62,6 +63,7 @@ void PeerConnection::CloseNow() {
 
 asio::awaitable<void> PeerConnection::Read() {
   const Status broken = co_await ReadRequests();
+  NoteReadingEnd(peer_, stream_, broken);
   DropUnread();
   if (!broken.ok()) {
     Refuse(broken);
@@ -82,9 +84,6 @@ asio::awaitable<Status> PeerConnection::ReadRequests() {
     }
     const PeerStream::Moved came = stream_.Read(buffer_);
     if (came.is_closed) {
-      if (!stream_.failure().empty()) {
-        peer_.Warn(StrCat("TLS: ", stream_.failure()));
-      }
       co_return Status();
     }
     if (came.bytes > 0) {

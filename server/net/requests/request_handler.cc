@@ -24,6 +24,13 @@ namespace asio = boost::asio;
 
 constexpr std::size_t kBytesAtOnce = 1u << 20;  // of a reply, then it is the others' turn
 
+void EndSync(const SyncReply& reply, const Status& status, RequestRecord& record) {
+  if (reply.is_cut_late()) {
+    record.NoteLate();
+  }
+  record.End(status);
+}
+
 }  // namespace
 
 std::optional<asio::awaitable<void>> RequestHandler::Greet(Envelope request,
@@ -113,14 +120,16 @@ void RequestHandler::Cancel(const Envelope& request, Peer& peer) {
 
 asio::awaitable<void> RequestHandler::Await(Request request, Peer& peer) {
   RequestRecord record(peer.out.peer(), *request.message, request.began);
-  Status status = co_await Dispatch(request, peer);
+  Status status = co_await Dispatch(request, record, peer);
   record.End(status);
   if (!status.ok()) {
     co_await peer.out.SendError(request.message->request_id(), std::move(status));
   }
 }
 
-asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& peer) {
+asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole,
+                                                 RequestRecord& record,
+                                                 Peer& peer) {
   const Envelope& request = *whole.message;
   switch (request.body_case()) {
     case Envelope::kUploadKeyframe:
@@ -136,7 +145,7 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole, Peer& pee
     case Envelope::kSessionsRequest:
       return AnswerSessions(context_, request, peer);
     case Envelope::kWaitRequest:
-      return AnswerWait(context_, whole, peer.out);
+      return AnswerWait(context_, whole, record, peer.out);
     case Envelope::kDigestRequest:
       return AnswerDigest(context_, whole, peer.out);
     case Envelope::kLogRequest:
@@ -182,7 +191,7 @@ bool RequestHandler::SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWr
     }
     frames.clear();
     if (*step == SyncReply::Step::kDone) {
-      record.End({});
+      EndSync(reply, {}, record);
       return true;
     }
     if (*step == SyncReply::Step::kBlocked) {
@@ -198,7 +207,7 @@ asio::awaitable<void> RequestHandler::Sync(std::shared_ptr<SyncReply> reply,
                                            std::unique_ptr<TurnOrder::Turn> turn,
                                            Peer& peer) {
   Status status = co_await WaitAndSync(reply, std::move(hold), std::move(turn), peer);
-  record.End(status);
+  EndSync(*reply, status, record);
   if (!status.ok()) {
     co_await peer.out.SendError(reply->request_id(), std::move(status));
   }

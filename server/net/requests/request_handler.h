@@ -87,7 +87,7 @@ class RequestHandler {
                                       RequestRecord record,
                                       ReplyWriter& out);
   static void Cancel(const Envelope& request, Peer& peer);
-  boost::asio::awaitable<Status> Dispatch(const Request& whole, Peer& peer);
+  boost::asio::awaitable<Status> Dispatch(const Request& whole, RequestRecord& record, Peer& peer);
   static boost::asio::awaitable<Status> Refuse(const Envelope& request);
   // False: what is left takes long, or the disk, or the peer does not take it.
   static bool SyncAtOnce(SyncReply& reply, RequestRecord& record, ReplyWriter& out);

@@ -109,6 +109,9 @@ void RequestRecord::Count(StatusCode code, Clock::time_point now) {
   NetCounters& counters = std::exchange(peer_, nullptr)->counters;
   NetCounters::Kind& kind = counters.kinds[static_cast<std::size_t>(kind_)];
   kind.requests[IndexOf(code)].Add();
+  if (is_late_ || code == StatusCode::kTimeout) {
+    kind.late.Add();
+  }
   kind.durations.Add(now - began_);
   counters.in_flight.Subtract();
 }

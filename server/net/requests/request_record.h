@@ -26,6 +26,7 @@ class RequestRecord {
         id_(other.id_),
         kind_(other.kind_),
         may_wait_(other.may_wait_),
+        is_late_(other.is_late_),
         began_(other.began_) {}
   RequestRecord(const RequestRecord&) = delete;
   RequestRecord& operator=(const RequestRecord&) = delete;
@@ -33,6 +34,8 @@ class RequestRecord {
   // One that never ended was left by an exception: a mistake of the daemon.
   ~RequestRecord() { Count(StatusCode::kInternal, Clock::now()); }
 
+  // Its deadline passed, and it ends well all the same, with less than was asked for.
+  void NoteLate() { is_late_ = true; }
   // To be called once, when its last reply is queued or its error known.
   void End(const Status& status);
 
@@ -43,7 +46,8 @@ class RequestRecord {
   const PeerRecord* peer_;  // null: it ended, or goes on elsewhere
   std::uint64_t id_;
   RequestKind kind_;
-  bool may_wait_;  // for others: a long time says nothing
+  bool may_wait_;         // for others: a long time says nothing
+  bool is_late_ = false;  // a status of kTimeout says so, too
   Clock::time_point began_;
 };
 

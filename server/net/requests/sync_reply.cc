@@ -149,6 +149,7 @@ Result<SyncReply::Step> SyncReply::Fill(bool may_block, const Room& room, Batch&
   // One tile in any case: a reply that makes no step would be asked for the next one for ever.
   while (batch.tiles.empty() || (batch.tiles.size() < max_tiles && batch.tile_bytes < room.bytes)) {
     if (IsLate() && (next_ < plan_.items.size() || plan_.is_cut)) {
+      is_cut_late_ = true;
       batch.end = End::kCut;
       return Step::kDone;
     }

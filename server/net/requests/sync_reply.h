@@ -46,6 +46,8 @@ class SyncReply {
   const std::optional<Clock::time_point>& deadline() const { return deadline_; }
   // Some of it was sent: it can be cut where it is.
   bool has_begun() const { return sent_bytes_ > 0; }
+  // Its time was over before all was sent.
+  bool is_cut_late() const { return is_cut_late_; }
 
   // What it keeps until it goes on.
   std::size_t kept_bytes() const { return plan_.item_bytes(); }
@@ -98,6 +100,7 @@ class SyncReply {
   wire::SyncManifest holdings_;  // until they are told
   bool has_planned_ = false;
   bool is_for_pool_ = false;  // the plan takes the disk, or long: known from trying
+  bool is_cut_late_ = false;
   std::uint32_t sent_tiles_ = 0;
   std::uint64_t sent_bytes_ = 0;
 };

@@ -53,6 +53,7 @@ Result<CompactionRequest> ReadCompaction(const AtlasService& service,
 
 asio::awaitable<Status> AnswerWait(RequestContext& context,
                                    const Request& whole,
+                                   RequestRecord& record,
                                    ReplyWriter& out) {
   const Result<Places::Place> place = context.waits.Take(out.peer());
   if (!place) {
@@ -64,6 +65,9 @@ asio::awaitable<Status> AnswerWait(RequestContext& context,
       co_await WaitUntilClean(context.service, context.pool, patience);
   if (outcome && !outcome->damage.ok()) {
     co_return outcome->damage;
+  }
+  if (outcome && outcome->is_timed_out) {
+    record.NoteLate();
   }
   co_return co_await Answer(request, outcome, &wire::Envelope::mutable_wait_reply, WaitToWire, out);
 }

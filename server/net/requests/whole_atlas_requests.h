@@ -6,6 +6,7 @@
 
 #include "server/net/requests/request.h"
 #include "server/net/requests/request_context.h"
+#include "server/net/requests/request_record.h"
 #include "server/net/stream/reply_writer.h"
 
 namespace atlas {
@@ -14,6 +15,7 @@ namespace atlas {
 
 boost::asio::awaitable<Status> AnswerWait(RequestContext& context,
                                           const Request& request,
+                                          RequestRecord& record,
                                           ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerDigest(RequestContext& context,
                                             const Request& request,

@@ -120,6 +120,8 @@ PeerStream::Moved PeerStream::ReadSession(std::span<std::uint8_t> into) {
   ERR_clear_error();
   std::size_t size = 0;
   const int result = SSL_read_ex(session_.get(), into.data(), into.size(), &size);
+  // After a failure OpenSSL takes every handshake for one that is not done.
+  has_shaken_hands_ = has_shaken_hands_ || SSL_is_init_finished(session_.get()) == 1;
   if (HasTooManyKeyUpdates()) {
     failure_ = StrCat(key_updates_, " changes of the key with ", received_bytes_, " bytes");
     return {0, false, true};

@@ -59,6 +59,10 @@ class PeerStream {
   // Whether this context believes it, too; ok where there is none. kPermissionDenied.
   Status CheckCertificate(const TlsContext& tls) const;
   bool is_encrypted() const { return session_ != nullptr; }
+  // The peer has begun a handshake, and it is not done.
+  bool is_shaking_hands() const {
+    return session_ != nullptr && !has_shaken_hands_ && has_received();
+  }
   // Why TLS closed it; empty: it did not.
   const std::string& failure() const { return failure_; }
   // Closing forgets what the system has not sent yet.
@@ -84,6 +88,7 @@ class PeerStream {
   boost::asio::ip::tcp::socket socket_;
   SslSession session_;
   bool has_read_ = false;             // in the clear
+  bool has_shaken_hands_ = false;     // with TLS
   bool read_waits_to_write_ = false;  // in a handshake
   bool write_waits_to_read_ = false;
   std::uint64_t received_bytes_ = 0;  // without those of TLS

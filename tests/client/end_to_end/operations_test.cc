@@ -52,6 +52,20 @@ TEST_F(OperationsEndToEndTest, AGoodFileTakesEffectAndABadOneDoesNot) {
   EXPECT_EQ(daemon.Stop(SIGTERM), 0);
 }
 
+TEST_F(OperationsEndToEndTest, TheLogNamesWhatWasNewWhenItWasReadAgain) {
+  const fs::path tokens = NewFile();
+  Write(tokens, "");
+  DaemonProcess daemon(NewData(), {"--tokens", tokens.string()}, DaemonProcess::Log::kKept);
+  daemon.ReadLogUntil("atlas in");
+  daemon.Signal(SIGHUP);
+  EXPECT_NE(daemon.ReadLogUntil("signal 1").find("read again, no setting and no file changed"),
+            std::string::npos);
+  Write(tokens, "# nobody yet");
+  daemon.Signal(SIGHUP);
+  EXPECT_NE(daemon.ReadLogUntil("signal 1").find("read again, file of access.tokens changed"),
+            std::string::npos);
+}
+
 TEST_F(OperationsEndToEndTest, AFailedRequestIsALineWithItsIds) {
   DaemonProcess daemon(NewData(), {"--log-format", "json"}, DaemonProcess::Log::kKept);
   EXPECT_EQ(RunAtlas(daemon.address(), {"session", "retract", "bus/day"}).exit_code, 3);

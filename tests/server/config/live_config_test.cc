@@ -2,11 +2,14 @@
 #include "server/config/live_config.h"
 
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 namespace atlas {
 namespace {
@@ -92,6 +95,41 @@ TEST_F(LiveConfigTest, OneThatWaitsForARestartIsNamedUntilItIsBack) {
   EXPECT_THAT(config.Reload()->waiting, ElementsAre("workers"));
   arguments_ = {"--workers", "2"};
   EXPECT_THAT(config.Reload()->waiting, IsEmpty());
+}
+
+TEST_F(LiveConfigTest, FilesWithOtherContentAreNamed) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("live_config." + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  const auto write = [&folder](const std::string& name, const std::string& text) {
+    std::ofstream(folder / name) << text;
+    return (folder / name).string();
+  };
+  const std::vector<std::string> given = {
+      "--tls-certificate", write("a.pem", std::string(9'000, 'a')),
+      "--tls-key",         write("a.key", "a"),
+      "--tokens",          write("tokens", "")};
+  LiveConfig config = Start(given);
+  EXPECT_THAT(config.Reload()->renewed, IsEmpty());
+
+  write("a.pem", std::string(8'999, 'a') + "b");
+  write("tokens", "# nobody");
+  part_status_ = Status(StatusCode::kInvalidData, "of no use");
+  EXPECT_FALSE(config.Reload());
+  part_status_ = {};
+  const auto outcome = config.Reload();
+  ASSERT_TRUE(outcome) << outcome.error().message();
+  EXPECT_THAT(outcome->changed, IsEmpty());
+  EXPECT_THAT(outcome->renewed, ElementsAre("access.tokens", "tls.certificate"));
+  EXPECT_THAT(config.Reload()->renewed, IsEmpty()) << "once";
+
+  write("a.key", "b");
+  arguments_[1] = write("b.pem", "b");
+  const auto renamed = config.Reload();
+  ASSERT_TRUE(renamed) << renamed.error().message();
+  EXPECT_THAT(renamed->changed, ElementsAre("tls.certificate"));
+  EXPECT_THAT(renamed->renewed, ElementsAre("tls.key"));
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(LiveConfigTest, AMistakeLeavesEverythingAsItWas) {

@@ -4,6 +4,7 @@
 #include <future>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -20,7 +21,7 @@ using testing::HasSubstr;
 class HttpServerTest : public testing::Test {
  protected:
   ~HttpServerTest() override {
-    release_.set_value();  // or the page that hangs would hold up the end
+    Release();  // or the page that hangs would hold up the end
     server_.reset();
   }
 
@@ -34,6 +35,20 @@ class HttpServerTest : public testing::Test {
     const HttpPeer peer(port_);
     peer.Send(request);
     return peer.ReceiveAnswer().value_or(HttpAnswer());
+  }
+  // From now on no page hangs.
+  void Release() {
+    if (!std::exchange(is_released_, true)) {
+      release_.set_value();
+    }
+  }
+  std::vector<std::unique_ptr<HttpPeer>> AskForWhatHangs(int count) const {
+    std::vector<std::unique_ptr<HttpPeer>> peers;
+    for (int i = 0; i < count; ++i) {
+      peers.push_back(std::make_unique<HttpPeer>(port_));
+      peers.back()->Send(RequestFor("/hangs"));
+    }
+    return peers;
   }
   std::vector<HttpPage> Pages() const {
     return {{"/here",
@@ -58,6 +73,7 @@ class HttpServerTest : public testing::Test {
   std::uint16_t port_ = 0;
 
  private:
+  bool is_released_ = false;
   std::promise<void> release_;
   std::shared_future<void> released_ = release_.get_future().share();
   std::unique_ptr<HttpServer> server_;
@@ -149,30 +165,60 @@ TEST_F(HttpServerTest, APeerThatDoesNotCloseIsClosed) {
 }
 
 TEST_F(HttpServerTest, OneTooManyIsTold) {
-  options_.max_connections = 3;
-  options_.deadline = std::chrono::minutes(1);  // longer than the silent ones stay
+  options_.max_requests = 3;
+  options_.deadline = std::chrono::minutes(1);  // longer than the requests stay
   Serve();
-  std::vector<std::unique_ptr<HttpPeer>> silent;
-  for (int i = 0; i < 3; ++i) {
-    silent.push_back(std::make_unique<HttpPeer>(port_));
-  }
+  const auto requests = AskForWhatHangs(3);
   EXPECT_EQ(Ask(port_, "/here").status, 503);
-  EXPECT_THAT(Ask(port_, "/nowhere").body, HasSubstr("too many connections"));
-  silent.pop_back();
+  EXPECT_THAT(Ask(port_, "/nowhere").body, HasSubstr("too many requests"));
+  EXPECT_THAT(AnswerTo("hello there\r\n\r\n").body, HasSubstr("too many requests"));
+  Release();
   EXPECT_EQ(AskUntil(port_, "/here", 200).status, 200);
 }
 
 TEST_F(HttpServerTest, BeyondTwiceTheLimitAConnectionIsClosed) {
-  options_.max_connections = 3;
+  options_.max_requests = 3;
+  options_.deadline = std::chrono::minutes(1);
+  options_.linger = std::chrono::minutes(1);
+  Serve();
+  const auto requests = AskForWhatHangs(3);
+  auto told = AskForWhatHangs(3);  // that it is too much, and stay
+  for (const auto& peer : told) {
+    EXPECT_THAT(peer->ReceiveAll(), HasSubstr("503 "));
+  }
+  EXPECT_EQ(Ask(port_, "/here").status, 0);
+  told.clear();
+  EXPECT_EQ(AskUntil(port_, "/here", 503).status, 503);
+}
+
+TEST_F(HttpServerTest, WhoIsSilentForLongestMakesRoom) {
+  options_.max_silent = 3;
   options_.deadline = std::chrono::minutes(1);
   Serve();
   std::vector<std::unique_ptr<HttpPeer>> silent;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 5; ++i) {
     silent.push_back(std::make_unique<HttpPeer>(port_));
+    silent.back()->Send("GET /here HT");
   }
-  EXPECT_EQ(HttpPeer(port_).ReceiveAll(), "");
-  silent.clear();
-  EXPECT_EQ(AskUntil(port_, "/here", 200).status, 200);
+  EXPECT_EQ(silent[0]->ReceiveAll(), "");
+  EXPECT_EQ(silent[1]->ReceiveAll(), "");
+  for (int i = 2; i < 5; ++i) {
+    silent[i]->Send("TP/1.1\r\n\r\n");
+    EXPECT_EQ(silent[i]->ReceiveAnswer().value_or(HttpAnswer()).status, 200) << i;
+  }
+}
+
+TEST_F(HttpServerTest, WhoseRequestIsWholeMakesNoRoom) {
+  options_.max_silent = 1;
+  options_.deadline = std::chrono::minutes(1);
+  Serve();
+  const auto requests = AskForWhatHangs(3);
+  const HttpPeer silent(port_);
+  EXPECT_EQ(Ask(port_, "/here").status, 200);
+  Release();
+  for (const auto& peer : requests) {
+    EXPECT_EQ(peer->ReceiveAnswer().value_or(HttpAnswer()).status, 200);
+  }
 }
 
 TEST_F(HttpServerTest, APageThatHangsHoldsUpNoOther) {
@@ -185,7 +231,7 @@ TEST_F(HttpServerTest, APageThatHangsHoldsUpNoOther) {
 }
 
 TEST_F(HttpServerTest, APageThatHangsIsNotWaitedForByMoreThanTheLimit) {
-  options_.max_connections = 2;
+  options_.max_requests = 2;
   options_.deadline = milliseconds(200);
   Serve();
   for (int i = 0; i < 4; ++i) {

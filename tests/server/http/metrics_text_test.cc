@@ -22,6 +22,8 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   figures.rss_bytes = 1u << 30;
   figures.net.connections = 3;
   figures.net.refused = 4;
+  figures.net.handshakes_failed = 7;
+  figures.net.broken_frames = 8;
   figures.writes.queued = 6;
   const auto metrics = ParseMetrics(MetricsText(figures));
   EXPECT_EQ(metrics.at("roadatlas_atlas_readable"), 1);
@@ -32,6 +34,8 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   EXPECT_EQ(metrics.at("roadatlas_resident_bytes"), 1u << 30);
   EXPECT_EQ(metrics.at("roadatlas_connections"), 3);
   EXPECT_EQ(metrics.at("roadatlas_connections_refused_total"), 4);
+  EXPECT_EQ(metrics.at("roadatlas_tls_handshakes_failed_total"), 7);
+  EXPECT_EQ(metrics.at("roadatlas_broken_frames_total"), 8);
   EXPECT_EQ(metrics.at("roadatlas_store_writes_queued"), 6);
 }
 
@@ -47,11 +51,14 @@ TEST(MetricsTextTest, RequestsAreCountedByKindAndOutcome) {
   auto& sync = figures.net.kinds[static_cast<std::size_t>(RequestKind::kSync)];
   sync.requests[IndexOf(StatusCode::kOk)] = 7;
   sync.requests[IndexOf(StatusCode::kInvalidArgument)] = 1;
+  sync.late = 2;
   const auto metrics = ParseMetrics(MetricsText(figures));
   EXPECT_EQ(metrics.at(R"(roadatlas_requests_total{kind="sync",code="ok"})"), 7);
   EXPECT_EQ(metrics.at(R"(roadatlas_requests_total{kind="sync",code="invalid_argument"})"), 1);
   EXPECT_EQ(metrics.at(R"(roadatlas_requests_total{kind="hello",code="ok"})"), 0);
   EXPECT_EQ(metrics.count(R"(roadatlas_requests_total{kind="sync",code="internal"})"), 0u);
+  EXPECT_EQ(metrics.at(R"(roadatlas_requests_deadline_exceeded_total{kind="sync"})"), 2);
+  EXPECT_EQ(metrics.at(R"(roadatlas_requests_deadline_exceeded_total{kind="wait"})"), 0);
 }
 
 TEST(MetricsTextTest, AHistogramCountsUpToEachBound) {

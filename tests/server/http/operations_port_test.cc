@@ -1,10 +1,12 @@
 // What the operations port tells of a daemon at work, one that hangs and one that stops.
 #include "server/operations_port.h"
 
+#include <chrono>
 #include <future>
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,6 +67,9 @@ class OperationsPortTest : public NetTest {
   static std::string Requests(const std::string& kind, const std::string& code) {
     return "roadatlas_requests_total{kind=\"" + kind + "\",code=\"" + code + "\"}";
   }
+  static std::string Late(const std::string& kind) {
+    return "roadatlas_requests_deadline_exceeded_total{kind=\"" + kind + "\"}";
+  }
   static std::string Count(const std::string& kind) {
     return "roadatlas_request_seconds_count{kind=\"" + kind + "\"}";
   }
@@ -117,6 +122,17 @@ TEST_F(OperationsPortTest, ADaemonAtWorkIsWellAndReady) {
   EXPECT_EQ(Ask(http_, "/").status, 404);
 }
 
+TEST_F(OperationsPortTest, ManyWhoSayNothingKeepNobodyOut) {
+  ServeWithOperations();
+  std::vector<std::unique_ptr<HttpPeer>> silent;
+  for (int i = 0; i < 200; ++i) {
+    silent.push_back(std::make_unique<HttpPeer>(http_));
+  }
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_EQ(Ask(http_, "/healthz").status, 200);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(1));
+}
+
 TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
   ServeWithOperations();
   EXPECT_EQ(Metrics().at(Requests("hello", "ok")), 0);
@@ -156,6 +172,10 @@ TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
   EXPECT_EQ(metrics.at("roadatlas_held_bytes"), 0);
   EXPECT_EQ(metrics.at("roadatlas_queued_reply_bytes"), 0);
   EXPECT_EQ(metrics.at("roadatlas_large_requests_closed_total"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_broken_frames_total"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_tls_handshakes_failed_total"), 0);
+  EXPECT_EQ(metrics.at(Late("wait")), 1);
+  EXPECT_EQ(metrics.at(Late("status")), 0);
   EXPECT_EQ(metrics.at("roadatlas_keyframes"), 1);
   EXPECT_EQ(metrics.at("roadatlas_revision"), 1);
   EXPECT_GT(metrics.at("roadatlas_dirty_tiles"), 0);

@@ -165,6 +165,22 @@ TEST_F(SlowReadersTest, WhatIsLeftOfARequestGoesWithItsPeer) {
   StopServer();
 }
 
+TEST_F(SlowReadersTest, ASyncThatEndsByItsDeadlineIsCountedAsLate) {
+  ServeTiles();
+  const auto peer = Connect(4'096);
+  wire::Envelope sync = ManyHeldSync(1);
+  sync.mutable_sync_request()->set_timeout_ms(100);
+  peer->Send(sync);
+  WaitUntilAtRest();  // longer than that
+  std::optional<wire::Envelope> reply;
+  do {
+    reply = peer->Receive();
+    ASSERT_TRUE(reply.has_value());
+  } while (!reply->has_sync_end());
+  EXPECT_TRUE(reply->sync_end().has_cursor());
+  EXPECT_EQ(server_->ReadFigures().kinds[static_cast<std::size_t>(RequestKind::kSync)].late, 1u);
+}
+
 // As when so many others read nothing that nothing is left to be shared.
 TEST_F(SlowReadersTest, WhereAllIsTakenAReaderIsServedFrameByFrame) {
   net_.max_all_queued_bytes = 7;  // of which a share is nothing
