@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 
+import bench_crowd
 import bench_follow
 import bench_load
 import bench_memory
@@ -207,7 +208,8 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
-                                   **bench_memory.BENCHMARKS, **bench_unread.BENCHMARKS}.items()}}
+                                   **bench_memory.BENCHMARKS, **bench_unread.BENCHMARKS,
+                                   **bench_crowd.BENCHMARKS}.items()}}
 
 
 def main():

@@ -2,7 +2,7 @@
 # Runs the benchmarks named (all, if none) and prints one JSON line a figure:
 # {"name", "value", "unit", "against", "ratio"}. Usage: deploy/bench.sh [NAME...] [--long]; deploy/bench.sh --help
 # lists the names.
-# All but fusion, accuracy, online, passes, corrections, restarts, scaling and unread need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the
+# All but fusion, accuracy, online, passes, corrections, restarts, scaling, unread and crowd need the drives of docs/data.md in $ATLAS_DATA; accuracy takes the
 # meshes there too. curbs prints a line a threshold instead. curbs, online, passes and follow
 # draw docs/images/*.png. --long: memory with an atlas of 5 GiB, too (10 GiB of disk, half an hour).
 set -euo pipefail

@@ -7,11 +7,12 @@ import time
 import atlas_pb2
 
 from roadatlas.changes import Changes
-from roadatlas.client import AtlasClient, SyncReply
+from roadatlas.client import AtlasClient
 from roadatlas.command_line import connect, parse_arguments
 from roadatlas.errors import BadCredentials, RoadAtlasError
 from roadatlas.geometry import disc, tile_place
 from roadatlas.profile import parse_profile
+from roadatlas.sync_reply import SyncReply
 from roadatlas.tile_store import TileStore
 
 _LOOK_AGAIN_S = 60.0

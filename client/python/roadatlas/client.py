@@ -5,15 +5,17 @@ one's reply with `result`. All of them raise RequestRefused for an `Error`, Dead
 BrokenReply and TlsFailed.
 """
 
+import contextlib
 import dataclasses
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import atlas_pb2
 from google.protobuf.message import Message
 
 from roadatlas.connection import Connection
-from roadatlas.errors import BrokenReply
+from roadatlas.errors import BrokenReply, DaemonTooOld
+from roadatlas.sync_reply import SyncReply, read_sync_reply
 from roadatlas.tls import Tls
 from roadatlas.watch import Watch
 
@@ -25,7 +27,7 @@ _REPLY_TO = {"hello": "hello_reply", "upload_keyframe": "upload_reply", "update_
              "change_session": "change_session_reply", "status_request": "status_reply",
              "sessions_request": "sessions_reply", "wait_request": "wait_reply", "digest_request": "digest_reply",
              "compact_request": "compact_reply", "verify_request": "verify_reply",
-             "cancel_request": "cancel_reply"}  # those of one message
+             "log_request": "log_reply", "cancel_request": "cancel_reply"}  # those of one message
 
 
 @dataclasses.dataclass
@@ -34,29 +36,6 @@ class QueryReply:
 
     tiles: list[atlas_pb2.TileMessage]
     end: atlas_pb2.QueryEnd
-
-
-@dataclasses.dataclass
-class SyncReply:
-    """What a sync told. `current_tiles` and `current_blocks`: one for each that was told as held, in order."""
-
-    manifests: list[atlas_pb2.SyncManifest]
-    tiles: list[atlas_pb2.TileMessage]
-    current_tiles: list[bool]
-    current_blocks: list[bool]
-    end: atlas_pb2.SyncEnd
-
-    @property
-    def removed(self) -> list[int]:
-        return list(self.manifests[0].removed)
-
-    @property
-    def differing_blocks(self) -> list[int]:
-        return list(self.manifests[0].differing_blocks)
-
-    @property
-    def not_modified(self) -> int:
-        return self.manifests[0].not_modified
 
 
 class AtlasClient:
@@ -123,10 +102,10 @@ class AtlasClient:
     def result(self, request_id: int, timeout_ms: int = 0) -> Message:
         """The reply to a submitted request, once. `timeout_ms` is what the request allowed the daemon."""
         awaited = self._awaited.pop(request_id)
-        envelope = self._connection.receive(request_id, self._deadline(timeout_ms))
-        if envelope.WhichOneof("body") != awaited:
-            raise BrokenReply(f"{envelope.WhichOneof('body')} in place of a {awaited}")
-        return getattr(envelope, awaited)
+        try:
+            return _body_of(self._connection.receive(request_id, self._deadline(timeout_ms)), awaited)
+        finally:
+            self._connection.forget(request_id)
 
     def upload_keyframe(self, upload: atlas_pb2.UploadKeyframe) -> atlas_pb2.UploadReply:
         return self._call(upload)
@@ -171,42 +150,71 @@ class AtlasClient:
     def digest(self, timeout_ms: int, at_revision: int | None = None) -> atlas_pb2.DigestReply:
         return self._call(atlas_pb2.DigestRequest(timeout_ms=timeout_ms, at_revision=at_revision), timeout_ms)
 
+    def verify(self, timeout_ms: int, *, rebuild: bool = False, repair: bool = False,
+               author: str = "") -> atlas_pb2.VerifyReply:
+        """Reads everything back. `rebuild`: and fuses every tile again; `repair`: and restores what is damaged, as far
+        as something tells what it was. DaemonTooOld: it would repair nothing, and not say so."""
+        if repair:
+            self._needs_minor(8, "a verification that repairs")
+        return self._call(atlas_pb2.VerifyRequest(rebuild=rebuild, timeout_ms=timeout_ms, repair=repair,
+                                                  author=author), timeout_ms)
+
+    def log(self, after_id: int = 0) -> list[atlas_pb2.LogReply.Event]:
+        """What happened beside uploads behind that event, oldest first, however many replies it takes."""
+        events: list[atlas_pb2.LogReply.Event] = []
+        while page := self._call(atlas_pb2.LogRequest(after_id=after_id)).events:
+            for event in page:
+                if event.id <= after_id:
+                    raise BrokenReply(f"event {event.id} of the log comes twice, or out of order")
+                events.append(event)
+                after_id = event.id
+        return events
+
+    def backup(self, name: str, timeout_ms: int, *, author: str = "",
+               on_progress: Callable[[atlas_pb2.BackupReply], None] | None = None) -> atlas_pb2.BackupReply:
+        """Has the daemon write a copy of its atlas, and read it back; what it says when that is done. `on_progress`
+        hears how far it is. Whoever gives up before, by whatever exception, closes this client: that ends the backup.
+        """
+        if not name:
+            raise ValueError("a backup without a name: expected one, backups() lists those that are there")
+        deadline = self._deadline(timeout_ms)
+        request_id = self._send(atlas_pb2.BackupRequest(name=name, author=author, timeout_ms=timeout_ms))
+        try:
+            while True:
+                reply = _body_of(self._connection.receive(request_id, deadline), "backup_reply")
+                match reply.stage:
+                    case atlas_pb2.BackupReply.DONE:
+                        return reply
+                    case atlas_pb2.BackupReply.UNKNOWN:
+                        raise BrokenReply("a backup without a stage")
+                if on_progress is not None:
+                    on_progress(reply)
+        finally:
+            if self._connection.forget(request_id):
+                self.close()
+
+    def backups(self) -> list[atlas_pb2.BackupReply.Backup]:
+        """Those in the daemon's folder."""
+        with self._frames_of_reply(atlas_pb2.BackupRequest(), 0) as receive:
+            return list(_body_of(receive(), "backup_reply").backups)
+
     def query_region(self, query: atlas_pb2.QueryRegion) -> QueryReply:
-        deadline = self._deadline(query.timeout_ms)
-        request_id = self._send(query)
-        tiles = []
-        while True:
-            envelope = self._connection.receive(request_id, deadline)
-            match envelope.WhichOneof("body"):
-                case "tile":
-                    tiles.append(envelope.tile)
-                case "query_end":
-                    return QueryReply(tiles, envelope.query_end)
-                case other:
-                    raise BrokenReply(f"{other} within the reply to a query")
+        with self._frames_of_reply(query, query.timeout_ms) as receive:
+            tiles = []
+            while True:
+                envelope = receive()
+                match envelope.WhichOneof("body"):
+                    case "tile":
+                        tiles.append(envelope.tile)
+                    case "query_end":
+                        return QueryReply(tiles, envelope.query_end)
+                    case other:
+                        raise BrokenReply(f"{other} within the reply to a query")
 
     def sync(self, request: atlas_pb2.SyncRequest) -> SyncReply:
         """One reply; where `end.cursor` is not empty, the same request with it goes on."""
-        deadline = self._deadline(request.timeout_ms)
-        request_id = self._send(request)
-        manifests: list[atlas_pb2.SyncManifest] = []
-        tiles: list[atlas_pb2.TileMessage] = []
-        announced = 0
-        while True:
-            envelope = self._connection.receive(request_id, deadline)
-            match envelope.WhichOneof("body"):
-                case "sync_manifest" if len(tiles) == announced:
-                    manifests.append(envelope.sync_manifest)
-                    announced += len(envelope.sync_manifest.keys)
-                case "tile" if len(tiles) < announced:
-                    _check_announced(envelope.tile, manifests[-1], len(tiles) - announced)
-                    if envelope.tile.base_hash and not request.takes_deltas:
-                        raise BrokenReply(f"tile {envelope.tile.key:#018x} came as a delta, which was not asked for")
-                    tiles.append(envelope.tile)
-                case "sync_end" if manifests and len(tiles) == announced:
-                    return _sync_reply(request, manifests, tiles, envelope.sync_end)
-                case other:
-                    raise BrokenReply(f"{other} after {len(tiles)} of {announced} tiles that a sync announced")
+        with self._frames_of_reply(request, request.timeout_ms) as receive:
+            return read_sync_reply(request, receive)
 
     def watch(self, area: atlas_pb2.Area, *, finest_level: int = 0, coarsest_level: int = 0,
               interval_ms: int = 1000) -> Watch:
@@ -214,11 +222,31 @@ class AtlasClient:
         deadline = self._deadline(0)
         request_id = self._send(atlas_pb2.WatchRequest(area=area, finest_level=finest_level,
                                                        coarsest_level=coarsest_level, interval_ms=interval_ms))
-        return Watch(self._connection, request_id, self._cancel, deadline)
+        try:
+            return Watch(self._connection, request_id, self._cancel, deadline)
+        except BaseException:
+            if self._connection.forget(request_id):  # it may begin still
+                self._connection.forget(self._send(atlas_pb2.CancelRequest(request_id=request_id)))
+            raise
 
     def _cancel(self, request_id: int) -> bool:
         """False: there was no watch under that id any more."""
         return self._call(atlas_pb2.CancelRequest(request_id=request_id)).cancelled
+
+    @contextlib.contextmanager
+    def _frames_of_reply(self, request: Message, timeout_ms: int) -> Iterator[Callable[[], atlas_pb2.Envelope]]:
+        """Gives what waits for the next frame. What still comes when the block is left is dropped."""
+        deadline = self._deadline(timeout_ms)
+        request_id = self._send(request)
+        try:
+            yield lambda: self._connection.receive(request_id, deadline)
+        finally:
+            self._connection.forget(request_id)
+
+    def _needs_minor(self, minor: int, what: str) -> None:
+        if self.hello.protocol_minor < minor:
+            raise DaemonTooOld(f"{what} needs a daemon of version {PROTOCOL_MAJOR}.{minor}, this one speaks "
+                               f"{PROTOCOL_MAJOR}.{self.hello.protocol_minor}")
 
     def _call(self, request: Message, timeout_ms: int = 0) -> Message:
         return self.result(self.submit(request), timeout_ms)
@@ -234,26 +262,11 @@ def _session(resume: tuple[str, str] | None) -> atlas_pb2.Hello.Session | None:
     return atlas_pb2.Hello.Session(vehicle=resume[0], session=resume[1]) if resume else None
 
 
+def _body_of(envelope: atlas_pb2.Envelope, awaited: str) -> Message:
+    if envelope.WhichOneof("body") != awaited:
+        raise BrokenReply(f"{envelope.WhichOneof('body')} in place of a {awaited}")
+    return getattr(envelope, awaited)
+
+
 def _field_of(request: Message) -> str:
     return _FIELD_OF[request.DESCRIPTOR.full_name]
-
-
-def _check_announced(tile: atlas_pb2.TileMessage, manifest: atlas_pb2.SyncManifest, index: int) -> None:
-    promised = (manifest.keys[index], manifest.revisions[index], manifest.payload_hashes[index],
-                manifest.bytes[index])
-    if promised != (tile.key, tile.revision, tile.payload_hash, len(tile.blob)):
-        raise BrokenReply(f"tile {tile.key:#018x} is not what its manifest announced")
-
-
-def _sync_reply(request: atlas_pb2.SyncRequest, manifests: list[atlas_pb2.SyncManifest],
-                tiles: list[atlas_pb2.TileMessage], end: atlas_pb2.SyncEnd) -> SyncReply:
-    held_tiles = sum(len(held.keys) for held in request.held)
-    held_blocks = sum(len(held.blocks) for held in request.held)
-    return SyncReply(manifests, tiles, _bits(manifests[0].current_tiles, held_tiles),
-                     _bits(manifests[0].current_blocks, held_blocks), end)
-
-
-def _bits(data: bytes, count: int) -> list[bool]:
-    """Lowest bit of the first byte first; what is not there is false."""
-    value = int.from_bytes(data, "little")
-    return [bool(value >> i & 1) for i in range(count)]

@@ -19,6 +19,7 @@ from roadatlas.transport import Transport
 MAX_IN_FLIGHT = 64  # requests that the daemon reads before the first of them is answered
 MAX_WAITING_EVENTS = 16  # of one watch; what comes beyond them is told in the last one
 _MORE_FOLLOW = ("tile", "sync_manifest", "watch_event")  # bodies that do not end a reply
+_LAST_STAGES = (atlas_pb2.BackupReply.UNKNOWN, atlas_pb2.BackupReply.DONE)  # the first one's is a list
 
 
 class Connection:
@@ -42,22 +43,22 @@ class Connection:
             self._exchange(deadline)
         self._last_id += 1
         payload = atlas_pb2.Envelope(request_id=self._last_id, **{field: message}).SerializeToString()
-        self._to_send += encode_frame(payload, MAX_HELLO_BYTES if field == "hello" else MAX_PAYLOAD_BYTES)
-        self._unanswered.add(self._last_id)
+        frame = encode_frame(payload, MAX_HELLO_BYTES if field == "hello" else MAX_PAYLOAD_BYTES)
         self._arrived[self._last_id] = deque()
+        self._unanswered.add(self._last_id)
+        self._to_send += frame
         try:
             while self._to_send and self._end is None:
                 self._exchange(deadline)
-        except DeadlinePassed:
+        except BaseException:  # an interrupt, too
             self.forget(self._last_id)
             raise
         return self._last_id
 
     def receive(self, request_id: int, deadline: float) -> atlas_pb2.Envelope:
-        """The next frame under that id. RequestRefused for an Error; after DeadlinePassed there are no more."""
+        """The next frame under that id. RequestRefused for an Error; whoever asks no further forgets it."""
         envelope = self.poll(request_id, deadline)
         if envelope is None:
-            self.forget(request_id)
             raise DeadlinePassed("no answer in time")
         return envelope
 
@@ -76,13 +77,17 @@ class Connection:
             raise refusal(envelope)
         return envelope
 
-    def forget(self, request_id: int) -> None:
-        """What still comes for it is dropped."""
-        self._arrived.pop(request_id, None)
-        if request_id in self._unanswered:
+    def forget(self, request_id: int) -> bool:
+        """What still comes for it is dropped; false: nothing does."""
+        is_on_its_way = request_id in self._unanswered
+        if is_on_its_way:
             self._given_up.add(request_id)
+        self._arrived.pop(request_id, None)
+        return is_on_its_way
 
     def close(self) -> None:
+        """Whoever waits for a reply afterwards is told ConnectionLost."""
+        self._end = self._end or ConnectionLost("this client was closed: connect again")
         self._transport.close()
 
     def _exchange(self, deadline: float) -> None:
@@ -99,6 +104,9 @@ class Connection:
                 self._take(self._transport.receive())
         except (ConnectionLost, TlsFailed, BrokenReply) as error:
             self._end = error
+        except BaseException:  # an interrupt: bytes may be lost between the socket and the frames
+            self._end = ConnectionLost("interrupted while bytes moved: connect again")
+            raise
 
     def _put(self) -> None:
         """A daemon that reads no more may have said why: what it sent is still read."""
@@ -145,7 +153,8 @@ class Connection:
 
 
 def is_last(envelope: atlas_pb2.Envelope) -> bool:
-    return envelope.WhichOneof("body") not in _MORE_FOLLOW
+    body = envelope.WhichOneof("body")
+    return body not in _MORE_FOLLOW and (body != "backup_reply" or envelope.backup_reply.stage in _LAST_STAGES)
 
 
 def refusal(envelope: atlas_pb2.Envelope) -> RequestRefused:

@@ -62,6 +62,10 @@ class DeadlinePassed(RoadAtlasError):
     """The daemon did not answer in the time that this client allows."""
 
 
+class DaemonTooOld(RoadAtlasError):
+    """The daemon speaks an earlier version of the protocol, and would pass over what is asked of it."""
+
+
 class BrokenReply(RoadAtlasError):
     """What the daemon sent is not what the protocol says."""
 

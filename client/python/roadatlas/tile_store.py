@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator
 import atlas_pb2
 import xxhash
 
-from roadatlas.client import AtlasClient, SyncReply
+from roadatlas.client import AtlasClient
 from roadatlas.errors import BadTileBlob, UselessDelta
 from roadatlas.geometry import block_of, index_in_block
+from roadatlas.sync_reply import SyncReply
 from roadatlas.tile_blob import merge_tile_blobs, parse_tile_blob
 from roadatlas.tile_delta import CAN_APPLY, apply_delta
 

@@ -1,5 +1,6 @@
 // A crowd of connections to a daemon, beside which a good client is measured.
-// Usage: crowd_bench PORT IDLE SLOW HOSTILE breaks_rules|asks_much|never_reads|holds_unread [tls]
+// Usage: crowd_bench PORT IDLE SLOW HOSTILE HOW [tls|token TOKEN]
+// HOW: breaks_rules, asks_much, asks_wide, never_reads or holds_unread. TOKEN: of the hostile ones.
 // Says {"open": N} when those that keep to the rules are connected, then lets the hostile ones go
 // until its standard input ends, and checks that the others have lost nothing.
 #include <csignal>
@@ -32,6 +33,9 @@ Hostility HostilityOf(const std::string& name) {
   if (name == "asks_much") {
     return Hostility::kAskMuch;
   }
+  if (name == "asks_wide") {
+    return Hostility::kAskWide;
+  }
   if (name == "holds_unread") {
     return Hostility::kHoldUnread;
   }
@@ -39,19 +43,21 @@ Hostility HostilityOf(const std::string& name) {
 }
 
 Status Run(int argc, char** argv) {
-  if (argc != 6 && argc != 7) {
+  const bool with_tls = argc == 7 && argv[6] == std::string("tls");
+  const bool with_token = argc == 8 && argv[6] == std::string("token");
+  if (argc != 6 && !with_tls && !with_token) {
     return {StatusCode::kInvalidArgument,
             "usage: crowd_bench PORT IDLE SLOW HOSTILE "
-            "breaks_rules|asks_much|never_reads|holds_unread [tls]"};
+            "breaks_rules|asks_much|asks_wide|never_reads|holds_unread [tls|token TOKEN]"};
   }
   const Hostility how = HostilityOf(argv[5]);
   const auto port = static_cast<std::uint16_t>(std::atoi(argv[1]));
   std::optional<LoadTls> tls;
-  const LoadTls* const way = argc == 7 ? &tls.emplace() : nullptr;
+  const LoadTls* const way = with_tls ? &tls.emplace() : nullptr;
   QuietCrowd quiet(port, way);
   ATLAS_RETURN_IF_ERROR(quiet.Open(CountOf(argv[2]), CountOf(argv[3])));
   std::cout << "{\"open\": " << CountOf(argv[2]) + CountOf(argv[3]) << "}" << std::endl;
-  HostileCrowd hostile(port, way, CountOf(argv[4]), how);
+  HostileCrowd hostile(port, way, with_token ? argv[7] : "", CountOf(argv[4]), how);
   while (!IsToldToEnd()) {
     ATLAS_RETURN_IF_ERROR(quiet.Tick());
   }

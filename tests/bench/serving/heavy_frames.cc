@@ -1,5 +1,7 @@
 #include "tests/bench/serving/heavy_frames.h"
 
+#include <random>
+
 #include "core/geometry/tile_id.h"
 #include "proto/wire/envelope.h"
 
@@ -32,6 +34,23 @@ Bytes HoldingMany(std::uint64_t request_id, std::uint64_t radius_um) {
 }
 
 }  // namespace
+
+Bytes WideCorridorFrame(std::uint64_t request_id) {
+  constexpr int kPoints = 256;
+  constexpr std::int64_t kSide_um = 1'200'000'000;
+  wire::Envelope request;
+  request.set_request_id(request_id);
+  auto& corridor = *request.mutable_sync_request()->mutable_area()->mutable_corridor();
+  corridor.set_half_width_um(1'500'000'000);
+  std::mt19937_64 random(1);
+  std::uniform_int_distribution<std::int64_t> place_um(0, kSide_um);
+  for (int i = 0; i < kPoints; ++i) {
+    auto& point = *corridor.add_route();
+    point.set_x_um(place_um(random));
+    point.set_y_um(place_um(random));
+  }
+  return EncodeEnvelopeFrame(request).value();
+}
 
 Bytes ManyPosesFrame(std::uint64_t request_id) {
   wire::Envelope request;

@@ -14,6 +14,8 @@ Bytes ManyPosesFrame(std::uint64_t request_id);
 Bytes ManyHeldFrame(std::uint64_t request_id);
 // The same of an area that has what is held: the reply says of all of it that it is no more.
 Bytes ManyHeldInAreaFrame(std::uint64_t request_id);
+// A sync of all within 1.5 km of a route of 256 points at random, which takes long to plan.
+Bytes WideCorridorFrame(std::uint64_t request_id);
 // A watch of as many tiles as there may be.
 Bytes ManyWatchedFrame(std::uint64_t request_id);
 

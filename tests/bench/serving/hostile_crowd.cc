@@ -22,15 +22,24 @@ constexpr milliseconds kPatience{2'000};  // of one who waits to be thrown out, 
 constexpr milliseconds kLongPatience{100'000};
 constexpr std::uint64_t kRequestsUnread = 64;
 
+// Of a sync's reply; tiles and manifests are passed over unread: they are larger.
+wire::Envelope::BodyCase EndOf(ByteSpan payload) {
+  constexpr std::size_t kEndBytes = 256;
+  const auto reply = payload.size() > kEndBytes ? wire::Envelope() : ParseEnvelope(payload);
+  return reply ? reply->body_case() : wire::Envelope::BODY_NOT_SET;
+}
+
 // One visit.
 struct Visit {
   LoadSocket& socket;
+  const Bytes& hello;
   std::mt19937_64& random;
   const std::stop_token& stop;
+  FrameDecoder replies = FrameDecoder();
 
   // False: the daemon has closed.
   bool Say(ByteSpan bytes) { return socket.Send(bytes).ok(); }
-  bool Greet() { return Say(HelloFrame()); }
+  bool Greet() { return Say(hello); }
 
   // Reads and forgets, until the daemon closes or patience ends.
   void WaitForTheEnd() {
@@ -47,7 +56,6 @@ struct Visit {
   // To the Hello, and to what came after it.
   void WaitForAReply() {
     std::array<std::uint8_t, 16'384> buffer{};
-    FrameDecoder replies;
     int awaited = 2;
     while (awaited > 0 && !stop.stop_requested()) {
       pollfd wait{socket.descriptor(), POLLIN, 0};
@@ -61,6 +69,26 @@ struct Visit {
         --awaited;
       }
     }
+  }
+  // To its end; false: the daemon has closed or refused it, or enough is enough.
+  bool WaitForASync() {
+    std::array<std::uint8_t, 65'536> buffer{};
+    while (!stop.stop_requested()) {
+      while (const auto payload = replies.Next().value_or(std::nullopt)) {
+        const auto end = EndOf(*payload);
+        if (end == wire::Envelope::kSyncEnd || end == wire::Envelope::kError) {
+          return end == wire::Envelope::kSyncEnd;
+        }
+      }
+      pollfd wait{socket.descriptor(), POLLIN, 0};
+      ::poll(&wait, 1, 50);
+      const LoadSocket::Moved came = socket.Receive(buffer);
+      if (came.is_closed) {
+        return false;
+      }
+      replies.Push(ByteSpan(buffer).first(came.bytes));
+    }
+    return false;
   }
   void Idle(milliseconds time) {
     const auto end = Clock::now() + time;
@@ -186,6 +214,13 @@ void HoldsManyAndNeverReads(Visit& visit) {
   visit.socket.ResetAtClose();
 }
 
+void AsksForAWideCorridor(Visit& visit) {
+  static const Bytes kFrame = WideCorridorFrame(2);
+  visit.Greet();
+  while (visit.Say(kFrame) && visit.WaitForASync()) {
+  }
+}
+
 using Behaviour = void (*)(Visit&);
 constexpr Behaviour kBreakRules[] = {&RandomBytes,     &ClaimsMoreThanThereMayBe,
                                      &ClaimsAndStalls, &LeavesWithinAFrame,
@@ -193,6 +228,7 @@ constexpr Behaviour kBreakRules[] = {&RandomBytes,     &ClaimsMoreThanThereMayBe
                                      &SaysNothing,     &LeavesAtOnce,
                                      &NeverReads,      &SendsNoMessage};
 constexpr Behaviour kAskMuch[] = {&CorrectsManyPoses, &HoldsManyTiles, &WatchesManyTiles};
+constexpr Behaviour kAskWide[] = {&AsksForAWideCorridor};
 constexpr Behaviour kNeverRead[] = {&NeverReadsQueries, &NeverReadsSyncs};
 constexpr Behaviour kHoldUnread[] = {&HoldsManyAndNeverReads};
 
@@ -200,6 +236,8 @@ std::span<const Behaviour> BehavioursOf(Hostility how) {
   switch (how) {
     case Hostility::kAskMuch:
       return kAskMuch;
+    case Hostility::kAskWide:
+      return kAskWide;
     case Hostility::kNeverRead:
       return kNeverRead;
     case Hostility::kHoldUnread:
@@ -212,8 +250,12 @@ std::span<const Behaviour> BehavioursOf(Hostility how) {
 
 }  // namespace
 
-HostileCrowd::HostileCrowd(std::uint16_t port, const LoadTls* tls, std::size_t peers, Hostility how)
-    : port_(port), tls_(tls), how_(how) {
+HostileCrowd::HostileCrowd(std::uint16_t port,
+                           const LoadTls* tls,
+                           const std::string& token,
+                           std::size_t peers,
+                           Hostility how)
+    : port_(port), tls_(tls), hello_(HelloFrame(token)), how_(how) {
   for (std::size_t i = 0; i < peers; ++i) {
     threads_.emplace_back([this, i](const std::stop_token& stop) { Misbehave(i, stop); });
   }
@@ -237,7 +279,7 @@ void HostileCrowd::Misbehave(std::size_t number, const std::stop_token& stop) {
       ++refused_;
       continue;
     }
-    Visit visit{**socket, random, stop};
+    Visit visit{**socket, hello_, random, stop};
     behaviours[number % behaviours.size()](visit);
   }
 }

@@ -1,16 +1,19 @@
 // Frames that connections say, whole and as they must be.
 #pragma once
 
+#include <string>
+
 #include "proto/wire/envelope.h"
 
 namespace atlas::testing {
 
-// Request 1.
-inline Bytes HelloFrame() {
+// Request 1. An empty token: of nobody in particular.
+inline Bytes HelloFrame(const std::string& token = {}) {
   wire::Envelope hello;
   hello.set_request_id(1);
   hello.mutable_hello()->set_protocol_major(kProtocolMajor);
   hello.mutable_hello()->set_client_name("serving_bench");
+  hello.mutable_hello()->set_token(token);
   return EncodeEnvelopeFrame(hello).value();
 }
 

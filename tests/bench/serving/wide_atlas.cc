@@ -7,14 +7,10 @@
 
 #include "client/connection/atlas_client.h"
 #include "client/connection/keyframe_uploader.h"
-#include "core/keyframe/keyframe_codec.h"
-#include "tests/core/support/keyframe_worlds.h"
+#include "tests/bench/serving/wide_upload.h"
 
 namespace atlas::testing {
 namespace {
-
-constexpr std::int32_t kRadius_cells = 8;
-constexpr std::int64_t kTime_ms = 1'700'000'000'000;
 
 Status Run(std::uint16_t port, int side) {
   ConnectionOptions connection;
@@ -24,19 +20,12 @@ Status Run(std::uint16_t port, int side) {
   if (!client) {
     return client.error();
   }
-  const MapProfile profile = client->profile();
-  const Bytes blob = EncodeKeyframe(StreetKeyframe(profile, kRadius_cells, 1));
+  const Bytes blob = WideBlob(client->profile());
   KeyframeUploader uploader(*client);
   for (int i = 0; i < side * side; ++i) {
-    Pose pose = Pose::Identity();
-    pose.translation() = Eigen::Vector3d((i % side + 0.5) * profile.tile_size_m(),
-                                         (i / side + 0.5) * profile.tile_size_m(), 1.8);
-    KeyframeUpload upload;
-    upload.key = {{"wide", "grid"}, static_cast<std::uint32_t>(i)};
-    upload.time_ms = kTime_ms + i;
-    upload.T_world_sensor = QuantizedPose::FromPose(pose);
-    upload.blob = blob;
-    ATLAS_RETURN_IF_ERROR(uploader.Upload(upload));
+    const KeyframeKey key{{"wide", "grid"}, static_cast<std::uint32_t>(i)};
+    ATLAS_RETURN_IF_ERROR(
+        uploader.Upload(WideUpload(client->profile(), blob, key, i % side, i / side)));
   }
   return uploader.Finish();
 }

@@ -1,10 +1,7 @@
 #!/usr/bin/python3
 """Handshake, versions, unknown fields, broken frames, pipelining and deadlines against a real daemon."""
 
-import pathlib
-import signal
 import struct
-import time
 import unittest
 
 import atlas_pb2
@@ -146,13 +143,6 @@ class BrokenSyncTest(unittest.TestCase):
             return client.sync(atlas_pb2.SyncRequest())
 
 
-def wait_until_stopped(pid):
-    """Every thread of the process (proc(5): the state is behind the name in brackets)."""
-    tasks = pathlib.Path(f"/proc/{pid}/task")
-    while any((task / "stat").read_text().rpartition(") ")[2][0] != "T" for task in tasks.iterdir()):
-        time.sleep(0.001)
-
-
 class RequestTest(AtlasCase):
 
     def test_unknown_fields_are_ignored(self):
@@ -174,13 +164,8 @@ class RequestTest(AtlasCase):
 
     def test_deadline_gives_up_one_request_and_not_the_connection(self):
         client = self.connect(timeout_s=2)
-        self.daemon.process.send_signal(signal.SIGSTOP)
-        wait_until_stopped(self.daemon.process.pid)  # else it may still answer
-        try:
-            with self.assertRaises(DeadlinePassed):
-                client.status()
-        finally:
-            self.daemon.process.send_signal(signal.SIGCONT)
+        with self.stopped_daemon(), self.assertRaises(DeadlinePassed):
+            client.status()
         self.assertEqual(self.client.status().keyframes, 0)
         request_id = client.submit(atlas_pb2.SessionsRequest())
         self.assertIsInstance(client.result(request_id, timeout_ms=30_000), atlas_pb2.SessionsReply)

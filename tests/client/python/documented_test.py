@@ -31,8 +31,12 @@ def run(name, port, **names):
 
 class DocumentedTest(AtlasCase):
 
+    def flags(self):
+        (self.work / "backups").mkdir()
+        return "--backup-folder", str(self.work / "backups")
+
     def test_each_is_run_here(self):
-        self.assertEqual(set(examples()), {"Use", "Over TLS", "Watch", "Upload"})
+        self.assertEqual(set(examples()), {"Use", "Over TLS", "Watch", "Upload", "Look after it"})
 
     def test_use(self):
         self.drive()
@@ -62,6 +66,15 @@ class DocumentedTest(AtlasCase):
         keyframes = [self.upload(i, i, "monday", radius_cells=8) for i in range(3)]
         self.assertEqual(run("Upload", self.port, keyframes=keyframes)[0], "[0, 1, 2] [] {}\n")
         self.assertEqual(run("Upload", self.port, keyframes=keyframes)[0], "[] [0, 1, 2] {}\n")
+
+    def test_look_after_it(self):
+        self.drive()
+        said, names = run("Look after it", self.port)
+        *progress, copied, verified, logged = said.splitlines()
+        self.assertTrue(all(re.fullmatch(r"[12] \d+ \d+", line) for line in progress), said)
+        self.assertEqual(copied, f"{names['done'].revision} {self.client.digest(60_000).sha256.hex()} ['monday']")
+        self.assertRegex(verified, r"^\d+ 0 \[\]$")
+        self.assertEqual(logged, "1 backup  monday")
 
 
 class DocumentedTlsTest(FleetCase):

@@ -47,13 +47,21 @@ class RolesTest(FleetCase):
 
     def test_sessions_and_verifications(self):
         self.car.upload_keyframe(keyframe_of("car.7", self.car))
-        verify = atlas_pb2.VerifyRequest(timeout_ms=60_000)
         for client in (self.car, self.reader):
             self.refused(client, client.change_session, "car.7", "s", RETRACT)
-            self.refused(client, lambda client=client: client.result(client.submit(verify), 60_000))
+            self.refused(client, client.verify, 60_000)
+            self.refused(client, client.log)
         self.refused(self.merge, self.merge.change_session, "car.7", "s", RETRACT)
-        self.assertEqual(self.merge.result(self.merge.submit(verify), 60_000).damaged, 0)
-        self.assertTrue(self.admin.change_session("car.7", "s", RETRACT).changed)
+        self.refused(self.merge, lambda: self.merge.verify(60_000, repair=True))
+        self.assertEqual(self.merge.verify(60_000).damaged, 0)
+        self.assertEqual(self.merge.log(), [])
+        self.assertTrue(self.admin.change_session("car.7", "s", RETRACT, author="somebody").changed)
+        self.assertEqual([(event.kind, event.author) for event in self.admin.log()], [("retract", "alice")])
+
+    def test_backups(self):
+        for client in (self.car, self.merge, self.reader):
+            self.refused(client, client.backup, "monday", 60_000)
+            self.refused(client, client.backups)
 
     def test_everybody_reads_and_watches(self):
         for client in (self.car, self.merge, self.reader, self.admin):

@@ -3,13 +3,16 @@
 The environment gives ATLAS_BIN_DIR, and PYTHONPATH for the client and the messages made from atlas.proto.
 """
 
+import contextlib
 import functools
 import os
 import pathlib
+import signal
 import socket
 import sys
 import tempfile
 import threading
+import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -20,7 +23,7 @@ import keyframes
 from harness import SMALL, Daemon
 from roadatlas import AtlasClient, Code, RequestRefused
 from roadatlas import geometry
-from roadatlas.framing import FrameReader
+from roadatlas.framing import FrameReader, encode_frame
 from roadatlas.profile import parse_profile
 
 BIN_DIR = pathlib.Path(os.environ["ATLAS_BIN_DIR"])
@@ -32,15 +35,23 @@ EVERYWHERE = geometry.disc(150, 0, 500)
 
 
 class AtlasCase(unittest.TestCase):
-    """A daemon of its own for each test."""
+    """A daemon of its own for each test, and what it needs in the folder `work`."""
 
     def setUp(self):
-        work = self.enterContext(tempfile.TemporaryDirectory())
-        self.daemon = self.enterContext(Daemon(BIN_DIR, pathlib.Path(work) / "atlas", *SMALL))
+        self.work = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.start_daemon()
+        self.profile = parse_profile(self.client.hello.profile)
+
+    def flags(self):
+        """More of them for the daemon."""
+        return ()
+
+    def start_daemon(self):
+        """On the atlas of the one before, if that was stopped."""
+        self.daemon = self.enterContext(Daemon(BIN_DIR, self.work / "atlas", *SMALL, *self.flags()))
         self.host, port = self.daemon.server.rsplit(":", 1)
         self.port = int(port)
         self.client = self.connect()
-        self.profile = parse_profile(self.client.hello.profile)
 
     def connect(self, **options):
         return self.enterContext(AtlasClient(self.host, self.port, **options))
@@ -49,6 +60,16 @@ class AtlasCase(unittest.TestCase):
         return atlas_pb2.UploadKeyframe(
             key=key(sequence, session), time_ms=START_MS + 1000 * sequence, pose=pose_at(x_m),
             blob=road_blob(radius_cells, bump_mm, self.profile.hash, self.profile.cell_size_um))
+
+    @contextlib.contextmanager
+    def stopped_daemon(self):
+        """It does nothing at all as long as that lasts."""
+        self.daemon.process.send_signal(signal.SIGSTOP)
+        try:
+            _wait_until_stopped(self.daemon.process.pid)  # else it may still answer
+            yield
+        finally:
+            self.daemon.process.send_signal(signal.SIGCONT)
 
     def drive(self):
         """Eight keyframes along a road, and three of another session further on; all fused."""
@@ -91,6 +112,17 @@ class AtlasCase(unittest.TestCase):
 
 
 RETRY = (Code.UNAVAILABLE, Code.TIMEOUT, Code.RESOURCE_EXHAUSTED)
+
+
+def _wait_until_stopped(pid):
+    """Every thread of the process (proc(5): the state is behind the name in brackets)."""
+    tasks = pathlib.Path(f"/proc/{pid}/task")
+    while any((task / "stat").read_text().rpartition(") ")[2][0] != "T" for task in tasks.iterdir()):
+        time.sleep(0.001)
+
+
+def frame_of(request_id, **body):
+    return encode_frame(atlas_pb2.Envelope(request_id=request_id, **body).SerializeToString())
 
 
 @functools.cache
