@@ -150,7 +150,7 @@ TEST(KeyframeUploaderTest, ABusyDaemonGetsAllOfThemInOrderInTheEnd) {
 }
 
 TEST(KeyframeUploaderTest, ALimitIsWaitedForAsLongAsItSays) {
-  constexpr std::chrono::milliseconds kWait{700};
+  static constexpr std::chrono::milliseconds kWait{700};
   std::atomic<int> came{0};
   TestPeer peer([&came](PeerSocket& socket) {
     AnswerHello(socket, {});

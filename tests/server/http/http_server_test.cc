@@ -202,7 +202,7 @@ TEST_F(HttpServerTest, WhoIsSilentForLongestMakesRoom) {
   }
   EXPECT_EQ(silent[0]->ReceiveAll(), "");
   EXPECT_EQ(silent[1]->ReceiveAll(), "");
-  for (int i = 2; i < 5; ++i) {
+  for (std::size_t i = 2; i < 5; ++i) {
     silent[i]->Send("TP/1.1\r\n\r\n");
     EXPECT_EQ(silent[i]->ReceiveAnswer().value_or(HttpAnswer()).status, 200) << i;
   }
