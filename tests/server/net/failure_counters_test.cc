@@ -13,12 +13,14 @@ namespace {
 class FailureCountersTest : public TlsTest {
  protected:
   // Of the moment when nobody is connected any more.
-  NetFigures AtTheEnd() const {
+  NetFigures AtTheEnd() {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (server_->ReadFigures().connections > 0 && std::chrono::steady_clock::now() < deadline) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     EXPECT_EQ(server_->ReadFigures().connections, 0u);
+    server_->Stop();
+    EXPECT_TRUE(HasDrained());  // who read from them may still have to say why it ended
     return server_->ReadFigures();
   }
   static std::uint64_t Late(const NetFigures& figures, RequestKind kind) {

@@ -11,7 +11,7 @@ namespace atlas {
 namespace {
 
 TileId AnyTile(std::mt19937& random, std::uint8_t level) {
-  const int side = 160 >> level;
+  const int side = 32 >> level;
   const auto coordinate = [&] {
     return static_cast<std::int32_t>(random() % static_cast<unsigned>(side)) - side / 2;
   };
