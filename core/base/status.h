@@ -2,6 +2,7 @@
 // A message says what failed, on which id, and what was expected.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -31,6 +32,19 @@ constexpr bool IsTemporary(StatusCode code) {
          code == StatusCode::kResourceExhausted;
 }
 
+// What the code alone does not tell. Frozen: the names travel in error replies.
+enum class StatusReason : std::uint8_t {
+  kNone,
+  kQuota,       // of these three: no room for an upload, its vehicle's share is taken,
+  kStoreLimit,  // the atlas takes as much as it may,
+  kDiskFloor,   // or its disk is nearly full
+};
+
+// In snake case, "store_limit"; empty for kNone.
+std::string_view StatusReasonName(StatusReason reason);
+// kNone for a name that is none.
+StatusReason StatusReasonByName(std::string_view name);
+
 // The code's name in snake case, as printed in JSON errors: "invalid_data".
 std::string_view StatusCodeName(StatusCode code);
 
@@ -42,15 +56,18 @@ class [[nodiscard]] Status {
   bool ok() const { return code_ == StatusCode::kOk; }
   StatusCode code() const { return code_; }
   const std::string& message() const { return message_; }
+  StatusReason reason() const { return reason_; }
 
-  // The same code with "context: " before the message.
+  // The same with "context: " before the message.
   Status WithContext(std::string_view context) const;
+  Status WithReason(StatusReason reason) const;
 
   friend bool operator==(const Status&, const Status&) = default;
 
  private:
   StatusCode code_ = StatusCode::kOk;
   std::string message_;
+  StatusReason reason_ = StatusReason::kNone;
 };
 
 template <typename T>

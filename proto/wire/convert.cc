@@ -81,6 +81,7 @@ wire::Error ErrorToWire(const Status& status) {
   message.set_message(status.message());
   message.set_retry_after_ms(RetryAfterMs(status.code()));
   message.set_retry(IsTemporary(status.code()));
+  message.set_reason(std::string(StatusReasonName(status.reason())));
   return message;
 }
 
@@ -88,7 +89,8 @@ RemoteError ErrorFromWire(const wire::Error& message) {
   const bool is_known = message.code() >= static_cast<int>(StatusCode::kInvalidArgument) &&
                         message.code() <= static_cast<int>(StatusCode::kInternal);
   const auto code = is_known ? static_cast<StatusCode>(message.code()) : StatusCode::kInternal;
-  return {Status(code, message.message()), message.retry(), message.retry_after_ms()};
+  return {Status(code, message.message()).WithReason(StatusReasonByName(message.reason())),
+          message.retry(), message.retry_after_ms()};
 }
 
 }  // namespace atlas
