@@ -23,6 +23,10 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   figures.net.connections = 3;
   figures.net.refused = 4;
   figures.writes.queued = 6;
+  figures.room.used_bytes = 7;
+  figures.room.limits = {8, 9, 10};
+  figures.room.free_disk_bytes = 11;
+  figures.room.refused = {12, 13, 14};
   const auto metrics = ParseMetrics(MetricsText(figures));
   EXPECT_EQ(metrics.at("roadatlas_atlas_readable"), 1);
   EXPECT_EQ(metrics.at("roadatlas_revision"), 123'456'789'012);
@@ -33,12 +37,21 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   EXPECT_EQ(metrics.at("roadatlas_connections"), 3);
   EXPECT_EQ(metrics.at("roadatlas_connections_refused_total"), 4);
   EXPECT_EQ(metrics.at("roadatlas_store_writes_queued"), 6);
+  EXPECT_EQ(metrics.at("roadatlas_store_used_bytes"), 7);
+  EXPECT_EQ(metrics.at("roadatlas_store_limit_bytes"), 8);
+  EXPECT_EQ(metrics.at("roadatlas_vehicle_limit_bytes"), 9);
+  EXPECT_EQ(metrics.at("roadatlas_disk_floor_bytes"), 10);
+  EXPECT_EQ(metrics.at("roadatlas_disk_free_bytes"), 11);
+  EXPECT_EQ(metrics.at(R"(roadatlas_uploads_refused_total{reason="disk_floor"})"), 12);
+  EXPECT_EQ(metrics.at(R"(roadatlas_uploads_refused_total{reason="store_limit"})"), 13);
+  EXPECT_EQ(metrics.at(R"(roadatlas_uploads_refused_total{reason="quota"})"), 14);
 }
 
 TEST(MetricsTextTest, AnAtlasThatCannotBeReadLeavesTheRest) {
   const auto metrics = ParseMetrics(MetricsText({}));
   EXPECT_EQ(metrics.at("roadatlas_atlas_readable"), 0);
   EXPECT_EQ(metrics.count("roadatlas_revision"), 0u);
+  EXPECT_EQ(metrics.count("roadatlas_disk_free_bytes"), 0u);
   EXPECT_EQ(metrics.at("roadatlas_connections"), 0);
 }
 
