@@ -65,8 +65,8 @@ Result<DaemonConfig> ConfigFrom(const GivenSettings& given) {
       return Error(std::move(status));
     }
   }
-  if (Status status = CheckSecurity(config); !status.ok()) {
-    return Error(std::move(status));
+  if (const Status status = CheckSecurity(config); !status.ok()) {
+    return Error(status);
   }
   return config;
 }

@@ -10,7 +10,8 @@ namespace {
 Status NoRoom(UploadRefusal why, std::string message) {
   const auto i = static_cast<std::size_t>(why);
   return Status(StatusCode::kResourceExhausted, std::move(message))
-      .WithReason(kUploadRefusalReasons[i]);
+      .WithReason(kUploadRefusalReasons[i])
+      .WithRetryAfter(kUploadRefusalWaits[i]);
 }
 
 // `more_bytes` behind those in use.

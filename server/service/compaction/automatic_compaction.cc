@@ -58,25 +58,30 @@ bool AutomaticCompaction::IsAbove(double share) const {
                                             share * static_cast<double>(room.limits.store_bytes);
 }
 
-// From the oldest keyframes to the newest, as far as it takes.
+// From the oldest keyframes to the newest, as far as it takes; behind a step that failed the next
+// time.
 AutomaticCompaction::End AutomaticCompaction::Pass(const std::stop_token& stop) {
   const auto sessions = ListSessionsInMap();
   if (!sessions) {
     log_(LogLevel::kError, StrCat("retention: ", sessions.error().message()));
     return End::kNothingLeft;
   }
-  std::int64_t from_ms = 0;
   while (!stop.stop_requested() && is_on_) {
     if (!IsAbove(options_.end_share)) {
+      from_ms_ = 0;
       return End::kEnough;
     }
-    const auto end_ms = EndOfWindow(*sessions, from_ms, options_.step_keyframes);
-    if (!end_ms || !Step(from_ms, *end_ms, stop)) {
+    const auto end_ms = EndOfWindow(*sessions, from_ms_, options_.step_keyframes);
+    if (!end_ms) {
+      from_ms_ = 0;
       log_(LogLevel::kWarning, StrCat("retention: the store stays above ", options_.end_share * 100,
                                       " % of retention.store_mib: no more keyframes can go"));
       return End::kNothingLeft;
     }
-    from_ms = *end_ms;
+    const std::int64_t from_ms = std::exchange(from_ms_, *end_ms);
+    if (!Step(from_ms, *end_ms, stop)) {
+      return End::kInterrupted;
+    }
   }
   return End::kInterrupted;
 }
@@ -114,11 +119,10 @@ bool AutomaticCompaction::Step(std::int64_t from_ms,
     }
     return true;
   }
-  if (stop.stop_requested()) {
-    return true;
+  if (!stop.stop_requested()) {
+    log_(LogLevel::kWarning, StrCat("retention: keyframes stay: ", report.error().message()));
   }
-  log_(LogLevel::kWarning, StrCat("retention: keyframes stay: ", report.error().message()));
-  return IsTemporary(report.error().code());  // other places may stand still
+  return false;
 }
 
 }  // namespace atlas

@@ -57,7 +57,6 @@ class AutomaticCompaction {
   bool IsAbove(double share) const;
   End Pass(const std::stop_token& stop);
   Result<std::vector<SessionRecord>> ListSessionsInMap() const;
-  // False: there is no use in going on.
   bool Step(std::int64_t from_ms, std::int64_t end_ms, const std::stop_token& stop);
 
   AtlasStore& store_;
@@ -65,6 +64,7 @@ class AutomaticCompaction {
   const LogSink log_;
   const AutomaticCompactionOptions options_;
   std::atomic<bool> is_on_ = false;
+  std::int64_t from_ms_ = 0;  // where the next step begins
   std::jthread thread_;
 };
 

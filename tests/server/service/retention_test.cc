@@ -1,7 +1,9 @@
 // A store that is nearly full makes room by itself where it is told to, and nobody sees a
 // difference in the map.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -160,6 +162,37 @@ TEST_F(RetentionTest, WhereNothingCanGoItRests) {
   EXPECT_TRUE(Until([&] { return steps >= 2; }));
   std::this_thread::sleep_for(milliseconds(100));
   EXPECT_EQ(steps, 2) << "each pass once";
+}
+
+TEST_F(RetentionTest, AStepThatFailsIsPassedOver) {
+  Open();
+  UploadPasses(0, 3);
+  Digest();
+  std::mutex mutex;
+  std::vector<std::int64_t> begun_ms;
+  std::vector<std::string> lines;
+  AutomaticCompaction compaction(
+      *store_,
+      [&](const CompactionRequest& request, const std::stop_token&) -> Result<CompactionReport> {
+        const std::lock_guard lock(mutex);
+        begun_ms.push_back(request.from_ms);
+        return Error(StatusCode::kInvalidData, "keyframe 7 is damaged");
+      },
+      [&](LogLevel, const std::string& line) {
+        const std::lock_guard lock(mutex);
+        lines.push_back(line);
+      },
+      compaction_);
+  LimitTo(0.95, false);
+  compaction.set_on(true);
+  EXPECT_TRUE(Until([&] {
+    const std::lock_guard lock(mutex);
+    return begun_ms.size() == 3;
+  }));
+  compaction.Stop();
+  EXPECT_TRUE(std::is_sorted(begun_ms.begin(), begun_ms.end()));
+  EXPECT_GT(begun_ms[2], begun_ms[1]);
+  EXPECT_NE(lines.at(0).find("keyframe 7"), std::string::npos);
 }
 
 TEST_F(RetentionTest, OfAnotherPresetNothingGoesAndSomebodyIsTold) {

@@ -204,13 +204,16 @@ TEST(UploadRoomLimitsTest, TheFloorItselfIsFreeAndEachRefusalSaysHowLongToWait) 
   room.set_limits({.store_bytes = 50, .vehicle_bytes = 20, .disk_floor_bytes = 100});
   auto now = UploadRoom::Clock::time_point() + std::chrono::hours(1);
   EXPECT_TRUE(room.Check({"bus", 10, 10, 40}, now).ok());
-  EXPECT_EQ(room.Check({"bus", 10, 11, 40}, now).reason(), StatusReason::kQuota);
+  const Status quota = room.Check({"bus", 10, 11, 40}, now);
+  EXPECT_EQ(quota.reason(), StatusReason::kQuota);
+  EXPECT_EQ(quota.retry_after(), std::chrono::seconds(60));
   EXPECT_EQ(room.Check({"bus", 10, 11, 41}, now).reason(), StatusReason::kStoreLimit);
   free_bytes = 99;
   now += std::chrono::seconds(1);
   const Status refused = room.Check({"bus", 10, 11, 41}, now);
   EXPECT_EQ(refused.reason(), StatusReason::kDiskFloor);
   EXPECT_NE(refused.message().find("retention.disk_floor_mib"), std::string::npos);
+  EXPECT_EQ(refused.retry_after(), std::chrono::seconds(10));
 }
 
 TEST(UploadRoomLimitsTest, ADiskThatDoesNotTellIsNoRoomWhereAFloorIsSet) {
