@@ -286,6 +286,10 @@ milliseconds AtlasClient::retry_after() const {
   return channel_->retry_after();
 }
 
+milliseconds AtlasClient::retry_after_of_reads() const {
+  return channel_->retry_after_of_reads();
+}
+
 std::uint64_t AtlasClient::bytes_sent() const {
   return channel_->connection().bytes_sent();
 }

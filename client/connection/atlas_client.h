@@ -35,7 +35,8 @@ struct ConnectionOptions {
   // From looking the host up to the end of the handshake, all of it.
   std::chrono::milliseconds connect_timeout{5'000};
   std::chrono::milliseconds request_timeout{30'000};  // until each frame of a reply is whole
-  // The most that is believed of a daemon that wants to be left alone; it asks for 1 s or 5 s.
+  // The most that is believed of a daemon that wants to be left alone; it asks for 1 s or 5 s, or
+  // for as long as a limit of its own lasts, up to an hour.
   std::chrono::milliseconds max_retry_after{60'000};
   std::shared_ptr<NameLookup>
       names;  // for the endpoint's host; null: a new one that asks the system
@@ -132,6 +133,8 @@ class AtlasClient {
   // How long the daemon still wants to be left alone, by what it refused for a while on this
   // connection (`retry_after_ms`); 0: it does not. Nothing here waits for it by itself.
   std::chrono::milliseconds retry_after() const;
+  // The same without what it refused uploads for, which may be a limit of their vehicle alone.
+  std::chrono::milliseconds retry_after_of_reads() const;
   std::uint64_t bytes_sent() const;
   std::uint64_t bytes_received() const;
 

@@ -169,7 +169,7 @@ Status KeyframeUploader::OnAnswer(const Answer& answer) {
   channel->Forget(answered.request_id);
   const KeyframeKey key = answered.upload.key;
   if (reply.has_error()) {
-    channel->NoteRetryAfter(reply.error());
+    channel->NoteRetryAfter(reply.error(), RpcChannel::Refused::kUpload);
     NoteRefusal(std::move(answered), ErrorFromWire(reply.error()).status);
     return {};
   }

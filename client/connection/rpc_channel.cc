@@ -12,8 +12,8 @@ namespace {
 using std::chrono::milliseconds;
 
 milliseconds Until(std::chrono::steady_clock::time_point time) {
-  const auto left = std::chrono::ceil<milliseconds>(time - std::chrono::steady_clock::now());
-  return std::max(left, milliseconds(0));
+  const auto now = std::chrono::steady_clock::now();
+  return now < time ? std::chrono::ceil<milliseconds>(time - now) : milliseconds(0);
 }
 
 }  // namespace
@@ -99,7 +99,7 @@ Result<wire::Envelope> RpcChannel::Read(ByteSpan payload) {
     refused_id_ = reply->request_id();
   }
   if (reply->request_id() == 0 && reply->has_error()) {
-    NoteRetryAfter(reply->error());
+    NoteRetryAfter(reply->error(), Refused::kOther);
     return Error(Break(ErrorFromWire(reply->error()).status));
   }
   if (reply->request_id() == 0 || reply->request_id() > last_id_) return Error(Unexpected(*reply));
@@ -109,16 +109,20 @@ Result<wire::Envelope> RpcChannel::Read(ByteSpan payload) {
   return reply;
 }
 
-void RpcChannel::NoteRetryAfter(const wire::Error& error) {
+void RpcChannel::NoteRetryAfter(const wire::Error& error, Refused refused) {
   const RemoteError refusal = ErrorFromWire(error);
   if (!refusal.retry) return;
-  const Milliseconds asked(refusal.retry_after_ms);
-  retry_at_ = std::max(retry_at_, Clock::now() + std::min(asked, max_retry_after_));
+  const Milliseconds asked(refusal.status.retry_after_ms().value_or(0));
+  Clock::time_point& until = refused == Refused::kUpload ? retry_upload_at_ : retry_at_;
+  until = std::max(until, Clock::now() + std::min(asked, max_retry_after_));
 }
 
 RpcChannel::Milliseconds RpcChannel::retry_after() const {
-  const Clock::time_point now = Clock::now();
-  return now < retry_at_ ? std::chrono::ceil<Milliseconds>(retry_at_ - now) : Milliseconds(0);
+  return Until(std::max(retry_upload_at_, retry_at_));
+}
+
+RpcChannel::Milliseconds RpcChannel::retry_after_of_reads() const {
+  return Until(retry_at_);
 }
 
 Result<bool> RpcChannel::Tell(const wire::Envelope& reply) {
@@ -165,7 +169,7 @@ Result<std::optional<wire::Envelope>> RpcChannel::AnswerTo(std::uint64_t id, wir
   if (*is_told || reply.request_id() < id) return std::nullopt;
   if (reply.request_id() != id) return Error(Unexpected(reply));
   if (!reply.has_error()) return reply;
-  NoteRetryAfter(reply.error());
+  NoteRetryAfter(reply.error(), Refused::kOther);
   return Error(ErrorFromWire(reply.error()).status);
 }
 

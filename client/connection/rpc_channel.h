@@ -84,10 +84,14 @@ class RpcChannel {
   std::uint64_t last_call() const { return last_call_; }
   // Whether the last frame that came was an Error to this request.
   bool has_refused(std::uint64_t id) const { return refused_id_ == id; }
-  // A daemon that refused this does not want to be asked again for a while.
-  void NoteRetryAfter(const wire::Error& error);
-  // How long the daemon still wants to be left alone, by what was noted; 0: it does not.
+  // A daemon that refused this does not want to be asked again for a while. What it refused an
+  // upload for may be a limit of that vehicle: nothing else has to wait for it.
+  enum class Refused : std::uint8_t { kUpload, kOther };
+  void NoteRetryAfter(const wire::Error& error, Refused refused);
+  // How long the daemon still wants to be left alone, by all that was noted, and by what is not
+  // about uploads; 0: it does not.
   Milliseconds retry_after() const;
+  Milliseconds retry_after_of_reads() const;
   // Of the frame received last, its header included.
   std::uint64_t last_frame_bytes() const { return last_frame_bytes_; }
   DaemonConnection& connection() { return connection_; }
@@ -111,10 +115,11 @@ class RpcChannel {
   DaemonConnection connection_;
   Milliseconds frame_timeout_;
   Milliseconds max_retry_after_;
-  Clock::time_point retry_at_ = Clock::time_point::min();
-  Clock::time_point waiting_since_ = Clock::now();  // for a frame that answers
-  Clock::time_point sending_since_ = Clock::now();  // the last request
-  std::uint64_t last_id_ = 0;                       // that was given
+  Clock::time_point retry_upload_at_ = Clock::time_point::min();
+  Clock::time_point retry_at_ = Clock::time_point::min();  // anything
+  Clock::time_point waiting_since_ = Clock::now();         // for a frame that answers
+  Clock::time_point sending_since_ = Clock::now();         // the last request
+  std::uint64_t last_id_ = 0;                              // that was given
   std::uint64_t last_call_ = 0;
   std::vector<std::uint64_t> cancelled_;  // that the daemon was not told yet
   std::map<std::uint64_t, Listening> listeners_;

@@ -16,7 +16,7 @@ Result<StoreSyncReport> LinkFeed::Sync(TileStore& store,
   const Clock::time_point start = Clock::now();
   const Result<AtlasClient*> client = link_->Client(options.deadline);
   if (!client) return Error(client.error());
-  const milliseconds left_alone = (*client)->retry_after();
+  const milliseconds left_alone = (*client)->retry_after_of_reads();
   if (left_alone.count() > 0) {
     return Error(StatusCode::kUnavailable,
                  StrCat("atlas view: the daemon wants to be left alone for another ",

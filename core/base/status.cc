@@ -55,17 +55,22 @@ StatusReason StatusReasonByName(std::string_view name) {
 }
 
 Status Status::WithContext(std::string_view context) const {
-  if (ok()) {
-    return *this;
-  }
   Status status = *this;
-  status.message_ = std::string(context) + ": " + message_;
+  if (!ok()) {
+    status.message_ = std::string(context) + ": " + message_;
+  }
   return status;
 }
 
 Status Status::WithReason(StatusReason reason) const {
   Status status = *this;
   status.reason_ = reason;
+  return status;
+}
+
+Status Status::WithRetryAfter(std::int64_t retry_after_ms) const {
+  Status status = *this;
+  status.retry_after_ms_ = retry_after_ms;
   return status;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -58,9 +59,15 @@ class [[nodiscard]] Status {
   const std::string& message() const { return message_; }
   StatusReason reason() const { return reason_; }
 
+  // Milliseconds: the caller may try again after them; none: after what is usual for the code. They
+  // travel in error replies where the code IsTemporary.
+  std::optional<std::int64_t> retry_after_ms() const { return retry_after_ms_; }
+
   // The same with "context: " before the message.
   Status WithContext(std::string_view context) const;
   Status WithReason(StatusReason reason) const;
+  // The same, to be tried again after so long.
+  Status WithRetryAfter(std::int64_t retry_after_ms) const;
 
   friend bool operator==(const Status&, const Status&) = default;
 
@@ -68,6 +75,7 @@ class [[nodiscard]] Status {
   StatusCode code_ = StatusCode::kOk;
   std::string message_;
   StatusReason reason_ = StatusReason::kNone;
+  std::optional<std::int64_t> retry_after_ms_;
 };
 
 template <typename T>

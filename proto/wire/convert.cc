@@ -1,16 +1,23 @@
 #include "proto/wire/convert.h"
 
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace atlas {
 namespace {
 
 // How long to wait before the same request may succeed; 0: do not retry.
-std::uint32_t RetryAfterMs(StatusCode code) {
-  if (!IsTemporary(code)) {
+std::uint32_t RetryAfterMs(const Status& status) {
+  if (!IsTemporary(status.code())) {
     return 0;
   }
-  return code == StatusCode::kResourceExhausted ? 5'000 : 1'000;  // someone must make room first
+  if (const auto asked_ms = status.retry_after_ms()) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(*asked_ms, 0, kMost));
+  }
+  const bool is_full = status.code() == StatusCode::kResourceExhausted;
+  return is_full ? 5'000 : 1'000;  // someone must make room first
 }
 
 }  // namespace
@@ -79,7 +86,7 @@ wire::Error ErrorToWire(const Status& status) {
   wire::Error message;
   message.set_code(static_cast<int>(status.code()));
   message.set_message(status.message());
-  message.set_retry_after_ms(RetryAfterMs(status.code()));
+  message.set_retry_after_ms(RetryAfterMs(status));
   message.set_retry(IsTemporary(status.code()));
   message.set_reason(std::string(StatusReasonName(status.reason())));
   return message;
@@ -89,8 +96,10 @@ RemoteError ErrorFromWire(const wire::Error& message) {
   const bool is_known = message.code() >= static_cast<int>(StatusCode::kInvalidArgument) &&
                         message.code() <= static_cast<int>(StatusCode::kInternal);
   const auto code = is_known ? static_cast<StatusCode>(message.code()) : StatusCode::kInternal;
-  return {Status(code, message.message()).WithReason(StatusReasonByName(message.reason())),
-          message.retry(), message.retry_after_ms()};
+  const auto reason = StatusReasonByName(message.reason());
+  const Status status = Status(code, message.message()).WithReason(reason);
+  const std::uint32_t asked_ms = message.retry() ? message.retry_after_ms() : 0;
+  return {asked_ms > 0 ? status.WithRetryAfter(asked_ms) : status, message.retry()};
 }
 
 }  // namespace atlas

@@ -26,14 +26,13 @@ ByteSpan BytesFromWire(const std::string& bytes);
 std::string BytesToWire(ByteSpan bytes);
 
 // An error reply. `retry` follows from the code: unavailable, timeout and resource_exhausted may
-// succeed later.
+// succeed later, after what the status says, up to what fits, or else what is usual for the code.
 wire::Error ErrorToWire(const Status& status);
 
 // An error as its receiver sees it.
 struct RemoteError {
-  Status status;  // never ok: an unknown code becomes kInternal
+  Status status;  // never ok: an unknown code becomes kInternal; with the wait that it asks for
   bool retry = false;
-  std::uint32_t retry_after_ms = 0;
 };
 RemoteError ErrorFromWire(const wire::Error& message);
 

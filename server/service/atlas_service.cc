@@ -75,7 +75,7 @@ Result<NewKeyframe> AtlasService::CheckUpload(UploadRequest request) const {
 }
 
 void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done) {
-  keyframe.starts = starts_;
+  keyframe.start = std::make_shared<SessionStart>(starts_);
   store_.PutKeyframe(std::move(keyframe), Notifying(changes_, std::move(done)));
 }
 

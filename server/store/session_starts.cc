@@ -6,31 +6,60 @@
 
 namespace atlas {
 
-Status SessionStarts::Begin(const std::string& vehicle, Clock::time_point now) {
+Result<SessionStarts::Clock::duration> SessionStarts::Begin(const std::string& vehicle,
+                                                            Clock::time_point now) {
   constexpr std::chrono::hours kHour{1};
   const std::lock_guard lock(mutex_);
   if (per_hour_ == 0) {
-    return {};
+    return Clock::duration(0);
   }
   if (rested_at_.size() >= kMaxVehicles && !rested_at_.contains(vehicle)) {
     ForgetRested(now);
   }
   Clock::time_point& rested_at = rested_at_.try_emplace(vehicle, now).first->second;
-  const Clock::time_point next = std::max(rested_at, now) + Clock::duration(kHour) / per_hour_;
+  const Clock::duration counted = Clock::duration(kHour) / per_hour_;
+  const Clock::time_point next = std::max(rested_at, now) + counted;
   if (next > now + kHour) {
-    const auto wait = std::chrono::ceil<std::chrono::seconds>(next - now - kHour);
-    return {StatusCode::kUnavailable,
-            StrCat("vehicle ", vehicle, " began as many sessions as it may, ", per_hour_,
-                   " an hour: the next one may begin in ", wait.count(), " s")};
+    const Clock::duration wait = next - now - kHour;
+    const Status refused(StatusCode::kUnavailable,
+                         StrCat("vehicle ", vehicle, " began as many sessions as it may, ",
+                                per_hour_, " an hour: the next one may begin in ",
+                                std::chrono::ceil<std::chrono::seconds>(wait).count(), " s"));
+    return Error(
+        refused.WithRetryAfter(std::chrono::ceil<std::chrono::milliseconds>(wait).count()));
   }
   rested_at = next;
-  return {};
+  return counted;
+}
+
+void SessionStarts::GiveBack(const std::string& vehicle, Clock::duration counted) {
+  const std::lock_guard lock(mutex_);
+  const auto rested_at = rested_at_.find(vehicle);
+  if (rested_at != rested_at_.end()) {
+    rested_at->second -= counted;
+  }
 }
 
 void SessionStarts::ForgetRested(Clock::time_point now) {
   std::erase_if(rested_at_, [now](const auto& entry) { return entry.second <= now; });
   if (rested_at_.size() > kMaxVehicles / 2) {  // else it would be looked through again and again
     rested_at_.clear();
+  }
+}
+
+Status SessionStart::Begin(const std::string& vehicle, SessionStarts::Clock::time_point now) {
+  const Result<SessionStarts::Clock::duration> counted = starts_->Begin(vehicle, now);
+  if (!counted) {
+    return counted.error();
+  }
+  vehicle_ = vehicle;
+  counted_ = *counted;
+  return {};
+}
+
+void SessionStart::NoteEnd(const Status& status) {
+  if (!status.ok()) {
+    starts_->GiveBack(vehicle_, counted_);
   }
 }
 

@@ -67,7 +67,7 @@ struct NewKeyframe {
   Bytes blob;
   std::vector<TileId> footprint;            // the level-0 tiles it touches at `pose`
   std::shared_ptr<MissingUploads> missing;  // of who sends it; null: order does not matter
-  std::shared_ptr<SessionStarts> starts;    // of all; null: as many sessions as they like
+  std::shared_ptr<SessionStart> start;      // of its session; null: as many as they like
 };
 
 struct PutKeyframeResult {

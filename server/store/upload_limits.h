@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -29,8 +28,8 @@ inline constexpr std::array<StatusReason, kUploadRefusals> kUploadRefusalReasons
 
 // After which whoever was refused may ask again. A disk is made room on in seconds; the others take
 // a compaction, a purge or another limit.
-inline constexpr std::array<std::chrono::milliseconds, kUploadRefusals> kUploadRefusalWaits = {
-    std::chrono::seconds(10), std::chrono::seconds(60), std::chrono::seconds(60)};
+inline constexpr std::array<std::int64_t, kUploadRefusals> kUploadRefusalWaits_ms = {10'000, 60'000,
+                                                                                     60'000};
 
 struct RoomFigures {
   UploadLimits limits;

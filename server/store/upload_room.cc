@@ -11,7 +11,7 @@ Status NoRoom(UploadRefusal why, std::string message) {
   const auto i = static_cast<std::size_t>(why);
   return Status(StatusCode::kResourceExhausted, std::move(message))
       .WithReason(kUploadRefusalReasons[i])
-      .WithRetryAfter(kUploadRefusalWaits[i]);
+      .WithRetryAfter(kUploadRefusalWaits_ms[i]);
 }
 
 // `more_bytes` behind those in use.

@@ -74,7 +74,7 @@ Result<HeldTiles> HeldTiles::Create(std::vector<HeldTile> tiles, std::vector<Hel
   held.blocks_ = std::move(blocks);
   for (const HeldTile& tile : held.tiles_) {
     if (const auto id = TileId::FromKey(tile.key); !id) {
-      return Error(id.error().WithContext("held tiles"));
+      return Error(Refuse(id.error().message()));
     }
     if (held.FindBlock(TileBlockOf(tile.key)) != nullptr) {
       return Error(Refuse(StrCat("tile ", TileId::FromKey(tile.key).value(),

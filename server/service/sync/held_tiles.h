@@ -44,7 +44,7 @@ class HeldTiles {
 
   HeldTiles() = default;
   // In any order; they are numbered. kInvalidArgument: too many, one twice, a tile whose block is
-  // there, too. kInvalidData: a key that no tile has.
+  // there, too, a key that no tile has.
   static Result<HeldTiles> Create(std::vector<HeldTile> tiles, std::vector<HeldBlock> blocks);
 
   // In key order.

@@ -63,7 +63,7 @@ Status CheckTiles(const std::vector<std::uint64_t>& keys) {
   for (std::size_t i = 0; i < keys.size(); ++i) {
     const auto id = TileId::FromKey(keys[i]);
     if (!id) {
-      return id.error().WithContext("sync area");
+      return Refuse(id.error().message());
     }
     if (i > 0 && keys[i - 1] >= keys[i]) {
       return Refuse(StrCat("tile ", *id, " after ", TileId::FromKey(keys[i - 1]).value(),

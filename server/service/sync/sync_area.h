@@ -36,7 +36,7 @@ class SyncArea {
   // kInvalidArgument: not finite, a box or a width below nothing, a route without points or with
   // too many, too many tiles or not in key order.
   static Result<SyncArea> Create(MapArea shape, const MapProfile& profile);
-  // One of these tiles. As above, and kInvalidData: a key that no tile has.
+  // One of these tiles. As above, and for a key that no tile has.
   static Result<SyncArea> OfTiles(std::vector<std::uint64_t> keys, const MapProfile& profile);
 
   // Squares of 2^bits tiles a side, aligned to their size, are given by their lower tile.

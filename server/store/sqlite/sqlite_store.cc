@@ -78,9 +78,7 @@ class SqliteStore final : public AtlasStore {
   }
 
   void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) override {
-    if (keyframe.missing != nullptr) {
-      done = Noting(keyframe, std::move(done));
-    }
+    done = Noting(keyframe, std::move(done));
     Write<PutKeyframeResult>(
         std::move(done), [this, k = std::move(keyframe)](Connection& connection) {
           return k.missing == nullptr ? PutKeyframeInStore(connection, k, room_)

@@ -149,6 +149,33 @@ TEST(KeyframeUploaderTest, ABusyDaemonGetsAllOfThemInOrderInTheEnd) {
   }
 }
 
+TEST(KeyframeUploaderTest, ALimitIsWaitedForAsLongAsItSays) {
+  constexpr std::chrono::milliseconds kWait{700};
+  std::atomic<int> came{0};
+  TestPeer peer([&came](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    while (const auto request = socket.ReadRequest()) {
+      if (++came > 1) {
+        Acknowledge(socket, request->request_id(), false);
+        continue;
+      }
+      wire::Envelope reply;
+      const Status limit(StatusCode::kUnavailable, "too many sessions");
+      *reply.mutable_error() = ErrorToWire(limit.WithRetryAfter(kWait.count()));
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client, {.patience = std::chrono::seconds(20)});
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_TRUE(uploader.Upload(Upload(0, Bytes(10))).ok());
+  const Status status = uploader.Finish();
+  EXPECT_TRUE(status.ok()) << status.message();
+  EXPECT_GE(std::chrono::steady_clock::now() - start, kWait);
+  EXPECT_EQ(came, 2);
+}
+
 TEST(KeyframeUploaderTest, PatienceHasAnEnd) {
   std::vector<std::uint32_t> taken;
   TestPeer peer([&](PeerSocket& socket) { ServeBusy(socket, 2, 1 << 30, taken); });

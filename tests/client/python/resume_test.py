@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 import unittest
+import unittest.mock
 
 import atlas_pb2
 from roadatlas import AtlasClient, Code, RequestRefused, SessionUploader
@@ -186,6 +187,7 @@ class BusyDaemon:
         self.missing = set()
         self.taken = []
         self.sent = []
+        self.wait_ms = 1  # of those that are busy; what is behind them is told to come in 1 ms
 
     epoch = 1
 
@@ -206,9 +208,10 @@ class BusyDaemon:
 
     def result(self, sequence):
         if sequence in self.busy or min(self.missing, default=sequence) < sequence:
+            wait_ms = self.wait_ms if sequence in self.busy else 1
             self.busy.discard(sequence)
             self.missing.add(sequence)
-            raise RequestRefused(sequence + 1, Code.UNAVAILABLE, "busy", True, 1)
+            raise RequestRefused(sequence + 1, Code.UNAVAILABLE, "busy", True, wait_ms)
         self.missing.discard(sequence)
         self.taken.append(sequence)
         return Reply()
@@ -243,6 +246,14 @@ class PostponedTest(unittest.TestCase):
         report = SessionUploader(daemon, "car", "near", first_pause_s=0.001).upload(uploads)
         self.assertEqual(daemon.sent, [*range(8), *range(2, 8)])
         self.assertEqual((report.acknowledged, report.refused), (list(range(8)), {}))
+
+    def test_waits_as_long_as_the_daemon_says(self):
+        daemon = BusyDaemon({2})
+        daemon.wait_ms = 3_600_000
+        with unittest.mock.patch("roadatlas.session_uploader.time.sleep") as sleep:
+            report = SessionUploader(daemon, "car", "near", first_pause_s=0.001).upload(map(self.named, range(8)))
+        self.assertEqual([call.args for call in sleep.call_args_list], [(3600,)])
+        self.assertEqual(report.acknowledged, list(range(8)))
 
     def test_what_was_acknowledged_before_a_restore_is_sent_again(self):
         daemon = RestoredDaemon()

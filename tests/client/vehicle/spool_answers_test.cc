@@ -211,8 +211,8 @@ TEST(SpoolAnswersTest, ADaemonThatWantsToBeLeftAloneIs) {
       while (const auto request = socket.ReadRequest()) {
         if (++requests == 2) continue;  // not answered yet
         wire::Envelope reply;
-        *reply.mutable_error() = ErrorToWire({StatusCode::kResourceExhausted, "a full disk"});
-        reply.mutable_error()->set_retry_after_ms(60'000);
+        const Status why(StatusCode::kResourceExhausted, "a full disk");
+        *reply.mutable_error() = ErrorToWire(why.WithRetryAfter(3'600'000));
         socket.Reply(request->request_id(), std::move(reply));
       }
     });
@@ -220,9 +220,12 @@ TEST(SpoolAnswersTest, ADaemonThatWantsToBeLeftAloneIs) {
     ASSERT_TRUE(client) << client.error().message();
     const auto first = spool.Send(*client, {.deadline = std::chrono::milliseconds(300)});
     EXPECT_EQ(first.error().code(), StatusCode::kResourceExhausted);
+    EXPECT_EQ(first.error().retry_after_ms(), 3'600'000);
+    EXPECT_EQ(client->retry_after_of_reads(), std::chrono::milliseconds(0));
     const auto again = spool.Send(*client);
     ASSERT_TRUE(again) << again.error().message();
     EXPECT_GT(again->retry_after, std::chrono::milliseconds(0));
+    EXPECT_LE(again->retry_after, std::chrono::minutes(1)) << "what is believed";
     EXPECT_EQ(again->acknowledged, 0U);
     EXPECT_EQ(again->waiting, 2U);
     EXPECT_EQ(again->in_flight, 1U);

@@ -45,7 +45,30 @@ TEST(ConvertTest, ErrorsSayWhetherToRetry) {
   EXPECT_FALSE(conflict.retry);
   const RemoteError down = ErrorFromWire(ErrorToWire({StatusCode::kUnavailable, "draining"}));
   EXPECT_TRUE(down.retry);
-  EXPECT_GT(down.retry_after_ms, 0u);
+  EXPECT_EQ(down.status.retry_after_ms(), 1'000);
+}
+
+TEST(ConvertTest, ErrorsSayHowLongToWait) {
+  const auto sent_ms = [](const Status& status) {
+    return ErrorToWire(status).retry_after_ms();
+  };
+  const Status busy(StatusCode::kUnavailable, "busy");
+  EXPECT_EQ(sent_ms(busy), 1'000u) << "as usual";
+  EXPECT_EQ(sent_ms({StatusCode::kResourceExhausted, "full"}), 5'000u);
+  EXPECT_EQ(sent_ms(busy.WithRetryAfter(3'600'000).WithContext("bus")), 3'600'000u);
+  EXPECT_EQ(sent_ms(busy.WithRetryAfter(std::int64_t{1} << 40)), ~0u) << "what fits";
+  EXPECT_EQ(sent_ms(busy.WithRetryAfter(-1)), 0u);
+  const Status conflict(StatusCode::kConflict, "other bytes");
+  EXPECT_EQ(sent_ms(conflict.WithRetryAfter(7)), 0u) << "it does not pass";
+
+  const Status hour = busy.WithRetryAfter(3'600'000);
+  EXPECT_EQ(ErrorFromWire(ErrorToWire(hour)).status, hour);
+  wire::Error silent = ErrorToWire(hour);
+  silent.set_retry_after_ms(0);
+  EXPECT_EQ(ErrorFromWire(silent).status, busy);
+  wire::Error for_good = ErrorToWire(hour);
+  for_good.set_retry(false);
+  EXPECT_EQ(ErrorFromWire(for_good).status, busy);
 }
 
 TEST(ConvertTest, AReasonGoesWithItsError) {

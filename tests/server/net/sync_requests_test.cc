@@ -304,7 +304,12 @@ TEST_F(SyncTest, BadRequestsAreRefusedAndTheConnectionGoesOn) {
   EXPECT_EQ(refusal([](Request& r) { r.clear_area(); }), kWrong);
   EXPECT_EQ(refusal([](Request& r) { r.mutable_area()->mutable_corridor(); }), kWrong);
   EXPECT_EQ(refusal([](Request& r) { r.mutable_area()->mutable_tiles()->add_keys(~0ull); }),
-            StatusCode::kInvalidData);
+            kWrong);
+  EXPECT_EQ(refusal([](Request& r) {
+              r.add_held()->add_keys(~0ull);
+              r.mutable_held(0)->add_payload_hashes(1);
+            }),
+            kWrong);
   EXPECT_EQ(refusal([](Request& r) { r.set_finest_level(99); }), kWrong);
   EXPECT_EQ(refusal([](Request& r) { r.add_sections(64); }), kWrong);
   EXPECT_EQ(refusal([](Request& r) { r.add_held()->add_keys(1); }), kWrong);

@@ -1,6 +1,9 @@
 // A vehicle begins an hour's worth of sessions at once, and then as many an hour.
 #include "server/store/session_starts.h"
 
+#include <atomic>
+
+#include "tests/server/store/faulty_vfs.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace atlas {
@@ -14,37 +17,38 @@ constexpr SessionStarts::Clock::time_point kStart{};
 TEST(SessionStartsTest, AnHoursWorthMayBeginAtOnceAndThenAsManyAnHour) {
   SessionStarts starts(6);
   for (int i = 0; i < 6; ++i) {
-    EXPECT_TRUE(starts.Begin("bus", kStart + seconds(i)).ok()) << i;
+    EXPECT_TRUE(starts.Begin("bus", kStart + seconds(i))) << i;
   }
-  const Status refused = starts.Begin("bus", kStart + minutes(5));
+  const Status refused = starts.Begin("bus", kStart + minutes(5)).error();
   EXPECT_EQ(refused.code(), StatusCode::kUnavailable);
   EXPECT_NE(refused.message().find("vehicle bus"), std::string::npos);
   EXPECT_NE(refused.message().find("in 300 s"), std::string::npos) << refused.message();
-  EXPECT_TRUE(starts.Begin("tram", kStart + minutes(5)).ok()) << "every vehicle for itself";
-  EXPECT_TRUE(starts.Begin("bus", kStart + minutes(10)).ok());
-  EXPECT_FALSE(starts.Begin("bus", kStart + minutes(10)).ok());
+  EXPECT_EQ(refused.retry_after_ms(), 300'000);
+  EXPECT_TRUE(starts.Begin("tram", kStart + minutes(5))) << "every vehicle for itself";
+  EXPECT_TRUE(starts.Begin("bus", kStart + minutes(10)));
+  EXPECT_FALSE(starts.Begin("bus", kStart + minutes(10)));
   int begun = 0;
   for (minutes passed{11}; passed <= minutes(130); ++passed) {
-    begun += starts.Begin("bus", kStart + passed).ok() ? 1 : 0;
+    begun += starts.Begin("bus", kStart + passed) ? 1 : 0;
   }
   EXPECT_EQ(begun, 12) << "in two hours";
 }
 
 TEST(SessionStartsTest, TheLimitChangesAndZeroIsNone) {
   SessionStarts starts(1);
-  EXPECT_TRUE(starts.Begin("bus", kStart).ok());
-  EXPECT_FALSE(starts.Begin("bus", kStart).ok());
+  EXPECT_TRUE(starts.Begin("bus", kStart));
+  EXPECT_FALSE(starts.Begin("bus", kStart));
   starts.set_per_hour(0);
-  EXPECT_TRUE(starts.Begin("bus", kStart).ok());
+  EXPECT_TRUE(starts.Begin("bus", kStart));
   starts.set_per_hour(2);
-  EXPECT_FALSE(starts.Begin("bus", kStart).ok()) << "what was begun stays counted";
-  EXPECT_TRUE(starts.Begin("bus", kStart + minutes(30)).ok());
+  EXPECT_FALSE(starts.Begin("bus", kStart)) << "what was begun stays counted";
+  EXPECT_TRUE(starts.Begin("bus", kStart + minutes(30)));
 }
 
 TEST(SessionStartsTest, IsBounded) {
   SessionStarts starts(1'000);
   for (std::size_t i = 0; i < 3 * SessionStarts::kMaxVehicles; ++i) {
-    ASSERT_TRUE(starts.Begin("bus-" + std::to_string(i), kStart).ok());
+    ASSERT_TRUE(starts.Begin("bus-" + std::to_string(i), kStart));
     ASSERT_LE(starts.vehicles(), SessionStarts::kMaxVehicles);
   }
 }
@@ -53,12 +57,29 @@ TEST(SessionStartsTest, IsBounded) {
 TEST(SessionStartsTest, ForgetsWhoIsRestedFirst) {
   SessionStarts starts(1);
   for (std::size_t i = 0; i < SessionStarts::kMaxVehicles - 1; ++i) {
-    ASSERT_TRUE(starts.Begin("bus-" + std::to_string(i), kStart).ok());
+    ASSERT_TRUE(starts.Begin("bus-" + std::to_string(i), kStart));
   }
-  ASSERT_TRUE(starts.Begin("late", kStart + minutes(30)).ok());
-  ASSERT_TRUE(starts.Begin("another", kStart + minutes(61)).ok());
+  ASSERT_TRUE(starts.Begin("late", kStart + minutes(30)));
+  ASSERT_TRUE(starts.Begin("another", kStart + minutes(61)));
   EXPECT_EQ(starts.vehicles(), 2u);
-  EXPECT_FALSE(starts.Begin("late", kStart + minutes(61)).ok());
+  EXPECT_FALSE(starts.Begin("late", kStart + minutes(61)));
+}
+
+TEST(SessionStartsTest, OnlyWhatBecameOfAnUploadThatFailedIsGivenBack) {
+  const auto starts = std::make_shared<SessionStarts>(1);
+  SessionStart failed(starts);
+  ASSERT_TRUE(failed.Begin("bus", kStart).ok());
+  EXPECT_FALSE(SessionStart(starts).Begin("bus", kStart).ok()) << "counted at once";
+  SessionStart never_begun(starts);
+  never_begun.NoteEnd({StatusCode::kUnavailable, "another reason"});
+  EXPECT_FALSE(SessionStart(starts).Begin("bus", kStart).ok());
+  starts->set_per_hour(4);
+  failed.NoteEnd({StatusCode::kResourceExhausted, "a full disk"});
+  starts->set_per_hour(1);
+  SessionStart done(starts);
+  EXPECT_TRUE(done.Begin("bus", kStart).ok()) << "all that it counted for";
+  done.NoteEnd({});
+  EXPECT_FALSE(SessionStart(starts).Begin("bus", kStart).ok());
 }
 
 class SessionsStoreTest : public StoreTest {
@@ -66,8 +87,21 @@ class SessionsStoreTest : public StoreTest {
   Result<PutKeyframeResult> PutInto(const SessionKey& session, std::uint32_t sequence = 1) {
     NewKeyframe keyframe = MakeKeyframe(sequence, {{0, 1, 2}});
     keyframe.key.session = session;
-    keyframe.starts = starts_;
+    keyframe.start = starts_ == nullptr ? nullptr : std::make_shared<SessionStart>(starts_);
     return Put(std::move(keyframe));
+  }
+  // So many sessions of a bus at once, each of one keyframe. How many began.
+  int BeginTogether(int count) {
+    std::atomic<int> begun = 0;
+    for (int i = 0; i < count; ++i) {
+      NewKeyframe keyframe = MakeKeyframe(1, {{0, 1, 2}});
+      keyframe.key.session = {"bus", "s" + std::to_string(i)};
+      keyframe.start = std::make_shared<SessionStart>(starts_);
+      store_->PutKeyframe(std::move(keyframe),
+                          [&begun](const Result<PutKeyframeResult>& put) { begun += put ? 1 : 0; });
+    }
+    store_->Flush();
+    return begun;
   }
   // "vehicle/session", page by page.
   std::vector<std::string> PagesOf(std::uint32_t limit) {
@@ -102,6 +136,35 @@ TEST_F(SessionsStoreTest, OneThatMayNotBeginLeavesNothing) {
   EXPECT_TRUE(PutInto({"bus", "a"}, 2)) << "one that is there goes on";
   EXPECT_TRUE(PutInto({"tram", "c"}));
   EXPECT_EQ(store_->ReadCounts()->sessions, 3u);
+}
+
+TEST_F(SessionsStoreTest, TogetherNoMoreBeginThanMay) {
+  Open();
+  EXPECT_EQ(BeginTogether(20), 2);
+  EXPECT_EQ(store_->ReadCounts()->sessions, 2u);
+}
+
+class SessionsFaultTest : public SessionsStoreTest {
+ protected:
+  ~SessionsFaultTest() override { store_.reset(); }  // before the layer that it was opened with
+
+  FaultyVfs vfs_;
+};
+
+TEST_F(SessionsFaultTest, WhatDidNotComeToTheDiskIsNotCounted) {
+  Open();
+  for (int day = 0; day < 5; ++day) {
+    vfs_.FailAt(1, FaultyVfs::Calls::kWrite, FaultyVfs::Until::kHealed, true);
+    const auto put = PutInto({"bus", "full" + std::to_string(day)});
+    ASSERT_FALSE(put);
+    EXPECT_EQ(put.error().code(), StatusCode::kResourceExhausted) << put.error().message();
+    EXPECT_EQ(BeginTogether(20), 0);
+    ASSERT_TRUE(vfs_.Heal());
+  }
+  EXPECT_TRUE(PutInto({"bus", "a"}));
+  EXPECT_TRUE(PutInto({"bus", "b"}));
+  EXPECT_EQ(PutInto({"bus", "c"}).error().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(PagesOf(10), (std::vector<std::string>{"bus/a", "bus/b"}));
 }
 
 TEST_F(SessionsStoreTest, PagesAreInOrderWhateverTheirSize) {

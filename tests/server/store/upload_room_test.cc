@@ -206,14 +206,14 @@ TEST(UploadRoomLimitsTest, TheFloorItselfIsFreeAndEachRefusalSaysHowLongToWait) 
   EXPECT_TRUE(room.Check({"bus", 10, 10, 40}, now).ok());
   const Status quota = room.Check({"bus", 10, 11, 40}, now);
   EXPECT_EQ(quota.reason(), StatusReason::kQuota);
-  EXPECT_EQ(quota.retry_after(), std::chrono::seconds(60));
+  EXPECT_EQ(quota.retry_after_ms(), 60'000);
   EXPECT_EQ(room.Check({"bus", 10, 11, 41}, now).reason(), StatusReason::kStoreLimit);
   free_bytes = 99;
   now += std::chrono::seconds(1);
   const Status refused = room.Check({"bus", 10, 11, 41}, now);
   EXPECT_EQ(refused.reason(), StatusReason::kDiskFloor);
   EXPECT_NE(refused.message().find("retention.disk_floor_mib"), std::string::npos);
-  EXPECT_EQ(refused.retry_after(), std::chrono::seconds(10));
+  EXPECT_EQ(refused.retry_after_ms(), 10'000);
 }
 
 TEST(UploadRoomLimitsTest, ADiskThatDoesNotTellIsNoRoomWhereAFloorIsSet) {

@@ -12,6 +12,12 @@
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 
+// Of a whole row, as ReadRow and WriteSession have them: statements are kept by the address of a
+// literal.
+#define SESSION_COLUMNS                                                                         \
+  "id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, last_sequence, " \
+  "compacted, checksum"
+
 namespace atlas {
 namespace {
 
@@ -31,8 +37,7 @@ std::int64_t HashOf(const SessionRow& row) {
       .value();
 }
 
-// Columns: id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms,
-// last_sequence, compacted, checksum.
+// Of a row of SESSION_COLUMNS.
 Result<SessionRow> ReadRow(Query& row) {
   row.Rewind();
   SessionRow result;
@@ -108,9 +113,8 @@ void CountRows(Connection& connection, SessionRow& session) {
 }  // namespace
 
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key) {
-  Query row = connection.Prepare(
-      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? AND session = ?");
+  Query row = connection.Prepare("SELECT " SESSION_COLUMNS
+                                 " FROM sessions WHERE vehicle = ? AND session = ?");
   row.Bind(std::string_view(key.vehicle)).Bind(std::string_view(key.session));
   if (!row.Step()) {
     return std::nullopt;
@@ -125,10 +129,9 @@ Result<std::optional<SessionRow>> FindSession(Connection& connection, const Sess
 Result<std::vector<SessionRow>> ReadVehicleSessions(Connection& connection,
                                                     const SessionKey& after,
                                                     std::uint32_t limit) {
-  Query row = connection.Prepare(
-      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions WHERE vehicle = ? AND session > ? "
-      "ORDER BY session LIMIT ?");
+  Query row = connection.Prepare("SELECT " SESSION_COLUMNS
+                                 " FROM sessions WHERE vehicle = ? AND session > ? "
+                                 "ORDER BY session LIMIT ?");
   row.Bind(std::string_view(after.vehicle)).Bind(std::string_view(after.session)).Bind(limit);
   return ReadPage(row, after);
 }
@@ -136,10 +139,9 @@ Result<std::vector<SessionRow>> ReadVehicleSessions(Connection& connection,
 Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
                                                 const SessionKey& after,
                                                 std::uint32_t limit) {
-  Query row = connection.Prepare(
-      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions WHERE (vehicle, session) > (?, ?) "
-      "ORDER BY vehicle, session LIMIT ?");
+  Query row = connection.Prepare("SELECT " SESSION_COLUMNS
+                                 " FROM sessions WHERE (vehicle, session) > (?, ?) "
+                                 "ORDER BY vehicle, session LIMIT ?");
   row.Bind(std::string_view(after.vehicle)).Bind(std::string_view(after.session)).Bind(limit);
   auto page = ReadPage(row, after);
   if (!page) {
@@ -154,9 +156,7 @@ Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
 }
 
 Result<SessionRow> ReadSession(Connection& connection, std::int64_t id) {
-  Query row = connection.Prepare(
-      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions WHERE id = ?");
+  Query row = connection.Prepare("SELECT " SESSION_COLUMNS " FROM sessions WHERE id = ?");
   row.Bind(id);
   if (!row.Step()) {
     return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", id, " is missing"));
@@ -180,10 +180,8 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key) {
 void WriteSession(Connection& connection, const SessionRow& row) {
   const SessionRecord& r = row.record;
   connection
-      .Prepare(
-          "INSERT OR REPLACE INTO sessions (id, vehicle, session, state, keyframes, bytes, "
-          "first_time_ms, last_time_ms, last_sequence, compacted, checksum) "
-          "VALUES (?,?,?,?,?,?,?,?,?,?,?)")
+      .Prepare("INSERT OR REPLACE INTO sessions (" SESSION_COLUMNS
+               ") VALUES (?,?,?,?,?,?,?,?,?,?,?)")
       .Bind(row.id)
       .Bind(std::string_view(r.key.vehicle))
       .Bind(std::string_view(r.key.session))
@@ -199,9 +197,7 @@ void WriteSession(Connection& connection, const SessionRow& row) {
 }
 
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
-  Query row = connection.Prepare(
-      "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-      "last_sequence, compacted, checksum FROM sessions NOT INDEXED");
+  Query row = connection.Prepare("SELECT " SESSION_COLUMNS " FROM sessions NOT INDEXED");
   std::vector<std::int64_t> damaged;
   while (row.Step()) {
     if (!ReadRow(row)) {
@@ -245,9 +241,7 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
 int RecountSessions(Connection& connection) {
   std::vector<SessionRow> rows;
   {
-    Query query = connection.Prepare(
-        "SELECT id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, "
-        "last_sequence, compacted, checksum FROM sessions NOT INDEXED");
+    Query query = connection.Prepare("SELECT " SESSION_COLUMNS " FROM sessions NOT INDEXED");
     while (query.Step()) {
       if (auto row = ReadRow(query)) {
         rows.push_back(std::move(*row));

@@ -145,8 +145,8 @@ Result<SessionRow> FindOrBeginSession(Connection& connection, const NewKeyframe&
   if (*found) {
     return std::move(**found);
   }
-  if (keyframe.starts != nullptr) {
-    Status status = keyframe.starts->Begin(key.vehicle, SessionStarts::Clock::now());
+  if (keyframe.start != nullptr) {
+    Status status = keyframe.start->Begin(key.vehicle, SessionStarts::Clock::now());
     if (!status.ok()) {
       return Error(std::move(status));
     }

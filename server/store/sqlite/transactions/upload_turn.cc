@@ -26,9 +26,15 @@ Result<PutKeyframeResult> PutInTurn(Connection& connection,
 
 std::function<void(Result<PutKeyframeResult>)> Noting(
     const NewKeyframe& keyframe, std::function<void(Result<PutKeyframeResult>)> done) {
-  return [missing = keyframe.missing, key = keyframe.key,
+  return [missing = keyframe.missing, start = keyframe.start, key = keyframe.key,
           done = std::move(done)](Result<PutKeyframeResult> result) {
-    missing->NoteEnd(key, result ? Status() : result.error());
+    const Status end = result ? Status() : result.error();
+    if (missing != nullptr) {
+      missing->NoteEnd(key, end);
+    }
+    if (start != nullptr) {
+      start->NoteEnd(end);
+    }
     done(std::move(result));
   };
 }

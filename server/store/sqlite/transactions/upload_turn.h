@@ -16,7 +16,7 @@ Result<PutKeyframeResult> PutInTurn(Connection& connection,
                                     const NewKeyframe& keyframe,
                                     UploadRoom& room);
 
-// Notes what became of it, then calls `done`.
+// Notes what became of it, and of the session that it began, then calls `done`.
 std::function<void(Result<PutKeyframeResult>)> Noting(
     const NewKeyframe& keyframe, std::function<void(Result<PutKeyframeResult>)> done);
 

@@ -57,7 +57,7 @@ TEST(HeldTilesTest, RefusesWhatMakesNoSense) {
   const std::uint64_t block = TileBlockOf(a.Key());
   EXPECT_EQ(code({Tile(a), Tile(b)}, {}), StatusCode::kOk);
   EXPECT_EQ(code({Tile(a), Tile(a)}, {}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(code({{~std::uint64_t{0}, 1}}, {}), StatusCode::kInvalidData);
+  EXPECT_EQ(code({{~std::uint64_t{0}, 1}}, {}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code({}, {{block, 1, 2}, {block, 1, 2}}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code({}, {{std::uint64_t{1} << 60, 1, 2}}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code({Tile(a)}, {{block, 1, 2}}), StatusCode::kInvalidArgument);

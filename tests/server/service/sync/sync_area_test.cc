@@ -79,7 +79,7 @@ TEST(SyncAreaTest, KeysThatNoTilesHaveAreRefused) {
   };
   EXPECT_EQ(code({key, key + 1}), StatusCode::kOk);
   EXPECT_EQ(code({key + 1, key}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(code({key, std::uint64_t{1} << 63}), StatusCode::kInvalidData);
+  EXPECT_EQ(code({key, std::uint64_t{1} << 63}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code(std::vector<std::uint64_t>(SyncArea::kMaxTiles + 1, key)),
             StatusCode::kInvalidArgument);
 }
