@@ -164,6 +164,25 @@ TEST_F(RetentionTest, WhereNothingCanGoItRests) {
   EXPECT_EQ(steps, 2) << "each pass once";
 }
 
+TEST_F(RetentionTest, ItBeginsAtTheUpperShareAndEndsAtTheLower) {
+  Open();
+  UploadPasses(0, 4);
+  Digest();
+  std::atomic<int> steps = 0;
+  AutomaticCompaction compaction(
+      *store_,
+      [&](const CompactionRequest&, const std::stop_token&) -> Result<CompactionReport> {
+        LimitTo(++steps == 1 ? 0.87 : 0.84, false);
+        return CompactionReport{};
+      },
+      [](LogLevel, const std::string&) {}, compaction_);
+  LimitTo(0.95, false);
+  compaction.set_on(true);
+  EXPECT_TRUE(Until([&] { return steps >= 2; }));
+  std::this_thread::sleep_for(milliseconds(100));
+  EXPECT_EQ(steps, 2) << "of four";
+}
+
 TEST_F(RetentionTest, AStepThatFailsIsPassedOver) {
   Open();
   UploadPasses(0, 3);
