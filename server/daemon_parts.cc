@@ -87,6 +87,11 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.scrub.bytes_per_s = config.scrub_kib_per_s * 1024.0;
   options.scrub.between = std::chrono::hours(config.scrub_hours);
   options.sessions_per_hour = static_cast<std::uint32_t>(config.vehicle_sessions_per_hour);
+  options.retention.limits.store_bytes = static_cast<std::uint64_t>(config.store_mib) << 20;
+  options.retention.limits.vehicle_bytes = static_cast<std::uint64_t>(config.vehicle_mib) << 20;
+  options.retention.limits.disk_floor_bytes = static_cast<std::uint64_t>(config.disk_floor_mib)
+                                              << 20;
+  options.retention.is_compacting = config.is_compacting;
   options.backup.folder = config.backup_folder;
   options.backup.bytes_per_s = config.backup_mib_per_s * double{1u << 20};
   options.scratch_directory = config.data;

@@ -168,6 +168,14 @@ LiveConfig::Prepare PrepareSessionLimit(AtlasService& service) {
   };
 }
 
+LiveConfig::Prepare PrepareRetention(AtlasService& service) {
+  return [&service](const DaemonConfig& config) -> Result<LiveConfig::Commit> {
+    return [&service, retention = ServiceFrom(config).retention] {
+      service.SetRetention(retention);
+    };
+  };
+}
+
 // A connection is a file, and the store has some.
 void AllowConnections(const NetOptions& options) {
   constexpr std::size_t kOtherFiles = 256;
@@ -223,6 +231,7 @@ int Serve(LiveConfig& live, std::atomic<bool>& has_failed) {
   live.AddPart(PrepareSecurity(server, !config.tls_certificate.empty()));
   live.AddPart(PrepareNameLimits(server));
   live.AddPart(PrepareSessionLimit(service));
+  live.AddPart(PrepareRetention(service));
   const HangupWatch hangups([&live] { ReloadConfig(live); });
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());

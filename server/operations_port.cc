@@ -61,6 +61,7 @@ HttpPage MetricsPage(AtlasService& service, AtlasStore& store, TcpServer& server
             }
             figures.net = server.ReadFigures();
             figures.writes = store.ReadWriteFigures();
+            figures.room = store.ReadRoom();
             figures.rss_bytes = ResidentBytes();
             return HttpReply{200, kMetricsContentType, MetricsText(figures)};
           }};

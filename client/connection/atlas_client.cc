@@ -82,6 +82,11 @@ AtlasStatus StatusFromWire(const wire::StatusReply& reply) {
   status.multilayer_cells = reply.multilayer_cells();
   status.rss_bytes = reply.rss_bytes();
   status.compacted = reply.compacted();
+  status.used_bytes = reply.used_bytes();
+  status.store_limit_bytes = reply.store_limit_bytes();
+  if (reply.has_disk_free_bytes()) status.disk_free_bytes = reply.disk_free_bytes();
+  status.disk_floor_bytes = reply.disk_floor_bytes();
+  status.refusing = reply.refusing();
   return status;
 }
 

@@ -98,6 +98,12 @@ struct AtlasStatus {
   std::uint64_t multilayer_cells = 0;
   std::uint64_t rss_bytes = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
+  // Of a daemon of protocol 1.9; limits of 0 are none.
+  std::uint64_t used_bytes = 0;         // pages of the database
+  std::uint64_t store_limit_bytes = 0;  // of those, for uploads
+  std::optional<std::uint64_t> disk_free_bytes;
+  std::uint64_t disk_floor_bytes = 0;  // that stay free
+  std::string refusing;                // why any upload is refused now: "store_limit"; else empty
 };
 
 struct WaitSummary {

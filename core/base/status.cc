@@ -30,11 +30,41 @@ std::string_view StatusCodeName(StatusCode code) {
   return "unknown";
 }
 
+std::string_view StatusReasonName(StatusReason reason) {
+  switch (reason) {
+    case StatusReason::kNone:
+      return "";
+    case StatusReason::kQuota:
+      return "quota";
+    case StatusReason::kStoreLimit:
+      return "store_limit";
+    case StatusReason::kDiskFloor:
+      return "disk_floor";
+  }
+  return "";
+}
+
+StatusReason StatusReasonByName(std::string_view name) {
+  for (const StatusReason reason :
+       {StatusReason::kQuota, StatusReason::kStoreLimit, StatusReason::kDiskFloor}) {
+    if (StatusReasonName(reason) == name) {
+      return reason;
+    }
+  }
+  return StatusReason::kNone;
+}
+
 Status Status::WithContext(std::string_view context) const {
   Status status = *this;
   if (!ok()) {
     status.message_ = std::string(context) + ": " + message_;
   }
+  return status;
+}
+
+Status Status::WithReason(StatusReason reason) const {
+  Status status = *this;
+  status.reason_ = reason;
   return status;
 }
 

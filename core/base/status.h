@@ -33,6 +33,19 @@ constexpr bool IsTemporary(StatusCode code) {
          code == StatusCode::kResourceExhausted;
 }
 
+// What the code alone does not tell. Frozen: the names travel in error replies.
+enum class StatusReason : std::uint8_t {
+  kNone,
+  kQuota,       // of these three: no room for an upload, its vehicle's share is taken,
+  kStoreLimit,  // the atlas takes as much as it may,
+  kDiskFloor,   // or its disk is nearly full
+};
+
+// In snake case, "store_limit"; empty for kNone.
+std::string_view StatusReasonName(StatusReason reason);
+// kNone for a name that is none.
+StatusReason StatusReasonByName(std::string_view name);
+
 // The code's name in snake case, as printed in JSON errors: "invalid_data".
 std::string_view StatusCodeName(StatusCode code);
 
@@ -44,6 +57,7 @@ class [[nodiscard]] Status {
   bool ok() const { return code_ == StatusCode::kOk; }
   StatusCode code() const { return code_; }
   const std::string& message() const { return message_; }
+  StatusReason reason() const { return reason_; }
 
   // Milliseconds: the caller may try again after them; none: after what is usual for the code. They
   // travel in error replies where the code IsTemporary.
@@ -51,6 +65,7 @@ class [[nodiscard]] Status {
 
   // The same with "context: " before the message.
   Status WithContext(std::string_view context) const;
+  Status WithReason(StatusReason reason) const;
   // The same, to be tried again after so long.
   Status WithRetryAfter(std::int64_t retry_after_ms) const;
 
@@ -59,6 +74,7 @@ class [[nodiscard]] Status {
  private:
   StatusCode code_ = StatusCode::kOk;
   std::string message_;
+  StatusReason reason_ = StatusReason::kNone;
   std::optional<std::int64_t> retry_after_ms_;
 };
 

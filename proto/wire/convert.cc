@@ -88,6 +88,7 @@ wire::Error ErrorToWire(const Status& status) {
   message.set_message(status.message());
   message.set_retry_after_ms(RetryAfterMs(status));
   message.set_retry(IsTemporary(status.code()));
+  message.set_reason(std::string(StatusReasonName(status.reason())));
   return message;
 }
 
@@ -95,7 +96,8 @@ RemoteError ErrorFromWire(const wire::Error& message) {
   const bool is_known = message.code() >= static_cast<int>(StatusCode::kInvalidArgument) &&
                         message.code() <= static_cast<int>(StatusCode::kInternal);
   const auto code = is_known ? static_cast<StatusCode>(message.code()) : StatusCode::kInternal;
-  const Status status(code, message.message());
+  const auto reason = StatusReasonByName(message.reason());
+  const Status status = Status(code, message.message()).WithReason(reason);
   const std::uint32_t asked_ms = message.retry() ? message.retry_after_ms() : 0;
   return {asked_ms > 0 ? status.WithRetryAfter(asked_ms) : status, message.retry()};
 }

@@ -51,7 +51,12 @@ struct DaemonConfig {
   int name_mib_per_s = 64;
   int name_served_mib_per_s = 256;
   int vehicle_sessions_per_hour = 1'000;  // that it may begin; 0: no limit
-  std::optional<HostPort> http;           // the operations port; none: off
+  // How much may be stored; 0: no limit.
+  int store_mib = 0;             // the database
+  int vehicle_mib = 0;           // keyframes of one vehicle
+  int disk_floor_mib = 256;      // that stay free on the disk
+  bool is_compacting = false;    // when the store is nearly full
+  std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.
   std::filesystem::path tls_certificate;

@@ -145,6 +145,25 @@ void AddWrites(const WriteFigures& writes, Families& out) {
                {}, writes.commits);
 }
 
+void AddRoom(const RoomFigures& room, Families& out) {
+  AddGauge(out, "store_used_bytes", "Pages of the database that are in use.", room.used_bytes);
+  AddGauge(out, "store_limit_bytes", "What uploads may fill of them; 0: no limit.",
+           room.limits.store_bytes);
+  AddGauge(out, "vehicle_limit_bytes", "What one vehicle's keyframes may take; 0: no limit.",
+           room.limits.vehicle_bytes);
+  AddGauge(out, "disk_floor_bytes", "What uploads leave free on the disk; 0: nothing.",
+           room.limits.disk_floor_bytes);
+  if (room.free_disk_bytes) {
+    AddGauge(out, "disk_free_bytes", "Free on the atlas's disk.", *room.free_disk_bytes);
+  }
+  MetricFamily& refused = Begin(out, "uploads_refused_total", "Keyframes refused for want of room.",
+                                MetricType::Counter);
+  for (std::size_t why = 0; why < kUploadRefusals; ++why) {
+    AddCount(refused, {{"reason", std::string(StatusReasonName(kUploadRefusalReasons[why]))}},
+             static_cast<double>(room.refused[why]));
+  }
+}
+
 }  // namespace
 
 std::string MetricsText(const DaemonFigures& figures) {
@@ -157,6 +176,7 @@ std::string MetricsText(const DaemonFigures& figures) {
   AddGauge(families, "resident_bytes", "Memory of the process.", figures.rss_bytes);
   AddNet(figures.net, families);
   AddWrites(figures.writes, families);
+  AddRoom(figures.room, families);
   return prometheus::TextSerializer().Serialize(families);
 }
 

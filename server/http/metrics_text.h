@@ -7,6 +7,7 @@
 
 #include "server/net/net_counters.h"
 #include "server/service/atlas_service.h"
+#include "server/store/upload_limits.h"
 #include "server/store/write_figures.h"
 
 namespace atlas {
@@ -17,6 +18,7 @@ struct DaemonFigures {
   std::optional<ServiceStatus> atlas;  // none: it cannot be read now
   NetFigures net;
   WriteFigures writes;
+  RoomFigures room;
   std::uint64_t rss_bytes = 0;
 };
 

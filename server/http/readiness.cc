@@ -43,6 +43,9 @@ Status Readiness::Check() {
   if (refusal && Clock::now() - refusal->when < options_.refusal) {
     return refusal->why;
   }
+  if (Status refusing = store_.ReadRoom().refusing; !refusing.ok()) {
+    return refusing;
+  }
   return CheckDisk();
 }
 

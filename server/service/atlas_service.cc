@@ -1,6 +1,8 @@
 #include "server/service/atlas_service.h"
 
 #include <algorithm>
+#include <chrono>
+#include <stop_token>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -10,6 +12,9 @@
 
 namespace atlas {
 namespace {
+
+// Of automatic compaction: for what is there to be fused, and the step.
+constexpr std::chrono::hours kStepPatience{1};
 
 // Calls `done` with the result after waking whoever waits for changes.
 template <typename T>
@@ -42,7 +47,16 @@ AtlasService::AtlasService(AtlasStore& store,
       whole_(store, changes_, wait_),
       past_(store, options.past_cache_bytes, options.scratch_directory),
       scrubber_(store, changes_, log_, options.scrub),
-      backups_(store, log_, options.backup) {}
+      backups_(store, log_, options.backup),
+      compaction_(
+          store,
+          [this](const CompactionRequest& request, const std::stop_token& stop) {
+            return whole_.Compact(request, Patience(kStepPatience, stop));
+          },
+          log_,
+          options.compaction) {
+  SetRetention(options.retention);
+}
 
 AtlasService::~AtlasService() {
   Stop();
@@ -51,6 +65,7 @@ AtlasService::~AtlasService() {
 
 void AtlasService::Stop() {
   EndWaits();
+  compaction_.Stop();
   scrubber_.Stop();
   fusion_.Stop();
 }
@@ -197,7 +212,20 @@ Result<ServiceStatus> AtlasService::ReadStatus() {
                        fusion_.kept_bytes(),
                        fusion_.kept_disk_bytes(),
                        ResidentBytes(),
-                       scrubber_.figures()};
+                       scrubber_.figures(),
+                       store_.ReadRoom()};
+}
+
+// Of another preset every keyframe counts: whoever expects room is told at once.
+void AtlasService::SetRetention(const Retention& retention) {
+  store_.SetUploadLimits(retention.limits);
+  const FusionPreset preset = identity().profile.preset;
+  const bool can_compact = preset == FusionPreset::kBounded;
+  if (retention.is_compacting && !can_compact) {
+    log_(LogLevel::kWarning, StrCat("retention.compact has no effect: this atlas has preset ",
+                                    FusionPresetName(preset), ", in which every keyframe counts"));
+  }
+  compaction_.set_on(retention.is_compacting && can_compact);
 }
 
 Result<AtlasFacts> AtlasService::Backup(

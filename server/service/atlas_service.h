@@ -13,6 +13,7 @@
 #include "core/base/status.h"
 #include "server/service/backup/backup_keeper.h"
 #include "server/service/change_signal.h"
+#include "server/service/compaction/automatic_compaction.h"
 #include "server/service/fusion/fusion_scheduler.h"
 #include "server/service/fusion_wait.h"
 #include "server/service/history/past_atlas.h"
@@ -46,13 +47,22 @@ struct ServiceStatus {
   std::uint64_t kept_disk_bytes = 0;  // and those on disk
   std::uint64_t rss_bytes = 0;
   ScrubFigures scrub;
+  RoomFigures room;
+};
+
+// How much may be stored.
+struct Retention {
+  UploadLimits limits;
+  bool is_compacting = false;  // by itself, when the store is nearly full
 };
 
 struct ServiceOptions {
   FusionOptions fusion;
   ScrubOptions scrub;
   BackupOptions backup;
-  std::uint32_t sessions_per_hour = 1'000;    // that one vehicle may begin; 0: no limit
+  std::uint32_t sessions_per_hour = 1'000;  // that one vehicle may begin; 0: no limit
+  Retention retention;
+  AutomaticCompactionOptions compaction;
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
@@ -78,6 +88,7 @@ class AtlasService {
   void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
   // From now on.
   void set_sessions_per_hour(std::uint32_t sessions) { starts_->set_per_hour(sessions); }
+  void SetRetention(const Retention& retention);
 
   // fusion_wait.h
   Result<WaitOutcome> WaitUntilClean(const Patience& patience) {
@@ -164,6 +175,7 @@ class AtlasService {
   PastAtlas past_;
   Scrubber scrubber_;
   BackupKeeper backups_;
+  AutomaticCompaction compaction_;
 };
 
 }  // namespace atlas

@@ -20,6 +20,7 @@
 #include "server/store/event_types.h"
 #include "server/store/store_types.h"
 #include "server/store/tile_index.h"
+#include "server/store/upload_limits.h"
 #include "server/store/write_figures.h"
 
 namespace atlas {
@@ -41,6 +42,8 @@ class AtlasStore : public TileIndex {
   // was corrected since, unless what is stored is damaged: that is put right then. Other content
   // under the key: kConflict. Marks the footprint dirty. All the same where a compaction dropped
   // the stored one. kUnavailable: it would begin a session, and its vehicle began too many.
+  // kResourceExhausted with one of kUploadRefusalReasons: it would be stored, and the limits
+  // leave no room; nothing else that is written here minds them.
   virtual void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) = 0;
   // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
   // and marks nothing. Marks the union of the old and the new footprints. Neither uploads nor poses
@@ -98,6 +101,10 @@ class AtlasStore : public TileIndex {
   virtual void Probe(ProbeDepth depth, Done<bool> done) = 0;
   // Since the store was opened; never blocks for long.
   virtual WriteFigures ReadWriteFigures() const = 0;
+  // Of uploads from now on.
+  virtual void SetUploadLimits(const UploadLimits& limits) = 0;
+  // What they say now; never waits for the store.
+  virtual RoomFigures ReadRoom() = 0;
   // Returns when every write queued before it is done and has been reported.
   virtual void Flush() = 0;
 

@@ -261,10 +261,13 @@ bool IsJsonAskedFor(const std::vector<std::string>& arguments) {
 
 void PrintFailure(const Status& status, bool is_json, std::ostream& err) {
   if (is_json) {
-    const boost::json::object error = {
+    boost::json::object error = {
         {"code", StatusCodeName(status.code())},
         {"message", status.message()},
     };
+    if (status.reason() != StatusReason::kNone) {
+      error["reason"] = StatusReasonName(status.reason());
+    }
     err << JsonText(boost::json::object{{"error", error}}) << '\n';
   } else {
     err << "atlas: " << status.message() << '\n';

@@ -20,7 +20,7 @@ from roadatlas.tls import Tls
 from roadatlas.watch import Watch
 
 PROTOCOL_MAJOR = 1
-PROTOCOL_MINOR = 8
+PROTOCOL_MINOR = 9
 _FIELD_OF = {field.message_type.full_name: field.name
              for field in atlas_pb2.Envelope.DESCRIPTOR.oneofs_by_name["body"].fields}
 _REPLY_TO = {"hello": "hello_reply", "upload_keyframe": "upload_reply", "update_poses": "update_poses_reply",

@@ -159,4 +159,5 @@ def is_last(envelope: atlas_pb2.Envelope) -> bool:
 
 def refusal(envelope: atlas_pb2.Envelope) -> RequestRefused:
     error = envelope.error
-    return RequestRefused(envelope.request_id, error.code, error.message, error.retry, error.retry_after_ms)
+    return RequestRefused(envelope.request_id, error.code, error.message, error.retry, error.retry_after_ms,
+                          error.reason)

@@ -27,15 +27,18 @@ class RoadAtlasError(Exception):
 
 
 class RequestRefused(RoadAtlasError):
-    """The daemon answered with an `Error`. `request_id` 0: it closes the connection."""
+    """The daemon answered with an `Error`. `request_id` 0: it closes the connection. `reason`: "quota" and the like,
+    where the code does not tell it all; else empty."""
 
-    def __init__(self, request_id: int, code: int, message: str, retry: bool, retry_after_ms: int) -> None:
+    def __init__(self, request_id: int, code: int, message: str, retry: bool, retry_after_ms: int,
+                 reason: str = "") -> None:
         super().__init__(f"{Code(code).name.lower()}: {message}")
         self.request_id = request_id
         self.code = Code(code)
         self.message = message
         self.retry = retry
         self.retry_after_ms = retry_after_ms
+        self.reason = reason
 
 
 class ConnectionLost(RoadAtlasError):

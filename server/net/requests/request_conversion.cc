@@ -154,6 +154,14 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
   out.set_rss_bytes(status.rss_bytes);
   out.set_damaged_tiles(status.damaged_tiles);
   out.set_compacted(counts.compacted);
+  const RoomFigures& room = status.room;
+  out.set_used_bytes(room.used_bytes);
+  out.set_store_limit_bytes(room.limits.store_bytes);
+  if (room.free_disk_bytes) {
+    out.set_disk_free_bytes(*room.free_disk_bytes);
+  }
+  out.set_disk_floor_bytes(room.limits.disk_floor_bytes);
+  out.set_refusing(std::string(StatusReasonName(room.refusing.reason())));
 }
 
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {

@@ -35,6 +35,7 @@ Result<CompactionReport> CompactAt(AtlasStore& store,
                                    const std::function<Status()>& check_stop) {
   CompactionPlanner::Options options;
   options.revision = revision;
+  options.from_ms = request.from_ms;
   options.before_ms = request.before_ms;
   options.check_stop = check_stop;
   CompactionPlanner planner(store, std::move(options));

@@ -14,6 +14,7 @@ namespace atlas {
 struct CompactionRequest {
   std::int64_t before_ms = 0;  // keyframes taken from then on stay
   std::string author;          // a name, or empty
+  std::int64_t from_ms = 0;    // those taken before stay, too
 };
 
 struct CompactionReport {

@@ -117,7 +117,8 @@ KeyframeSource CompactionPlanner::SourceOf(const Frames& frames) {
 }
 
 bool CompactionPlanner::MayGo(const FrameOnMap& frame) const {
-  return frame.time_ms < options_.before_ms && !needed_.contains(frame.content);
+  return frame.time_ms >= options_.from_ms && frame.time_ms < options_.before_ms &&
+         !needed_.contains(frame.content);
 }
 
 Status CompactionPlanner::FindNeeded(const TileId& id, const Frames& frames) {

@@ -27,6 +27,7 @@ class CompactionPlanner {
  public:
   struct Options {
     std::uint64_t revision = 0;                           // tiles reflect it, or changed since
+    std::int64_t from_ms = 0;                             // keyframes before it stay
     std::int64_t before_ms = 0;                           // keyframes from then on stay
     std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded
     std::size_t tile_bytes = std::size_t{128} << 20;      // of the tile at hand

@@ -1,11 +1,10 @@
 #include "server/service/verification/scrubber.h"
 
-#include <condition_variable>
 #include <exception>
-#include <mutex>
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/base/stoppable_sleep.h"
 #include "server/base/thread_priority.h"
 #include "server/service/verification/atlas_verify.h"
 
@@ -13,15 +12,6 @@ namespace atlas {
 namespace {
 
 constexpr int kNice = 19;
-
-// True when it is to stop.
-bool Sleep(const std::stop_token& stop, std::chrono::steady_clock::duration time) {
-  std::mutex mutex;
-  std::condition_variable_any never;
-  std::unique_lock lock(mutex);
-  never.wait_for(lock, stop, time, [] { return false; });
-  return stop.stop_requested();
-}
 
 }  // namespace
 
@@ -44,7 +34,7 @@ void Scrubber::Stop() {
 
 void Scrubber::Run(const std::stop_token& stop) {
   YieldToOthers(kNice);
-  for (auto wait = options_.first_after; !Sleep(stop, wait); wait = options_.between) {
+  for (auto wait = options_.first_after; !SleepUnlessStopped(stop, wait); wait = options_.between) {
     try {
       Pass(stop);
     } catch (const std::exception& error) {
@@ -61,9 +51,9 @@ void Scrubber::Pass(const std::stop_token& stop) {
   };
   options.on_read = [&](std::size_t bytes) {
     ++checked_;
-    Sleep(stop,
-          std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-              std::chrono::duration<double>(static_cast<double>(bytes) / options_.bytes_per_s)));
+    SleepUnlessStopped(stop, std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                                 std::chrono::duration<double>(static_cast<double>(bytes) /
+                                                               options_.bytes_per_s)));
   };
   const auto report = AtlasVerifier(store_, options).Run();
   if (stop.stop_requested()) {

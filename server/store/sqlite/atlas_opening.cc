@@ -11,6 +11,7 @@
 #include "server/store/sqlite/migrations/migration.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/stored_bytes.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
@@ -106,6 +107,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     KeepTableSums(*writer);
     DropAllLeases(*writer);
     Mend(*writer, identity->profile.levels);
+    KeepVehicleBytes(*writer);
     identity->restores = RevisionsOf(*writer, EventKind::kBackupRestored);
     return OpenedAtlas{std::move(*identity), std::move(writer)};
   } catch (const std::exception& error) {

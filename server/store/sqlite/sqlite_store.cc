@@ -13,6 +13,7 @@
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/stored_bytes.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
@@ -31,6 +32,7 @@
 #include "server/store/sqlite/transactions/transactions.h"
 #include "server/store/sqlite/transactions/upload_turn.h"
 #include "server/store/tile_directory.h"
+#include "server/store/upload_room.h"
 
 namespace atlas {
 namespace {
@@ -56,10 +58,14 @@ class SqliteStore final : public AtlasStore {
       : directory_(std::move(directory)),
         identity_(identity),
         tiles_(options.tile_directory_bytes),
+        room_([directory = options.directory] { return ReadFreeBytes(directory); }),
         guard_(options.on_failed_sync),
         log_(CopierOptions(directory_.database_file()), {}, *writer, guard_),
         writes_(std::move(writer),
-                {options.max_queued_writes, options.max_group, &ReadRevision},
+                {options.max_queued_writes, options.max_group, &ReadRevision,
+                 [this](Connection& connection) {
+                   room_.NoteUsed(ReadUsedBytes(connection));
+                 }},
                 guard_),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
 
@@ -73,9 +79,11 @@ class SqliteStore final : public AtlasStore {
 
   void PutKeyframe(NewKeyframe keyframe, Done<PutKeyframeResult> done) override {
     done = Noting(keyframe, std::move(done));
-    Write<PutKeyframeResult>(std::move(done), [k = std::move(keyframe)](Connection& connection) {
-      return k.missing == nullptr ? PutKeyframeInStore(connection, k) : PutInTurn(connection, k);
-    });
+    Write<PutKeyframeResult>(
+        std::move(done), [this, k = std::move(keyframe)](Connection& connection) {
+          return k.missing == nullptr ? PutKeyframeInStore(connection, k, room_)
+                                      : PutInTurn(connection, k, room_);
+        });
   }
   void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) override {
     Write<PoseBatchResult>(std::move(done), [b = std::move(batch)](Connection& connection) {
@@ -171,12 +179,15 @@ class SqliteStore final : public AtlasStore {
   }
   WriteFigures ReadWriteFigures() const override {
     WriteFigures figures = writes_.ReadFigures();
-    const auto failure = log_.last_failure();
-    if (failure && (!figures.last_refusal || figures.last_refusal->when < failure->when)) {
-      figures.last_refusal = failure;
+    for (const auto& other : {log_.last_failure(), room_.last_refusal()}) {
+      if (other && (!figures.last_refusal || figures.last_refusal->when < other->when)) {
+        figures.last_refusal = other;
+      }
     }
     return figures;
   }
+  void SetUploadLimits(const UploadLimits& limits) override { room_.set_limits(limits); }
+  RoomFigures ReadRoom() override { return room_.ReadFigures(UploadRoom::Clock::now()); }
   void Flush() override { writes_.Flush(); }
 
   Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override {
@@ -333,8 +344,9 @@ class SqliteStore final : public AtlasStore {
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   StoreIdentity identity_;
   TileDirectory tiles_;  // outlives the writes, which report to it
-  SyncGuard guard_;      // outlives all that writes
-  LogCopier log_;        // outlives the writer: whoever is closed last empties the write-ahead log
+  UploadRoom room_;      // as do these two, all that writes
+  SyncGuard guard_;
+  LogCopier log_;  // outlives the writer: whoever is closed last empties the write-ahead log
   WriteQueue writes_;
   ReaderPool readers_;
 };

@@ -57,8 +57,8 @@ def other_flags_cases(cases, drives, work):
         cases.report.equal("reopened with the same flags", after.state(), state)
 
 
-def made_atlas(cases, drives, data):
-    with Daemon(cases.bin_dir, data, *SMALL) as daemon:
+def made_atlas(cases, drives, data, *flags):
+    with Daemon(cases.bin_dir, data, *SMALL, *flags) as daemon:
         client = type(cases)(cases.report, cases.bin_dir, daemon.server)
         client.run("ingest", drives.good, *NEAR)
         client.run("wait")
@@ -141,13 +141,17 @@ def fill(file):
             pass
 
 
-def ready_again(daemon):
-    """Whether it is, within half a minute."""
+def in_time(condition):
+    """Whether it holds within half a minute."""
     deadline = time.monotonic() + 30
     while time.monotonic() < deadline:
-        if daemon.is_ready()[0]:
+        if condition():
             return True
     return False
+
+
+def ready_again(daemon):
+    return in_time(lambda: daemon.is_ready()[0])
 
 
 def full_disk_case(cases, drives, work):
@@ -155,7 +159,7 @@ def full_disk_case(cases, drives, work):
         if disk is None:
             cases.report.skip("a full disk", "a small file system cannot be mounted here")
             return
-        with Daemon(cases.bin_dir, disk + "/atlas", *SMALL, "--http", "127.0.0.1:0") as daemon:
+        with Daemon(cases.bin_dir, disk + "/atlas", *SMALL, "--disk-floor-mib", "0", "--http", "127.0.0.1:0") as daemon:
             client = type(cases)(cases.report, cases.bin_dir, daemon.server)
             cases.report.equal("a disk with room: ready", daemon.is_ready(), (True, "ok\n"))
             client.run("ingest", drives.good, *NEAR, "--range", "0:2")
@@ -182,12 +186,42 @@ def full_disk_case(cases, drives, work):
             cases.report.equal("a disk with room again: verify", client.run("verify", "--rebuild")["damaged"], 0)
 
 
+def disk_floor_case(cases, drives, work):
+    with small_disk(work + "/floor", "size=16m") as disk:
+        if disk is None:
+            cases.report.skip("a disk below its floor", "a small file system cannot be mounted here")
+            return
+        with Daemon(cases.bin_dir, disk + "/atlas", *SMALL, "--disk-floor-mib", "4", "--http", "127.0.0.1:0") as daemon:
+            client = type(cases)(cases.report, cases.bin_dir, daemon.server)
+            client.run("ingest", drives.good, *NEAR, "--range", "0:2")
+            client.run("wait")
+            ballast = pathlib.Path(disk) / "ballast"
+            with ballast.open("wb") as file:
+                file.write(b"\0" * (os.statvfs(disk).f_bavail * os.statvfs(disk).f_frsize - (3 << 20)))
+            # The room on the disk is asked for once a second.
+            cases.report.check("below the floor: status", in_time(lambda: client.run("status")["refusing"] == "disk_floor"))
+            more = ["ingest", drives.good, *NEAR]
+            client.refused("ingest below the floor", more, "resource_exhausted", "retention.disk_floor_mib",
+                           reason="disk_floor")
+            is_ready, why = daemon.is_ready()
+            cases.report.check("below the floor: not ready", not is_ready and "disk_floor" in why, why)
+            cases.report.equal("below the floor: what is there is a duplicate",
+                               client.run("ingest", drives.good, *NEAR, "--range", "0:2")["duplicates"], 2)
+            client.run("session", "retract", "vehicle/good")
+            client.run("session", "restore", "vehicle/good")
+            ballast.unlink()
+            cases.report.check("above the floor again: uploads", in_time(lambda: client.call(*more).returncode == 0))
+            client.run("wait")
+            cases.report.check("above the floor again: ready", ready_again(daemon))
+            cases.report.equal("above the floor again: verify", client.run("verify", "--rebuild")["damaged"], 0)
+
+
 def read_only_disk_case(cases, drives, work):
     with small_disk(work + "/read_only", "size=16m") as disk:
         if disk is None:
             cases.report.skip("a read-only disk", "a file system cannot be mounted here")
             return
-        made_atlas(cases, drives, disk + "/atlas")
+        made_atlas(cases, drives, disk + "/atlas", "--disk-floor-mib", "0")
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
         refuses_to_start(cases, "an atlas on a read-only disk", disk + "/atlas", [], 1, "permission_denied: ")
         refuses_to_start(cases, "a new atlas on a read-only disk", disk + "/new", SMALL, 1, "permission_denied: ")
@@ -205,4 +239,5 @@ def run(cases, source, work):
     database_cases(cases, drives, work)
     damaged_row_cases(cases, drives, work)
     full_disk_case(cases, drives, work)
+    disk_floor_case(cases, drives, work)
     read_only_disk_case(cases, drives, work)

@@ -117,6 +117,10 @@ class ErrorTest(unittest.TestCase):
             self.assertEqual((error.request_id, error.code, error.message, error.retry, error.retry_after_ms),
                              (request_id, Code.UNAVAILABLE, "busy", True, 250))
 
+    def test_says_what_the_code_does_not(self):
+        self.assertEqual(self.error(1, code=7, reason="quota").reason, "quota")
+        self.assertEqual(self.error(1).reason, "")
+
     def test_unknown_code_is_internal(self):
         self.assertEqual(self.error(1, code=77).code, Code.INTERNAL)
 

@@ -105,10 +105,10 @@ class Cases:
         """Everything a refused command must not change; says too that the daemon serves."""
         return self.run("digest"), self.run("sessions")
 
-    def refused(self, name, args, code, says="", is_stream=False, **run):
+    def refused(self, name, args, code, says="", is_stream=False, reason=None, **run):
         """`args` fail with `code` and a message that holds `says`, with and without --json; the stdout.
 
-        A stream may have begun; it has no summary then.
+        A stream may have begun; it has no summary then. `reason`: what the JSON says beside the code.
         """
         before = self.state()
         plain = self.call(*args, **run)
@@ -119,7 +119,7 @@ class Cases:
         self.report.equal(f"{name}: exit code with --json", done.returncode, EXIT[code])
         self.report.check(f"{name}: stdout", "summary" not in done.stdout if is_stream else not done.stdout,
                           done.stdout)
-        self.typed(name, done.stderr, code, says)
+        self.typed(name, done.stderr, code, says, reason)
         self.report.equal(f"{name}: the atlas", self.state(), before)
         return done
 
@@ -130,14 +130,15 @@ class Cases:
             return
         self.refused(name, args, "permission_denied", says, is_stream, **self.unprivileged)
 
-    def typed(self, name, stderr, code, says):
-        """One line {"error": {"code", "message"}} and nothing else."""
+    def typed(self, name, stderr, code, says, reason=None):
+        """One line {"error": {"code", "message"}} and nothing else; with `reason` that as well."""
         try:
             error = json.loads(stderr)["error"]
         except (ValueError, KeyError):
             self.report.check(f"{name}: JSON error", False, stderr)
             return
-        self.report.equal(f"{name}: keys", sorted(error), ["code", "message"])
+        self.report.equal(f"{name}: keys", sorted(error), ["code", "message"] + (["reason"] if reason else []))
+        self.report.equal(f"{name}: reason", error.get("reason"), reason)
         self.report.equal(f"{name}: code", error["code"], code)
         self.report.check(f"{name}: JSON message", says in error["message"], error["message"])
 

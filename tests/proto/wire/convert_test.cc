@@ -71,6 +71,19 @@ TEST(ConvertTest, ErrorsSayHowLongToWait) {
   EXPECT_EQ(ErrorFromWire(for_good).status, busy);
 }
 
+TEST(ConvertTest, AReasonGoesWithItsError) {
+  const Status full =
+      Status(StatusCode::kResourceExhausted, "full").WithReason(StatusReason::kQuota);
+  EXPECT_EQ(ErrorToWire(full.WithContext("upload")).reason(), "quota");
+  const Status back = ErrorFromWire(ErrorToWire(full)).status;
+  EXPECT_EQ(back.reason(), StatusReason::kQuota);
+  EXPECT_EQ(back.message(), "full");
+  EXPECT_EQ(ErrorToWire({StatusCode::kUnavailable, "draining"}).reason(), "");
+  wire::Error later = ErrorToWire(full);
+  later.set_reason("of a later version");
+  EXPECT_EQ(ErrorFromWire(later).status.reason(), StatusReason::kNone);
+}
+
 TEST(ConvertTest, AnUnknownErrorCodeIsNeverOk) {
   wire::Error message;
   for (const int code : {0, -1, 11, 1000}) {

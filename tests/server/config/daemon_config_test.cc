@@ -25,6 +25,10 @@ TEST_F(DaemonConfigTest, DefaultsNeedOnlyADirectory) {
   EXPECT_EQ(config.survey_disk_mib, 4096);
   EXPECT_EQ(config.scrub_kib_per_s, 2048);
   EXPECT_EQ(config.scrub_hours, 24);
+  EXPECT_EQ(config.store_mib, 0);
+  EXPECT_EQ(config.vehicle_mib, 0);
+  EXPECT_EQ(config.disk_floor_mib, 256);
+  EXPECT_FALSE(config.is_compacting);
   EXPECT_EQ(config.log_level, "info");
   EXPECT_EQ(config.NewProfile().value(), MapProfile());
   EXPECT_THAT(Refusal({}), HasSubstr("--data"));

@@ -80,6 +80,18 @@ TEST_F(LiveConfigTest, SettingsThatNeedEachOtherChangeTogether) {
   EXPECT_EQ(config.config().tls_client_ca, "ca.pem");
 }
 
+TEST_F(LiveConfigTest, HowMuchMayBeStoredChanges) {
+  LiveConfig config = Start({"--store-mib", "100"});
+  arguments_ = {"--vehicle-mib", "7", "--disk-floor-mib", "0", "--compact", "true"};
+  EXPECT_THAT(config.Reload()->changed,
+              ElementsAre("retention.compact", "retention.disk_floor_mib", "retention.store_mib",
+                          "retention.vehicle_mib"));
+  EXPECT_EQ(config.config().store_mib, 0);
+  EXPECT_EQ(config.config().vehicle_mib, 7);
+  EXPECT_EQ(config.config().disk_floor_mib, 0);
+  EXPECT_TRUE(config.config().is_compacting);
+}
+
 TEST_F(LiveConfigTest, ASettingThatIsGoneHasItsDefaultAgain) {
   LiveConfig config = Start({"--log-level", "error", "--log-format", "json"});
   arguments_ = {};

@@ -25,6 +25,10 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   figures.net.handshakes_failed = 7;
   figures.net.broken_frames = 8;
   figures.writes.queued = 6;
+  figures.room.used_bytes = 7;
+  figures.room.limits = {8, 9, 10};
+  figures.room.free_disk_bytes = 11;
+  figures.room.refused = {12, 13, 14};
   const auto metrics = ParseMetrics(MetricsText(figures));
   EXPECT_EQ(metrics.at("roadatlas_atlas_readable"), 1);
   EXPECT_EQ(metrics.at("roadatlas_revision"), 123'456'789'012);
@@ -37,12 +41,21 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   EXPECT_EQ(metrics.at("roadatlas_tls_handshakes_failed_total"), 7);
   EXPECT_EQ(metrics.at("roadatlas_broken_frames_total"), 8);
   EXPECT_EQ(metrics.at("roadatlas_store_writes_queued"), 6);
+  EXPECT_EQ(metrics.at("roadatlas_store_used_bytes"), 7);
+  EXPECT_EQ(metrics.at("roadatlas_store_limit_bytes"), 8);
+  EXPECT_EQ(metrics.at("roadatlas_vehicle_limit_bytes"), 9);
+  EXPECT_EQ(metrics.at("roadatlas_disk_floor_bytes"), 10);
+  EXPECT_EQ(metrics.at("roadatlas_disk_free_bytes"), 11);
+  EXPECT_EQ(metrics.at(R"(roadatlas_uploads_refused_total{reason="disk_floor"})"), 12);
+  EXPECT_EQ(metrics.at(R"(roadatlas_uploads_refused_total{reason="store_limit"})"), 13);
+  EXPECT_EQ(metrics.at(R"(roadatlas_uploads_refused_total{reason="quota"})"), 14);
 }
 
 TEST(MetricsTextTest, AnAtlasThatCannotBeReadLeavesTheRest) {
   const auto metrics = ParseMetrics(MetricsText({}));
   EXPECT_EQ(metrics.at("roadatlas_atlas_readable"), 0);
   EXPECT_EQ(metrics.count("roadatlas_revision"), 0u);
+  EXPECT_EQ(metrics.count("roadatlas_disk_free_bytes"), 0u);
   EXPECT_EQ(metrics.at("roadatlas_connections"), 0);
 }
 

@@ -253,6 +253,36 @@ TEST_F(OperationsPortTest, AWriterThatHangsIsNamed) {
   EXPECT_EQ(AskUntil(http_, "/readyz", 200).status, 200);
 }
 
+// A quota is one vehicle's: others may be sent.
+TEST_F(OperationsPortTest, AFullStoreAndADiskBelowItsFloorAreNotReady) {
+  ServeWithOperations();
+  UploadDrive(1);
+  service_->SetRetention({{.vehicle_bytes = 1}, false});
+  EXPECT_EQ(Upload(DriveUpload(1)).error().reason(), StatusReason::kQuota);
+  EXPECT_EQ(AskUntil(http_, "/readyz", 200).body, "ok\n");
+  service_->SetRetention({{.store_bytes = 1}, false});
+  EXPECT_THAT(Ask(http_, "/readyz").body, HasSubstr("retention.store_mib"));
+  service_->SetRetention({{.disk_floor_bytes = std::uint64_t{1} << 62U}, false});
+  const HttpAnswer below = Ask(http_, "/readyz");
+  EXPECT_EQ(below.status, 503);
+  EXPECT_THAT(below.body, HasSubstr("retention.disk_floor_mib"));
+  EXPECT_EQ(AskUntil(http_, "/healthz", 200).status, 200);
+  service_->SetRetention({});
+  EXPECT_EQ(Ask(http_, "/readyz").body, "ok\n");
+  EXPECT_EQ(Metrics().at(R"(roadatlas_uploads_refused_total{reason="quota"})"), 1);
+  EXPECT_GT(Metrics().at("roadatlas_store_used_bytes"), 1e4);
+}
+
+// It takes no more keyframes of that size, though it has a little room.
+TEST_F(OperationsPortTest, AnUploadThatAStoreRefusedCountsForAWhile) {
+  ServeWithOperations();
+  UploadDrive(1);
+  service_->SetRetention({{.store_bytes = store_->ReadRoom().used_bytes + 1}, false});
+  EXPECT_EQ(AskUntil(http_, "/readyz", 200).body, "ok\n");
+  EXPECT_EQ(Upload(DriveUpload(1)).error().reason(), StatusReason::kStoreLimit);
+  EXPECT_EQ(Ask(http_, "/readyz").status, 503);
+}
+
 TEST_F(OperationsPortTest, ANetworkThreadThatHangsIsNamed) {
   net_.threads = 2;
   ServeWithOperations();

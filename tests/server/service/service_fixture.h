@@ -88,6 +88,8 @@ class ServiceTest : public ::testing::Test {
     service.past_cache_bytes = 1u << 20;
     service.scratch_directory = directory_;
     service.backup = backups_;
+    service.retention = retention_;
+    service.compaction = compaction_;
     service_ = std::make_unique<AtlasService>(
         *store_, [this] { return now_ms_.load(); }, [](LogLevel, const std::string&) {}, service);
   }
@@ -133,6 +135,8 @@ class ServiceTest : public ::testing::Test {
   SurveyCacheLimits surveys_{100'000, 100'000};
   SurveyFilesOptions survey_files_;  // none
   BackupOptions backups_;            // none
+  Retention retention_;              // no limits
+  AutomaticCompactionOptions compaction_;
   std::filesystem::path directory_;
   std::atomic<std::int64_t> now_ms_{kTestNow_ms};
   std::unique_ptr<AtlasStore> store_;

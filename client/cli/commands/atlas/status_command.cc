@@ -5,6 +5,11 @@
 namespace atlas {
 namespace {
 
+boost::json::value FreeJson(const AtlasStatus& status) {
+  return status.disk_free_bytes ? boost::json::value(*status.disk_free_bytes)
+                                : boost::json::value(nullptr);
+}
+
 boost::json::object StatusJson(const AtlasStatus& status, const MapProfile& profile) {
   return {{"revision", status.revision},
           {"preset", FusionPresetName(profile.preset)},
@@ -19,7 +24,27 @@ boost::json::object StatusJson(const AtlasStatus& status, const MapProfile& prof
           {"cells", status.cells},
           {"multilayer_cells", status.multilayer_cells},
           {"rss_bytes", status.rss_bytes},
-          {"compacted", status.compacted}};
+          {"compacted", status.compacted},
+          {"used_bytes", status.used_bytes},
+          {"store_limit_bytes", status.store_limit_bytes},
+          {"disk_free_bytes", FreeJson(status)},
+          {"disk_floor_bytes", status.disk_floor_bytes},
+          {"refusing", status.refusing}};
+}
+
+// What uploads may take, where anything bounds them.
+void AddLimits(const AtlasStatus& status, FactList& facts) {
+  if (status.store_limit_bytes != 0) {
+    facts.Add("store limit",
+              BytesText(status.used_bytes) + " in use, of " + BytesText(status.store_limit_bytes));
+  }
+  if (status.disk_floor_bytes != 0 && status.disk_free_bytes) {
+    facts.Add("disk", BytesText(*status.disk_free_bytes) + " free, of which " +
+                          BytesText(status.disk_floor_bytes) + " stay free");
+  }
+  if (!status.refusing.empty()) {
+    facts.Add("uploads", "refused: " + status.refusing);
+  }
 }
 
 void PrintStatus(const AtlasStatus& status, const MapProfile& profile, std::ostream& out) {
@@ -40,6 +65,7 @@ void PrintStatus(const AtlasStatus& status, const MapProfile& profile, std::ostr
   facts.Add("cells", std::to_string(status.cells) + ", of them " +
                          std::to_string(status.multilayer_cells) + " with several surfaces");
   facts.Add("store", BytesText(status.store_bytes));
+  AddLimits(status, facts);
   facts.Add("daemon memory", BytesText(status.rss_bytes));
   facts.Print(out);
 }

@@ -17,8 +17,10 @@ WriteQueue::WriteQueue(std::unique_ptr<Connection> connection,
     : connection_(std::move(connection)),
       options_(options),
       guard_(guard),
-      revision_(options_.read_revision(*connection_)),
-      thread_([this] { Loop(); }) {}
+      revision_(options_.read_revision(*connection_)) {
+  options_.look(*connection_);
+  thread_ = std::thread([this] { Loop(); });
+}
 
 WriteQueue::~WriteQueue() {
   {
@@ -150,6 +152,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
       return RollBack(std::move(status));
     }
     const std::uint64_t revision = options_.read_revision(*connection_);
+    options_.look(*connection_);
     connection_->Execute("COMMIT");
     if (connection_->total_changes() != changes_before) {
       commits_.Add(std::chrono::steady_clock::now() - begin);

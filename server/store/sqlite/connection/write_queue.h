@@ -32,6 +32,9 @@ class WriteQueue {
     std::function<std::uint64_t(Connection&)> read_revision = [](Connection&) {
       return std::uint64_t{0};
     };
+    // Looks at what there is, in each transaction before its commit, and once at the start.
+    std::function<void(Connection&)> look = [](Connection&) {
+    };
   };
   struct Operation {
     std::function<Status(Connection&)> run;     // in a savepoint

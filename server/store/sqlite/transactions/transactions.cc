@@ -8,6 +8,7 @@
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/stored_bytes.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
@@ -153,6 +154,13 @@ Result<SessionRow> FindOrBeginSession(Connection& connection, const NewKeyframe&
   return AddSession(connection, key);
 }
 
+Status CheckRoom(Connection& connection, const NewKeyframe& keyframe, UploadRoom& room) {
+  const std::string& vehicle = keyframe.key.session.vehicle;
+  return room.Check({vehicle, keyframe.blob.size(), ReadVehicleBytes(connection, vehicle),
+                     ReadUsedBytes(connection)},
+                    UploadRoom::Clock::now());
+}
+
 Status CheckKeysDiffer(const PoseBatch& batch) {
   std::set<KeyframeKey> seen;
   for (const NewPose& update : batch.poses) {
@@ -166,13 +174,18 @@ Status CheckKeysDiffer(const PoseBatch& batch) {
 
 }  // namespace
 
-Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKeyframe& keyframe) {
+Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
+                                             const NewKeyframe& keyframe,
+                                             UploadRoom& room) {
   const auto session = FindOrBeginSession(connection, keyframe);
   if (!session) {
     return Error(session.error());
   }
   const auto stored = FindUpload(connection, session->id, keyframe.key.sequence);
   if (stored && !*stored) {
+    if (Status status = CheckRoom(connection, keyframe, room); !status.ok()) {
+      return Error(std::move(status));
+    }
     return AddKeyframe(connection, keyframe, *session);
   }
   const auto healed = HealInStore(connection, session->id, keyframe);

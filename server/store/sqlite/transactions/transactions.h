@@ -6,10 +6,13 @@
 #include "core/base/status.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/store_types.h"
+#include "server/store/upload_room.h"
 
 namespace atlas {
 
-Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection, const NewKeyframe& keyframe);
+Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
+                                             const NewKeyframe& keyframe,
+                                             UploadRoom& room);
 Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBatch& batch);
 // `levels` of the pyramid: the parent of a changed tile is marked if it is one of them.
 Result<FinishResult> FinishTileInStore(Connection& connection,

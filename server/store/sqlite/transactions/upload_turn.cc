@@ -8,12 +8,14 @@
 
 namespace atlas {
 
-Result<PutKeyframeResult> PutInTurn(Connection& connection, const NewKeyframe& keyframe) {
+Result<PutKeyframeResult> PutInTurn(Connection& connection,
+                                    const NewKeyframe& keyframe,
+                                    UploadRoom& room) {
   if (Status status = keyframe.missing->CheckTurn(keyframe.key); !status.ok()) {
     return Error(std::move(status));
   }
   try {
-    auto result = PutKeyframeInStore(connection, keyframe);
+    auto result = PutKeyframeInStore(connection, keyframe, room);
     keyframe.missing->NoteEnd(keyframe.key, result ? Status() : result.error());
     return result;
   } catch (const std::exception& error) {
