@@ -87,6 +87,10 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.scrub.bytes_per_s = config.scrub_kib_per_s * 1024.0;
   options.scrub.between = std::chrono::hours(config.scrub_hours);
   options.sessions_per_hour = static_cast<std::uint32_t>(config.vehicle_sessions_per_hour);
+  options.plausibility.max_speed_mps = config.quarantine_speed_mps;
+  options.plausibility.max_jump_m = config.quarantine_jump_m;
+  options.plausibility.max_climb_mps = config.quarantine_climb_mps;
+  options.plausibility.max_height_jump_m = config.quarantine_height_jump_m;
   options.backup.folder = config.backup_folder;
   options.backup.bytes_per_s = config.backup_mib_per_s * double{1u << 20};
   options.scratch_directory = config.data;

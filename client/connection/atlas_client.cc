@@ -82,6 +82,7 @@ AtlasStatus StatusFromWire(const wire::StatusReply& reply) {
   status.multilayer_cells = reply.multilayer_cells();
   status.rss_bytes = reply.rss_bytes();
   status.compacted = reply.compacted();
+  status.quarantined = reply.quarantined();
   return status;
 }
 
@@ -95,6 +96,7 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   session.last_time_ms = info.last_time_ms();
   session.last_sequence = info.last_sequence();
   session.compacted = info.compacted();
+  session.reason = info.reason();
   return session;
 }
 

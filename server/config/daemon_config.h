@@ -51,7 +51,12 @@ struct DaemonConfig {
   int name_mib_per_s = 64;
   int name_served_mib_per_s = 256;
   int vehicle_sessions_per_hour = 1'000;  // that it may begin; 0: no limit
-  std::optional<HostPort> http;           // the operations port; none: off
+  // How far keyframes that follow each other may be apart (server/store/plausibility.h).
+  int quarantine_speed_mps = 90;  // 0: as far as they like, as with the climb
+  int quarantine_jump_m = 250;
+  int quarantine_climb_mps = 15;
+  int quarantine_height_jump_m = 20;
+  std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.
   std::filesystem::path tls_certificate;

@@ -53,6 +53,7 @@ struct ServiceOptions {
   ScrubOptions scrub;
   BackupOptions backup;
   std::uint32_t sessions_per_hour = 1'000;    // that one vehicle may begin; 0: no limit
+  PlausibilityLimits plausibility;            // sessions that break them are quarantined
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
   // Where the digest of an earlier revision sets tiles aside: a disk.
   std::filesystem::path scratch_directory = std::filesystem::temp_directory_path();
@@ -147,6 +148,7 @@ class AtlasService {
   void Stop();
 
  private:
+  void LogJudgement(const SessionKey& session, const SessionJudgement& judgement) const;
   std::function<Status()> CheckPast(std::uint64_t revision, const Patience& patience) const;
   void RebuildDamaged(const TileId& id);
   Result<PoseBatch> PlacePoses(PoseBatchRequest request);

@@ -18,7 +18,7 @@ from roadatlas.tls import Tls
 from roadatlas.watch import Watch
 
 PROTOCOL_MAJOR = 1
-PROTOCOL_MINOR = 8
+PROTOCOL_MINOR = 9
 _FIELD_OF = {field.message_type.full_name: field.name
              for field in atlas_pb2.Envelope.DESCRIPTOR.oneofs_by_name["body"].fields}
 _REPLY_TO = {"hello": "hello_reply", "upload_keyframe": "upload_reply", "update_poses": "update_poses_reply",
@@ -141,7 +141,7 @@ class AtlasClient:
 
     def change_session(self, vehicle: str, session: str, action: int, author: str = "",
                        reason: str = "") -> atlas_pb2.ChangeSessionReply:
-        """`action` is ChangeSession.RETRACT or .RESTORE."""
+        """`action` is ChangeSession.RETRACT, .RESTORE, .RELEASE or .PURGE."""
         return self._call(atlas_pb2.ChangeSession(vehicle=vehicle, session=session, action=action, author=author,
                                                   reason=reason))
 

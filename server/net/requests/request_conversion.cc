@@ -28,6 +28,10 @@ std::string StateName(SessionState state) {
       return "quarantined";
     case SessionState::kRetracted:
       return "retracted";
+    case SessionState::kReleased:
+      return "released";
+    case SessionState::kPurged:
+      return "purged";
   }
   return "unknown";
 }
@@ -106,10 +110,16 @@ Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message) 
     case wire::ChangeSession::RESTORE:
       change.action = SessionAction::kRestore;
       return change;
+    case wire::ChangeSession::RELEASE:
+      change.action = SessionAction::kRelease;
+      return change;
+    case wire::ChangeSession::PURGE:
+      change.action = SessionAction::kPurge;
+      return change;
     default:
       return Error(StatusCode::kInvalidArgument,
                    StrCat("session: unknown action ", static_cast<int>(message.action()),
-                          ", expected to retract (1) or to restore (2)"));
+                          ", expected to retract (1), restore (2), release (3) or purge (4)"));
   }
 }
 
@@ -154,6 +164,7 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
   out.set_rss_bytes(status.rss_bytes);
   out.set_damaged_tiles(status.damaged_tiles);
   out.set_compacted(counts.compacted);
+  out.set_quarantined(counts.quarantined);
 }
 
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {
@@ -172,6 +183,7 @@ void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
   out.set_last_time_ms(record.last_time_ms);
   out.set_last_sequence(record.last_sequence);
   out.set_compacted(record.compacted);
+  out.set_reason(record.reason);
 }
 
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out) {

@@ -1,6 +1,6 @@
 // Fills the atlas of a daemon with many small tiles, so that it knows of far more tiles than a
 // reply has room for. Usage: wide_atlas PORT SIDE: keyframes on a grid, SIDE along each side, each
-// in a tile of its own.
+// in a tile of its own, row by row there and back.
 #include <cstdint>
 #include <cstdlib>
 #include <iostream>
@@ -28,9 +28,11 @@ Status Run(std::uint16_t port, int side) {
   const Bytes blob = EncodeKeyframe(StreetKeyframe(profile, kRadius_cells, 1));
   KeyframeUploader uploader(*client);
   for (int i = 0; i < side * side; ++i) {
+    const int row = i / side;
+    const int column = row % 2 == 0 ? i % side : side - 1 - i % side;
     Pose pose = Pose::Identity();
-    pose.translation() = Eigen::Vector3d((i % side + 0.5) * profile.tile_size_m(),
-                                         (i / side + 0.5) * profile.tile_size_m(), 1.8);
+    pose.translation() = Eigen::Vector3d((column + 0.5) * profile.tile_size_m(),
+                                         (row + 0.5) * profile.tile_size_m(), 1.8);
     KeyframeUpload upload;
     upload.key = {{"wide", "grid"}, static_cast<std::uint32_t>(i)};
     upload.time_ms = kTime_ms + i;

@@ -11,6 +11,8 @@ from roadatlas.errors import ConnectionLost
 from support import pose_at
 
 RETRACT = atlas_pb2.ChangeSession.RETRACT
+RELEASE = atlas_pb2.ChangeSession.RELEASE
+PURGE = atlas_pb2.ChangeSession.PURGE
 
 
 class RolesTest(FleetCase):
@@ -48,10 +50,11 @@ class RolesTest(FleetCase):
     def test_sessions_and_verifications(self):
         self.car.upload_keyframe(keyframe_of("car.7", self.car))
         verify = atlas_pb2.VerifyRequest(timeout_ms=60_000)
+        for client in (self.car, self.reader, self.merge):
+            for action in (RETRACT, RELEASE, PURGE):
+                self.refused(client, client.change_session, "car.7", "s", action)
         for client in (self.car, self.reader):
-            self.refused(client, client.change_session, "car.7", "s", RETRACT)
             self.refused(client, lambda client=client: client.result(client.submit(verify), 60_000))
-        self.refused(self.merge, self.merge.change_session, "car.7", "s", RETRACT)
         self.assertEqual(self.merge.result(self.merge.submit(verify), 60_000).damaged, 0)
         self.assertTrue(self.admin.change_session("car.7", "s", RETRACT).changed)
 

@@ -34,11 +34,13 @@ class WriteQueue {
     };
   };
   struct Operation {
-    std::function<Status(Connection&)> run;     // in a savepoint
+    std::function<Status(Connection&)> run;     // in a savepoint, unless it is alone
     std::function<void(const Status&)> finish;  // after the commit; must not block
     // Before that: once all can see what it wrote, or it is certain that nobody will, and before
     // the revision tells of it; must not block, nor throw. May be empty.
     std::function<void()> settle = {};
+    // A transaction of its own, without a savepoint, which would keep in memory what it overwrites.
+    bool is_alone = false;
   };
 
   // `guard` outlives this: once it says so, everything is refused.
