@@ -38,6 +38,14 @@ Status CheckSecurity(const DaemonConfig& config) {
   return {};
 }
 
+// What depends on more than one setting.
+Status CheckTogether(const DaemonConfig& config, const GivenSettings& given) {
+  if (const auto listen = given.find("listen"); listen != given.end()) {
+    ATLAS_RETURN_IF_ERROR(CheckListen(config, listen->second));
+  }
+  return CheckSecurity(config);
+}
+
 }  // namespace
 
 bool IsLoopback(const std::string& host) {
@@ -60,13 +68,8 @@ Result<DaemonConfig> ConfigFrom(const GivenSettings& given) {
       return Error(status.WithContext(setting.origin));
     }
   }
-  if (const auto listen = given.find("listen"); listen != given.end()) {
-    if (Status status = CheckListen(config, listen->second); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  if (Status status = CheckSecurity(config); !status.ok()) {
-    return Error(std::move(status));
+  if (const Status status = CheckTogether(config, given); !status.ok()) {
+    return Error(status);
   }
   return config;
 }

@@ -126,6 +126,9 @@ TEST_F(QuarantineTest, CorrectedPosesAreNotJudgedAndDoNotCount) {
   EXPECT_EQ(State(), SessionState::kLive);
   PutAt(5, 5);
   EXPECT_EQ(State(), SessionState::kLive) << "its neighbour was uploaded near it";
+  ASSERT_TRUE(Update({{{kDay, 5}, PoseAt(kFar_m * 1'000'000), {kB}}}).has_value());
+  PutAt(6, kFar_m);
+  EXPECT_EQ(State(), SessionState::kQuarantined) << "its neighbour was uploaded far from it";
 }
 
 TEST_F(QuarantineTest, WithoutLimitsNobodyIsJudged) {
