@@ -144,6 +144,7 @@ void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
 void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out) {
   out.set_changed(result.is_changed);
   out.set_sessions(result.sessions);
+  out.set_keyframes(result.keyframes);
   out.set_state(StateName(result.state));
   out.set_tiles_marked(result.tiles_marked);
   out.set_revision(result.revision);
