@@ -92,6 +92,10 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.retention.limits.disk_floor_bytes = static_cast<std::uint64_t>(config.disk_floor_mib)
                                               << 20;
   options.retention.is_compacting = config.is_compacting;
+  options.plausibility.max_speed_mps = config.quarantine_speed_mps;
+  options.plausibility.max_jump_m = config.quarantine_jump_m;
+  options.plausibility.max_climb_mps = config.quarantine_climb_mps;
+  options.plausibility.max_height_jump_m = config.quarantine_height_jump_m;
   options.backup.folder = config.backup_folder;
   options.backup.bytes_per_s = config.backup_mib_per_s * double{1u << 20};
   options.scratch_directory = config.data;

@@ -87,6 +87,7 @@ AtlasStatus StatusFromWire(const wire::StatusReply& reply) {
   if (reply.has_disk_free_bytes()) status.disk_free_bytes = reply.disk_free_bytes();
   status.disk_floor_bytes = reply.disk_floor_bytes();
   status.refusing = reply.refusing();
+  status.quarantined = reply.quarantined();
   return status;
 }
 
@@ -100,6 +101,7 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   session.last_time_ms = info.last_time_ms();
   session.last_sequence = info.last_sequence();
   session.compacted = info.compacted();
+  session.reason = info.reason();
   return session;
 }
 

@@ -97,7 +97,8 @@ struct AtlasStatus {
   std::uint64_t cells = 0;
   std::uint64_t multilayer_cells = 0;
   std::uint64_t rss_bytes = 0;
-  std::uint64_t compacted = 0;  // keyframes that compactions dropped
+  std::uint64_t compacted = 0;    // keyframes that compactions dropped
+  std::uint64_t quarantined = 0;  // sessions; 0 from a daemon before 1.9
   // Of a daemon of protocol 1.9; limits of 0 are none.
   std::uint64_t used_bytes = 0;         // pages of the database
   std::uint64_t store_limit_bytes = 0;  // of those, for uploads
@@ -120,6 +121,7 @@ struct SessionSummary {
   std::int64_t last_time_ms = 0;
   std::uint32_t last_sequence = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
+  std::string reason;           // of a state that is not "live"; empty: of a daemon before 1.9, too
 };
 
 struct SessionChangeSummary {
@@ -127,7 +129,8 @@ struct SessionChangeSummary {
   std::string state;  // after it
   std::uint32_t tiles_marked = 0;
   std::uint64_t revision = 0;
-  std::uint32_t sessions = 0;  // that changed; 0 from a daemon before 1.8
+  std::uint32_t sessions = 0;   // that changed; 0 from a daemon before 1.8
+  std::uint64_t keyframes = 0;  // that were deleted
 };
 
 struct DigestSummary {

@@ -15,6 +15,21 @@ using Body = wire::Envelope;
 using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithLog = 8;
+constexpr std::uint32_t kMinorWithQuarantine = 9;
+
+wire::ChangeSession::Action ActionToWire(SessionAction action) {
+  switch (action) {
+    case SessionAction::kRetract:
+      return wire::ChangeSession::RETRACT;
+    case SessionAction::kRestore:
+      return wire::ChangeSession::RESTORE;
+    case SessionAction::kRelease:
+      return wire::ChangeSession::RELEASE;
+    case SessionAction::kPurge:
+      break;
+  }
+  return wire::ChangeSession::PURGE;
+}
 
 Result<VerifySummary> CallVerify(RpcChannel& channel,
                                  wire::Envelope& request,
@@ -37,14 +52,13 @@ Result<SessionChangeSummary> CallChangeSession(RpcChannel& channel,
   wire::ChangeSession& change = *request.mutable_change_session();
   change.set_vehicle(key.vehicle);
   change.set_session(key.session);
-  change.set_action(action == SessionAction::kRetract ? wire::ChangeSession::RETRACT
-                                                      : wire::ChangeSession::RESTORE);
+  change.set_action(ActionToWire(action));
   change.set_author(author);
   const auto reply = channel.Call(request, Body::kChangeSessionReply);
   if (!reply) return Error(reply.error());
   const wire::ChangeSessionReply& done = reply->change_session_reply();
-  return SessionChangeSummary{done.changed(), done.state(), done.tiles_marked(), done.revision(),
-                              done.sessions()};
+  return SessionChangeSummary{done.changed(),  done.state(),    done.tiles_marked(),
+                              done.revision(), done.sessions(), done.keyframes()};
 }
 
 }  // namespace
@@ -67,6 +81,12 @@ Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
                                                         SessionAction action,
                                                         const std::string& author) {
   if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
+  if (action == SessionAction::kRelease || action == SessionAction::kPurge) {
+    if (Status status = CheckMinor(kMinorWithQuarantine, "to release or purge a session");
+        !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
   return CallChangeSession(*channel_, key, action, author);
 }
 

@@ -5,7 +5,8 @@
 
 namespace atlas {
 
-// kRetract takes a session out of the map, kRestore makes a retracted one what it was before.
-enum class SessionAction : std::uint8_t { kRetract, kRestore };
+// kRetract takes a session out of the map, kRestore puts a retracted one back. kRelease keeps one
+// in the map whatever its keyframes look like. kPurge deletes it for good.
+enum class SessionAction : std::uint8_t { kRetract, kRestore, kRelease, kPurge };
 
 }  // namespace atlas

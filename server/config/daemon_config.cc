@@ -38,7 +38,7 @@ Status CheckSecurity(const DaemonConfig& config) {
   return {};
 }
 
-// What no setting shows by itself.
+// What depends on more than one setting.
 Status CheckTogether(const DaemonConfig& config, const GivenSettings& given) {
   if (const auto listen = given.find("listen"); listen != given.end()) {
     ATLAS_RETURN_IF_ERROR(CheckListen(config, listen->second));

@@ -52,10 +52,15 @@ struct DaemonConfig {
   int name_served_mib_per_s = 256;
   int vehicle_sessions_per_hour = 1'000;  // that it may begin; 0: no limit
   // How much may be stored; 0: no limit.
-  int store_mib = 0;             // the database
-  int vehicle_mib = 0;           // keyframes of one vehicle
-  int disk_floor_mib = 256;      // that stay free on the disk
-  bool is_compacting = false;    // when the store is nearly full
+  int store_mib = 0;           // the database
+  int vehicle_mib = 0;         // keyframes of one vehicle
+  int disk_floor_mib = 256;    // that stay free on the disk
+  bool is_compacting = false;  // when the store is nearly full
+  // How far keyframes that follow each other may be apart (server/store/plausibility.h).
+  int quarantine_speed_mps = 90;  // 0: as far as they like, as with the climb
+  int quarantine_jump_m = 250;
+  int quarantine_climb_mps = 15;
+  int quarantine_height_jump_m = 20;
   std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.

@@ -65,6 +65,8 @@ void AddAtlas(const ServiceStatus& status, Families& out) {
   AddGauge(out, "tiles", "Tiles of all levels.", counts.tiles);
   AddGauge(out, "tile_bytes", "Bytes of their blobs.", counts.tile_bytes);
   AddGauge(out, "dirty_tiles", "Tiles to be fused again.", counts.dirty_tiles);
+  AddGauge(out, "quarantined_sessions", "Sessions kept out of the map because they look wrong.",
+           status.counts.quarantined);
   AddGauge(out, "damaged_tiles", "Dirty tiles that damage keeps from being fused.",
            status.damaged_tiles);
   AddGauge(out, "store_bytes", "Bytes of the atlas on disk.", counts.store_bytes);

@@ -76,7 +76,27 @@ Result<NewKeyframe> AtlasService::CheckUpload(UploadRequest request) const {
 
 void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done) {
   keyframe.start = std::make_shared<SessionStart>(starts_);
-  store_.PutKeyframe(std::move(keyframe), Notifying(changes_, std::move(done)));
+  keyframe.limits = options_.plausibility;
+  const auto report = [this, session = keyframe.key.session,
+                       done = std::move(done)](Result<PutKeyframeResult> result) {
+    if (result && result->judgement) {
+      LogJudgement(session, *result->judgement);
+    }
+    done(std::move(result));
+  };
+  store_.PutKeyframe(std::move(keyframe), Notifying<PutKeyframeResult>(changes_, report));
+}
+
+void AtlasService::LogJudgement(const SessionKey& session,
+                                const SessionJudgement& judgement) const {
+  if (judgement.state == SessionState::kQuarantined) {
+    log_(LogLevel::kWarning,
+         StrCat("session ", session, " is quarantined, its keyframes are not in the map: ",
+                judgement.reason, "; atlas session release, retract or purge"));
+  } else {
+    log_(LogLevel::kInfo,
+         StrCat("session ", session, " is plausible again, its keyframes are in the map"));
+  }
 }
 
 void AtlasService::Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done) {
@@ -103,6 +123,7 @@ void AtlasService::ChangeSession(SessionChange change, AtlasStore::Done<SessionC
     done(Error(std::move(status)));
     return;
   }
+  change.limits = options_.plausibility;
   store_.ChangeSession(std::move(change), Notifying(changes_, std::move(done)));
 }
 

@@ -61,6 +61,7 @@ struct ServiceOptions {
   ScrubOptions scrub;
   BackupOptions backup;
   std::uint32_t sessions_per_hour = 1'000;  // that one vehicle may begin; 0: no limit
+  PlausibilityLimits plausibility;          // sessions that break them are quarantined
   Retention retention;
   AutomaticCompactionOptions compaction;
   std::size_t past_cache_bytes = 128u << 20;  // all requests for earlier revisions together
@@ -158,6 +159,7 @@ class AtlasService {
   void Stop();
 
  private:
+  void LogJudgement(const SessionKey& session, const SessionJudgement& judgement) const;
   std::function<Status()> CheckPast(std::uint64_t revision, const Patience& patience) const;
   void RebuildDamaged(const TileId& id);
   Result<PoseBatch> PlacePoses(PoseBatchRequest request);

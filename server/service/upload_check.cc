@@ -86,6 +86,13 @@ Status CheckSessionChange(const SessionChange& change) {
   ATLAS_RETURN_IF_ERROR(change.key.session.empty() ? ValidateName("vehicle", change.key.vehicle)
                                                    : change.key.Validate());
   ATLAS_RETURN_IF_ERROR(CheckAuthor(change.author));
+  const bool is_of_one =
+      change.action == SessionAction::kRelease || change.action == SessionAction::kPurge;
+  if (is_of_one && change.key.session.empty()) {
+    return Status(StatusCode::kInvalidArgument,
+                  StrCat("vehicle ", change.key.vehicle,
+                         ": sessions are released and purged one by one; name the session"));
+  }
   const bool is_line = std::none_of(change.reason.begin(), change.reason.end(), [](char c) {
     return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
   });

@@ -3,19 +3,28 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/session_action.h"
+#include "server/store/plausibility.h"
 
 namespace atlas {
 
-// Frozen numbers (docs/formats/store.md). Only kLive and kRetracted occur yet.
-enum class SessionState : std::uint8_t { kStaged = 0, kLive = 1, kQuarantined = 2, kRetracted = 3 };
+// Frozen numbers (docs/formats/store.md).
+enum class SessionState : std::uint8_t {
+  kStaged = 0,  // does not occur yet
+  kLive = 1,
+  kQuarantined = 2,  // two neighbours of its keyframes are implausible (plausibility.h)
+  kRetracted = 3,
+  kReleased = 4,  // live, whatever its keyframes look like: somebody said so
+  kPurged = 5,    // nothing is left of it but its name, which takes no keyframes any more
+};
 
 // The map is made of the keyframes of such sessions.
 inline bool IsInMap(SessionState state) {
-  return state == SessionState::kLive;
+  return state == SessionState::kLive || state == SessionState::kReleased;
 }
 
 // The times and the last sequence are those of all keyframes that were ever uploaded.
@@ -28,6 +37,7 @@ struct SessionRecord {
   std::int64_t last_time_ms = 0;
   std::uint32_t last_sequence = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
+  std::string reason = {};      // of its state, unless it is live; may be empty
 };
 
 // No keyframe was uploaded yet.
@@ -40,6 +50,8 @@ struct SessionChange {
   SessionAction action = SessionAction::kRetract;
   std::string author;
   std::string reason;
+  // A restored session is judged by them; none: it becomes what it was.
+  std::optional<PlausibilityLimits> limits = {};
 };
 
 struct SessionChangeResult {
@@ -47,7 +59,14 @@ struct SessionChangeResult {
   bool is_changed = false;
   std::uint32_t tiles_marked = 0;  // of each session that changed
   std::uint64_t revision = 0;
-  std::uint32_t sessions = 0;  // that changed
+  std::uint32_t sessions = 0;   // that changed
+  std::uint64_t keyframes = 0;  // that were deleted
+};
+
+// The state that a session is in because of what its keyframes look like.
+struct SessionJudgement {
+  SessionState state = SessionState::kLive;
+  std::string reason;  // for people
 };
 
 }  // namespace atlas

@@ -65,15 +65,17 @@ struct NewKeyframe {
   std::array<std::int32_t, 4> level_quaternion{};
   std::optional<PositionPrior> prior;
   Bytes blob;
-  std::vector<TileId> footprint;            // the level-0 tiles it touches at `pose`
-  std::shared_ptr<MissingUploads> missing;  // of who sends it; null: order does not matter
-  std::shared_ptr<SessionStart> start;      // of its session; null: as many as they like
+  std::vector<TileId> footprint;             // the level-0 tiles it touches at `pose`
+  std::shared_ptr<MissingUploads> missing;   // of who sends it; null: order does not matter
+  std::shared_ptr<SessionStart> start;       // of its session; null: as many as they like
+  std::optional<PlausibilityLimits> limits;  // none: its session is not judged
 };
 
 struct PutKeyframeResult {
   bool is_duplicate = false;
   std::uint64_t revision = 0;
   std::uint32_t tiles_marked = 0;
+  std::optional<SessionJudgement> judgement = {};  // that put its session into another state
 };
 
 struct NewPose {
@@ -190,6 +192,7 @@ struct StoreCounts {
   std::uint64_t keyframe_bytes = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
   std::uint64_t sessions = 0;
+  std::uint64_t quarantined = 0;  // of the sessions
   std::uint64_t tiles = 0;
   std::uint64_t tile_bytes = 0;
   std::uint64_t cells = 0;             // level 0

@@ -18,6 +18,8 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeSessionsCommand());
   commands.push_back(MakeSessionRetractCommand());
   commands.push_back(MakeSessionRestoreCommand());
+  commands.push_back(MakeSessionReleaseCommand());
+  commands.push_back(MakeSessionPurgeCommand());
   commands.push_back(MakeVehicleRetractCommand());
   commands.push_back(MakeVehicleRestoreCommand());
   commands.push_back(MakeCompactCommand());

@@ -120,7 +120,7 @@ class AtlasClient:
 
     def change_session(self, vehicle: str, session: str, action: int, author: str = "",
                        reason: str = "") -> atlas_pb2.ChangeSessionReply:
-        """`action` is ChangeSession.RETRACT or .RESTORE."""
+        """`action` is ChangeSession.RETRACT, .RESTORE, .RELEASE or .PURGE."""
         return self._call(atlas_pb2.ChangeSession(vehicle=vehicle, session=session, action=action, author=author,
                                                   reason=reason))
 

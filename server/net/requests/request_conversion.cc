@@ -28,6 +28,10 @@ std::string StateName(SessionState state) {
       return "quarantined";
     case SessionState::kRetracted:
       return "retracted";
+    case SessionState::kReleased:
+      return "released";
+    case SessionState::kPurged:
+      return "purged";
   }
   return "unknown";
 }
@@ -106,10 +110,16 @@ Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message) 
     case wire::ChangeSession::RESTORE:
       change.action = SessionAction::kRestore;
       return change;
+    case wire::ChangeSession::RELEASE:
+      change.action = SessionAction::kRelease;
+      return change;
+    case wire::ChangeSession::PURGE:
+      change.action = SessionAction::kPurge;
+      return change;
     default:
       return Error(StatusCode::kInvalidArgument,
                    StrCat("session: unknown action ", static_cast<int>(message.action()),
-                          ", expected to retract (1) or to restore (2)"));
+                          ", expected to retract (1), restore (2), release (3) or purge (4)"));
   }
 }
 
@@ -134,6 +144,7 @@ void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
 void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out) {
   out.set_changed(result.is_changed);
   out.set_sessions(result.sessions);
+  out.set_keyframes(result.keyframes);
   out.set_state(StateName(result.state));
   out.set_tiles_marked(result.tiles_marked);
   out.set_revision(result.revision);
@@ -162,6 +173,7 @@ void StatusToWire(const ServiceStatus& status, wire::StatusReply& out) {
   }
   out.set_disk_floor_bytes(room.limits.disk_floor_bytes);
   out.set_refusing(std::string(StatusReasonName(room.refusing.reason())));
+  out.set_quarantined(counts.quarantined);
 }
 
 void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {
@@ -180,6 +192,7 @@ void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
   out.set_last_time_ms(record.last_time_ms);
   out.set_last_sequence(record.last_sequence);
   out.set_compacted(record.compacted);
+  out.set_reason(record.reason);
 }
 
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out) {

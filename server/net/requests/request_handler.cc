@@ -71,7 +71,7 @@ asio::awaitable<void> RequestHandler::Resume(SessionKey session,
     co_await out.SendError(reply.request_id(), found.error());
     co_return;
   }
-  if (*found) {
+  if (*found && (*found)->state != SessionState::kPurged) {
     reply.mutable_hello_reply()->set_last_sequence((*found)->last_sequence);
   }
   co_await out.Send(std::move(reply));

@@ -15,7 +15,8 @@ namespace asio = boost::asio;
 
 // More than one takes in a reply: two names of 64 bytes, a state of 11, six numbers, their tags.
 constexpr std::size_t kSessionBytes = 216;
-static_assert(kMaxSessionsOfPage * kSessionBytes <= kReplyBatchBytes);
+constexpr std::size_t kReasonBytes = 260;  // that some have besides: pages with many are shorter
+static_assert(kMaxSessionsOfPage * kSessionBytes + kReasonBytes <= kReplyBatchBytes);
 
 // Behind which one; nothing: from the first one on.
 Result<SessionKey> StartFromWire(const wire::SessionsRequest& message) {
@@ -32,12 +33,17 @@ Result<SessionKey> StartFromWire(const wire::SessionsRequest& message) {
 
 void PageToWire(const std::vector<SessionRecord>& found,
                 std::size_t limit,
+                std::size_t room_bytes,
                 wire::SessionsReply& out) {
-  const std::size_t count = std::min(found.size(), limit);
-  for (std::size_t i = 0; i < count; ++i) {
-    SessionToWire(found[i], *out.add_sessions());
+  std::size_t count = 0;
+  for (std::size_t bytes = 0; count < std::min(found.size(), limit); ++count) {
+    bytes += kSessionBytes + (found[count].reason.empty() ? 0 : kReasonBytes);
+    if (count > 0 && bytes > room_bytes) {
+      break;
+    }
+    SessionToWire(found[count], *out.add_sessions());
   }
-  out.set_has_more(found.size() > limit);
+  out.set_has_more(found.size() > count);
 }
 
 }  // namespace
@@ -54,12 +60,12 @@ asio::awaitable<Status> AnswerSessions(RequestContext& context,
       message.limit() == 0 ? kMaxSessionsOfPage : std::min(message.limit(), kMaxSessionsOfPage);
   TurnOrder::Turn turn(peer.streams);
   co_await turn.Come();
-  const ReplyWriter::Room room = co_await peer.out.TakeRoom(wanted * kSessionBytes);
+  const ReplyWriter::Room room = co_await peer.out.TakeRoom(wanted * kSessionBytes + kReasonBytes);
   if (!room) {
     co_return Status();
   }
   const auto limit =
-      static_cast<std::uint32_t>(std::max<std::size_t>(1, room.bytes() / kSessionBytes));
+      static_cast<std::uint32_t>(std::clamp<std::size_t>(room.bytes() / kSessionBytes, 1, wanted));
   const Blocking<std::vector<SessionRecord>> list = [&context, &after = *after, limit] {
     return context.service.ListSessions(after, limit + 1);  // whether there are more
   };
@@ -68,7 +74,7 @@ asio::awaitable<Status> AnswerSessions(RequestContext& context,
     co_return sessions.error();
   }
   wire::Envelope reply = ReplyTo(request);
-  PageToWire(*sessions, limit, *reply.mutable_sessions_reply());
+  PageToWire(*sessions, limit, room.bytes(), *reply.mutable_sessions_reply());
   peer.out.Push(reply);
   peer.out.Flush();
   co_return Status();

@@ -109,7 +109,8 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     Mend(*writer, identity->profile.levels);
     KeepVehicleBytes(*writer);
     identity->restores = RevisionsOf(*writer, EventKind::kBackupRestored);
-    return OpenedAtlas{std::move(*identity), std::move(writer)};
+    const bool has_purged = !RevisionsOf(*writer, EventKind::kSessionPurged).empty();
+    return OpenedAtlas{std::move(*identity), std::move(writer), has_purged};
   } catch (const std::exception& error) {
     return Error(StatusFromException(error).WithContext(directory.database_file().string()));
   }

@@ -41,8 +41,9 @@ DatabaseOptions ReaderOptions(const SqliteStoreOptions& options, std::filesystem
   return {std::move(file), DatabaseOptions::Mode::kReadOnly, options.reader_cache_kib, 5'000};
 }
 
+// Whoever is in the way is asked again later: a writer waits meanwhile.
 DatabaseOptions CopierOptions(std::filesystem::path file) {
-  return {std::move(file), DatabaseOptions::Mode::kReadWrite, 64, 5'000};
+  return {std::move(file), DatabaseOptions::Mode::kReadWrite, 64, 100};
 }
 
 std::uint64_t ReadRevision(Connection& connection) {
@@ -51,23 +52,24 @@ std::uint64_t ReadRevision(Connection& connection) {
 
 class SqliteStore final : public AtlasStore {
  public:
-  SqliteStore(const SqliteStoreOptions& options,
-              DataDirectory directory,
-              const StoreIdentity& identity,
-              std::unique_ptr<Connection> writer)
+  SqliteStore(const SqliteStoreOptions& options, DataDirectory directory, OpenedAtlas atlas)
       : directory_(std::move(directory)),
-        identity_(identity),
+        identity_(std::move(atlas.identity)),
         tiles_(options.tile_directory_bytes),
         room_([directory = options.directory] { return ReadFreeBytes(directory); }),
         guard_(options.on_failed_sync),
-        log_(CopierOptions(directory_.database_file()), {}, *writer, guard_),
-        writes_(std::move(writer),
+        log_(CopierOptions(directory_.database_file()), {}, *atlas.writer, guard_),
+        writes_(std::move(atlas.writer),
                 {options.max_queued_writes, options.max_group, &ReadRevision,
                  [this](Connection& connection) {
                    room_.NoteUsed(ReadUsedBytes(connection));
                  }},
                 guard_),
-        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {}
+        readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {
+    if (atlas.has_purged) {
+      log_.EmptySoon();
+    }
+  }
 
   const StoreIdentity& identity() const override { return identity_; }
   std::uint64_t revision() const override { return writes_.revision(); }
@@ -91,9 +93,18 @@ class SqliteStore final : public AtlasStore {
     });
   }
   void ChangeSession(SessionChange change, Done<SessionChangeResult> done) override {
-    Write<SessionChangeResult>(std::move(done), [c = std::move(change)](Connection& connection) {
-      return ChangeSessionInStore(connection, c);
-    });
+    const bool is_purge = change.action == SessionAction::kPurge;
+    WriteQueue::Operation operation = MakeWrite<SessionChangeResult>(
+        std::move(done), [c = std::move(change)](Connection& connection) {
+          return ChangeSessionInStore(connection, c);
+        });
+    operation.is_alone = is_purge;
+    if (is_purge) {
+      operation.settle = [this] {
+        log_.EmptySoon();
+      };
+    }
+    writes_.Submit(std::move(operation));
   }
   void Compact(Compaction compaction, Done<CompactionResult> done) override {
     Write<CompactionResult>(std::move(done), [c = std::move(compaction)](Connection& connection) {
@@ -323,23 +334,6 @@ class SqliteStore final : public AtlasStore {
   void Write(Done<T> done, Work work) {
     writes_.Submit(MakeWrite<T>(std::move(done), std::move(work)));
   }
-  template <typename T, typename Work>
-  static WriteQueue::Operation MakeWrite(Done<T> done, Work work) {
-    auto result = std::make_shared<Result<T>>(Error(StatusCode::kInternal, "store: not run"));
-    WriteQueue::Operation operation;
-    operation.run = [result, work = std::move(work)](Connection& connection) {
-      *result = work(connection);
-      return result->has_value() ? Status() : result->error();
-    };
-    operation.finish = [result, done = std::move(done)](const Status& status) {
-      if (status.ok()) {
-        done(std::move(*result));
-      } else {
-        done(Error(status));
-      }
-    };
-    return operation;
-  }
 
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   StoreIdentity identity_;
@@ -387,8 +381,7 @@ Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& op
   }
   const std::filesystem::path file = directory->database_file();
   try {
-    return std::make_unique<SqliteStore>(options, std::move(*directory), atlas->identity,
-                                         std::move(atlas->writer));
+    return std::make_unique<SqliteStore>(options, std::move(*directory), *std::move(atlas));
   } catch (const std::exception& error) {
     return Error(StatusFromException(error).WithContext(file.string()));
   }

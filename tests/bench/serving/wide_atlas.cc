@@ -1,6 +1,6 @@
 // Fills the atlas of a daemon with many small tiles, so that it knows of far more tiles than a
 // reply has room for. Usage: wide_atlas PORT SIDE: keyframes on a grid, SIDE along each side, each
-// in a tile of its own.
+// in a tile of its own, row by row there and back.
 #include <cstdint>
 #include <cstdlib>
 #include <iostream>
@@ -24,8 +24,9 @@ Status Run(std::uint16_t port, int side) {
   KeyframeUploader uploader(*client);
   for (int i = 0; i < side * side; ++i) {
     const KeyframeKey key{{"wide", "grid"}, static_cast<std::uint32_t>(i)};
-    ATLAS_RETURN_IF_ERROR(
-        uploader.Upload(WideUpload(client->profile(), blob, key, i % side, i / side)));
+    const int row = i / side;
+    const int column = row % 2 == 0 ? i % side : side - 1 - i % side;
+    ATLAS_RETURN_IF_ERROR(uploader.Upload(WideUpload(client->profile(), blob, key, column, row)));
   }
   return uploader.Finish();
 }

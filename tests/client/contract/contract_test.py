@@ -19,13 +19,13 @@ KEYS = {
     "ingest": "keyframes acked duplicates metres bytes_sent frontend_ms_per_scan sensor_height_m sessions wall_s",
     "wait": "revision dirty_tiles",
     "status": "revision preset keyframes sessions tiles dirty_tiles damaged_tiles store_bytes tile_bytes keyframe_bytes "
-              "cells multilayer_cells rss_bytes compacted used_bytes store_limit_bytes disk_free_bytes disk_floor_bytes "
-              "refusing",
+              "cells multilayer_cells rss_bytes compacted quarantined used_bytes store_limit_bytes disk_free_bytes "
+              "disk_floor_bytes refusing",
     "point": "layers",
     "query": "type tiles bytes revision truncated",
     "poses": "updated tiles_marked revision batch",
     "sessions": "sessions",
-    "session": "vehicle session state changed tiles_marked revision",
+    "session": "vehicle session state changed tiles_marked revision keyframes_deleted",
     "vehicle": "vehicle sessions changed tiles_marked revision",
     "watch": "type revision",
     "log": "events",

@@ -113,8 +113,43 @@ def live_cases(cases, drives, work):
     return moments
 
 
+def wild_cases(cases, drives):
+    """A drive that is faster than the daemon believes: out of the map, released, and purged."""
+    before = cases.run("digest")["digest"]
+    wild = drives.copy("wild")
+    done = cases.run("ingest", wild, *NEAR)
+    cases.report.equal("a wild drive: all are taken", (done["acked"], done["duplicates"]), (5, 0))
+    session = {session["session"]: session for session in cases.run("sessions")["sessions"]}["wild"]
+    cases.report.equal("a wild drive: state", (session["state"], cases.run("status")["quarantined"]),
+                       ("quarantined", 1))
+    cases.report.check("a wild drive: reason", "keyframe 0 to 1: 1 m in 0.25 s" in session["reason"], session["reason"])
+    cases.report.check("a wild drive: table", session["reason"] in cases.call("sessions").stdout)
+    cases.report.equal("a wild drive: the map", cases.run("digest")["digest"], before)
+    event = cases.run("log")["events"][-1]
+    cases.report.equal("a wild drive: log", (event["kind"], event["author"], event["subject"], event["detail"]),
+                       ("session_quarantined", "atlasd", "vehicle/wild", session["reason"]))
+    change(cases, "release", "wild", "released", True)
+    change(cases, "release", "wild", "released", False)
+    cases.report.check("released: another map", cases.run("digest")["digest"] != before)
+    revision = cases.run("status")["revision"]
+    cases.refused("purge without --yes", ["session", "purge", "vehicle/wild"], "invalid_argument", "--yes")
+    cases.report.equal("purge without --yes: nothing happened", cases.run("status")["revision"], revision)
+    purged = cases.run("session", "purge", "vehicle/wild", "--yes")
+    cases.report.equal("purged", (purged["state"], purged["changed"], purged["keyframes_deleted"]), ("purged", True, 5))
+    cases.run("wait")
+    cases.report.equal("purged: the map", cases.run("digest")["digest"], before)
+    cases.refused("purged: --at before", ["digest", "--at", purged["revision"] - 1], "not_found",
+                  f"the oldest is {purged['revision']}")
+    for word in ("retract", "restore", "release"):
+        cases.refused(f"purged: {word}", ["session", word, "vehicle/wild"], "conflict", "purged")
+    again = cases.run("session", "purge", "vehicle/wild", "--yes")
+    cases.report.equal("purged again", (again["changed"], again["keyframes_deleted"]), (False, 0))
+    kinds = [event["kind"] for event in cases.run("log")["events"]]
+    cases.report.equal("log of all that", kinds[-3:], ["session_quarantined", "session_released", "session_purged"])
+
+
 def refused_cases(cases):
-    for word in ("retract", "restore"):
+    for word in ("retract", "restore", "release"):
         for name in ("vehicle/nobody", "nobody/good"):
             cases.refused(f"session {word} {name}", ["session", word, name], "not_found", name)
         for name in ("vehicle", "", "/", "vehicle/", "/good", "vehicle/good/1", "a b/c", "ä/b", "x" * 65 + "/good"):
@@ -159,6 +194,8 @@ def main():
                              (horizon, checksum_of_counter(11, horizon)))
         with Daemon(bin_dir, data) as daemon:
             forgotten_cases(Cases(report, bin_dir, daemon.server), horizon)
+        with Daemon(bin_dir, data, "--quarantine-max-speed-mps", "1", "--quarantine-max-jump-m", "0") as daemon:
+            wild_cases(Cases(report, bin_dir, daemon.server), drives)
     print(f"{report.checks} checks, {report.failed} failed")
     return 1 if report.failed else 0
 

@@ -11,6 +11,8 @@ from roadatlas.errors import ConnectionLost
 from support import pose_at
 
 RETRACT = atlas_pb2.ChangeSession.RETRACT
+RELEASE = atlas_pb2.ChangeSession.RELEASE
+PURGE = atlas_pb2.ChangeSession.PURGE
 
 
 class RolesTest(FleetCase):
@@ -47,11 +49,12 @@ class RolesTest(FleetCase):
 
     def test_sessions_and_verifications(self):
         self.car.upload_keyframe(keyframe_of("car.7", self.car))
+        for client in (self.car, self.reader, self.merge):
+            for action in (RETRACT, RELEASE, PURGE):
+                self.refused(client, client.change_session, "car.7", "s", action)
         for client in (self.car, self.reader):
-            self.refused(client, client.change_session, "car.7", "s", RETRACT)
             self.refused(client, client.verify, 60_000)
             self.refused(client, client.log)
-        self.refused(self.merge, self.merge.change_session, "car.7", "s", RETRACT)
         self.refused(self.merge, lambda: self.merge.verify(60_000, repair=True))
         self.assertEqual(self.merge.verify(60_000).damaged, 0)
         self.assertEqual(self.merge.log(), [])

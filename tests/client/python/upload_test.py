@@ -12,6 +12,8 @@ from support import BIN_DIR, RADIUS_CELLS, SMALL, AtlasCase, Daemon, key, pose_a
 
 RETRACT = atlas_pb2.ChangeSession.RETRACT
 RESTORE = atlas_pb2.ChangeSession.RESTORE
+RELEASE = atlas_pb2.ChangeSession.RELEASE
+PURGE = atlas_pb2.ChangeSession.PURGE
 
 
 class UploadTest(AtlasCase):
@@ -135,6 +137,21 @@ class CorrectionTest(AtlasCase):
         self.assertEqual((after.sha256, after.tiles), (before.sha256, before.tiles))
         self.assertEqual(self.client.digest(60_000, at_revision=0).tiles, 0)
         self.refused(Code.NOT_FOUND, self.client.change_session, "car", "nobody", RETRACT)
+
+    def test_session_quarantined_released_and_purged(self):
+        before = self.client.digest(60_000)
+        self.client.upload_keyframe(self.upload(0, 0, "wild", radius_cells=20))
+        self.client.upload_keyframe(self.upload(1, 5_000, "wild", radius_cells=20))
+        _, wild = self.client.sessions()
+        self.assertEqual((wild.session, wild.state, self.client.status().quarantined), ("wild", "quarantined", 1))
+        self.assertRegex(wild.reason, "keyframe 0 to 1: 5000 m in ")
+        self.assertEqual(self.client.digest(60_000).sha256, before.sha256)
+        self.assertEqual(self.client.change_session("car", "wild", RELEASE).state, "released")
+        self.assertNotEqual(self.client.digest(60_000).sha256, before.sha256)
+        self.assertEqual(self.client.change_session("car", "wild", PURGE).keyframes, 2)
+        self.assertEqual(self.client.digest(60_000).sha256, before.sha256)
+        self.refused(Code.CONFLICT, self.client.upload_keyframe, self.upload(0, 0, "wild", radius_cells=20))
+        self.refused(Code.NOT_FOUND, self.client.digest, 60_000, before.revision)
 
 
 class SessionsTest(AtlasCase):

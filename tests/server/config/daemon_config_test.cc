@@ -59,6 +59,23 @@ TEST_F(DaemonConfigTest, FlagsGoBeforeEnvironmentBeforeFileBeforeDefault) {
   EXPECT_EQ(profile.segment_height_mm, 500);
 }
 
+TEST_F(DaemonConfigTest, WhatPutsASessionIntoQuarantineCanBeSet) {
+  const auto limits = [](const DaemonConfig& config) {
+    return std::vector<int>{config.quarantine_speed_mps, config.quarantine_jump_m,
+                            config.quarantine_climb_mps, config.quarantine_height_jump_m};
+  };
+  const auto usual = Parse({"--data", "/x"});
+  ASSERT_TRUE(usual.has_value()) << usual.error().message();
+  EXPECT_EQ(limits(usual->config), (std::vector<int>{90, 250, 15, 20}));
+  const auto other = Parse({"--config", File("data = '/x'\n[quarantine]\nmax_speed_mps = 0\n"
+                                             "max_jump_m = 1\nmax_climb_mps = 2\n"
+                                             "max_height_jump_m = 3\n")});
+  ASSERT_TRUE(other.has_value()) << other.error().message();
+  EXPECT_EQ(limits(other->config), (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_THAT(Refusal({"--data", "/x", "--quarantine-max-climb-mps", "-1"}),
+              HasSubstr("quarantine.max_climb_mps"));
+}
+
 TEST_F(DaemonConfigTest, AnUnknownKeyIsAnErrorWithItsLine) {
   EXPECT_THAT(RefusedFile("data = '/x'\n\nworker = 3\n"),
               HasSubstr("atlasd.toml: line 3: unknown key 'worker'"));

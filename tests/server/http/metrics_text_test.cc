@@ -18,6 +18,7 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   figures.atlas->counts.revision = 123'456'789'012;
   figures.atlas->counts.dirty_tiles = 5;
   figures.atlas->damaged_tiles = 2;
+  figures.atlas->counts.quarantined = 8;
   figures.atlas->building_s = 1.5;
   figures.rss_bytes = 1u << 30;
   figures.net.connections = 3;
@@ -34,6 +35,7 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   EXPECT_EQ(metrics.at("roadatlas_revision"), 123'456'789'012);
   EXPECT_EQ(metrics.at("roadatlas_dirty_tiles"), 5);
   EXPECT_EQ(metrics.at("roadatlas_damaged_tiles"), 2);
+  EXPECT_EQ(metrics.at("roadatlas_quarantined_sessions"), 8);
   EXPECT_EQ(metrics.at("roadatlas_fusion_seconds_total"), 1.5);
   EXPECT_EQ(metrics.at("roadatlas_resident_bytes"), 1u << 30);
   EXPECT_EQ(metrics.at("roadatlas_connections"), 3);

@@ -74,6 +74,44 @@ TEST_F(HistoryRequestTest, ASessionIsRetractedAndRestored) {
   EXPECT_EQ(Digest().sha256, before.sha256);
 }
 
+TEST_F(HistoryRequestTest, ASessionIsQuarantinedReleasedAndPurged) {
+  Serve();
+  UploadDrive(2);
+  UploadRequest wild = DriveUpload(2);
+  wild.pose.x_um += 5'000 * std::int64_t{1'000'000};
+  ASSERT_TRUE(Upload(wild).has_value());
+  const auto peer = Connect();
+  const auto session = [&peer] {
+    wire::Envelope sessions;
+    sessions.mutable_sessions_request();
+    peer->Send(sessions);
+    return peer->Receive()->sessions_reply().sessions(0);
+  };
+  const auto quarantined = [&peer] {
+    wire::Envelope status;
+    status.mutable_status_request();
+    peer->Send(status);
+    return peer->Receive()->status_reply().quarantined();
+  };
+  EXPECT_EQ(session().state(), "quarantined");
+  EXPECT_NE(session().reason().find("keyframe 1 to 2: "), std::string::npos);
+  EXPECT_EQ(quarantined(), 1u);
+  peer->Send(ChangeOf("day", wire::ChangeSession::RELEASE));
+  EXPECT_EQ(peer->Receive()->change_session_reply().state(), "released");
+  EXPECT_EQ(session().state(), "released");
+  EXPECT_EQ(quarantined(), 0u);
+  peer->Send(ChangeOf("day", wire::ChangeSession::PURGE));
+  const auto purged = peer->Receive();
+  EXPECT_EQ(purged->change_session_reply().state(), "purged");
+  EXPECT_EQ(purged->change_session_reply().keyframes(), 3u);
+  EXPECT_EQ(session().state(), "purged");
+  peer->Send(ChangeOf("day", wire::ChangeSession::RESTORE));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kConflict);
+  peer->Send(ChangeOf("", wire::ChangeSession::PURGE));
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kInvalidArgument);
+  EXPECT_EQ(Digest().tiles, 0u);
+}
+
 TEST_F(HistoryRequestTest, BadSessionChangesAreTyped) {
   Serve();
   UploadDrive(1);

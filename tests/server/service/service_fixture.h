@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -57,6 +58,10 @@ inline UploadRequest DriveUpload(std::uint32_t i,
 
 class ServiceTest : public ::testing::Test {
  protected:
+  void Note(const std::string& line) {
+    const std::lock_guard lock(log_mutex_);
+    log_ += line + "\n";
+  }
   ServiceTest() {
     std::string name = (std::filesystem::temp_directory_path() / "atlas_service_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) {
@@ -90,8 +95,15 @@ class ServiceTest : public ::testing::Test {
     service.backup = backups_;
     service.retention = retention_;
     service.compaction = compaction_;
+    service.plausibility = plausibility_;
     service_ = std::make_unique<AtlasService>(
-        *store_, [this] { return now_ms_.load(); }, [](LogLevel, const std::string&) {}, service);
+        *store_, [this] { return now_ms_.load(); },
+        [this](LogLevel, const std::string& line) { Note(line); }, service);
+  }
+  // What the service said, line by line.
+  std::string Log() {
+    const std::lock_guard lock(log_mutex_);
+    return log_;
   }
   void Close() {
     service_.reset();
@@ -137,8 +149,11 @@ class ServiceTest : public ::testing::Test {
   BackupOptions backups_;            // none
   Retention retention_;              // no limits
   AutomaticCompactionOptions compaction_;
+  PlausibilityLimits plausibility_;
   std::filesystem::path directory_;
   std::atomic<std::int64_t> now_ms_{kTestNow_ms};
+  std::mutex log_mutex_;
+  std::string log_;
   std::unique_ptr<AtlasStore> store_;
   std::unique_ptr<AtlasService> service_;
 };

@@ -84,13 +84,15 @@ TEST_F(UploadTest, AContinentAwayIsOnTheMap) {
     Digest();
     return service_->ReadStatus()->counts.tiles;
   }();
-  UploadRequest far = DriveUpload(1);
+  UploadRequest far = DriveUpload(1, "far");
   far.pose.x_um = 9'999'900'000'000;
   far.pose.y_um = -9'999'900'000'000;
   ASSERT_TRUE(Upload(std::move(far)).has_value());
   Digest();
+  EXPECT_GT(service_->ReadStatus()->counts.tiles, tiles_here);
   EXPECT_LE(service_->ReadStatus()->counts.tiles, 3 * tiles_here);
   ASSERT_TRUE(Change("day", SessionAction::kRetract).has_value());
+  ASSERT_TRUE(Change("far", SessionAction::kRetract).has_value());
   Digest();
   EXPECT_EQ(service_->ReadStatus()->counts.tiles, 0u);
 }

@@ -1,4 +1,5 @@
-// `atlas session retract V/S` and `atlas session restore V/S`: a drive out of the map and back.
+// `atlas session retract V/S` and `atlas session restore V/S`: a drive out of the map and back;
+// `release V/S`: out of quarantine for good; `purge V/S`: deleted.
 // `atlas vehicle retract V` and `restore V`: all its drives.
 #include "client/cli/commands/atlas/atlas_commands.h"
 #include "core/base/str_cat.h"
@@ -27,11 +28,18 @@ class SessionCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("SESSION", "VEHICLE/SESSION", session_, "As `atlas sessions` lists it");
+    if (is_purge()) {
+      arguments.Flag("--yes", is_sure_, "Needed: what is deleted does not come back");
+    }
   }
 
   Status Run(CommandContext& context) override {
     const Result<SessionKey> key = ParseSession(session_);
     if (!key) return key.error();
+    if (is_purge() && !is_sure_) {
+      return {StatusCode::kInvalidArgument,
+              StrCat("session ", *key, ": a purge deletes it for good; say --yes")};
+    }
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
     const auto done = client->ChangeSession(*key, action_, "atlas-session-" + word_);
@@ -50,18 +58,25 @@ class SessionCommand : public Command {
                          {"state", done.state},
                          {"changed", done.is_changed},
                          {"tiles_marked", done.tiles_marked},
-                         {"revision", done.revision}});
+                         {"revision", done.revision},
+                         {"keyframes_deleted", done.keyframes}});
     } else {
       context.out << StrCat(key) << (done.is_changed ? " is " : " was already ") << done.state
                   << ", " << done.tiles_marked << " tiles to be fused again, revision "
-                  << done.revision << '\n';
+                  << done.revision;
+      if (done.keyframes > 0) {
+        context.out << ", " << done.keyframes << " keyframes deleted";
+      }
+      context.out << '\n';
     }
   }
+  bool is_purge() const { return action_ == SessionAction::kPurge; }
 
   std::string word_;
   std::string summary_;
   SessionAction action_;
   std::string session_;
+  bool is_sure_ = false;
 };
 
 class VehicleCommand : public Command {
@@ -112,6 +127,17 @@ std::unique_ptr<Command> MakeSessionRetractCommand() {
 std::unique_ptr<Command> MakeSessionRestoreCommand() {
   return std::make_unique<SessionCommand>("restore", "Put a retracted session back into the map",
                                           SessionAction::kRestore);
+}
+
+std::unique_ptr<Command> MakeSessionReleaseCommand() {
+  return std::make_unique<SessionCommand>(
+      "release", "Put a quarantined session into the map, and never quarantine it again",
+      SessionAction::kRelease);
+}
+
+std::unique_ptr<Command> MakeSessionPurgeCommand() {
+  return std::make_unique<SessionCommand>("purge", "Delete a session for good",
+                                          SessionAction::kPurge);
 }
 
 std::unique_ptr<Command> MakeVehicleRetractCommand() {

@@ -14,11 +14,13 @@ boost::json::object SessionJson(const SessionSummary& session) {
           {"first_time_ms", session.first_time_ms},
           {"last_time_ms", session.last_time_ms},
           {"last_sequence", session.last_sequence},
-          {"compacted", session.compacted}};
+          {"compacted", session.compacted},
+          {"reason", session.reason}};
 }
 
 std::string StateText(const SessionSummary& session) {
-  return session.compacted == 0 ? session.state : session.state + ", compacted";
+  const std::string reason = session.reason.empty() ? "" : ": " + session.reason;
+  return session.state + (session.compacted == 0 ? "" : ", compacted") + reason;
 }
 
 void PrintSessions(const std::vector<SessionSummary>& sessions, std::ostream& out) {

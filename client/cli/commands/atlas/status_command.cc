@@ -25,6 +25,7 @@ boost::json::object StatusJson(const AtlasStatus& status, const MapProfile& prof
           {"multilayer_cells", status.multilayer_cells},
           {"rss_bytes", status.rss_bytes},
           {"compacted", status.compacted},
+          {"quarantined", status.quarantined},
           {"used_bytes", status.used_bytes},
           {"store_limit_bytes", status.store_limit_bytes},
           {"disk_free_bytes", FreeJson(status)},
@@ -52,6 +53,9 @@ void PrintStatus(const AtlasStatus& status, const MapProfile& profile, std::ostr
   facts.Add("preset", std::string(FusionPresetName(profile.preset)));
   facts.Add("revision", std::to_string(status.revision));
   facts.Add("sessions", std::to_string(status.sessions));
+  if (status.quarantined != 0) {
+    facts.Add("quarantined", std::to_string(status.quarantined) + " of them; see atlas sessions");
+  }
   facts.Add("keyframes",
             std::to_string(status.keyframes) + ", " + BytesText(status.keyframe_bytes));
   if (status.compacted != 0) {

@@ -101,10 +101,11 @@ Connection::Connection(const DatabaseOptions& options)
     : database_(NameToOpen(options), OpenFlags(options.mode), options.busy_timeout_ms) {
   std::random_device random;
   std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });
+  // Pages that are written have nothing in them of what moved or went: a purge finds all of it.
   // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.
   Execute(
       StrCat("PRAGMA cache_size = -", options.cache_kib,
-             "; PRAGMA mmap_size = 0; PRAGMA synchronous = FULL; PRAGMA secure_delete = OFF;"
+             "; PRAGMA mmap_size = 0; PRAGMA synchronous = FULL; PRAGMA secure_delete = FAST;"
              "PRAGMA temp_store = MEMORY; PRAGMA foreign_keys = OFF; PRAGMA trusted_schema = OFF;"
              "PRAGMA recursive_triggers = ON; PRAGMA cell_size_check = ON;"
              "PRAGMA journal_size_limit = 67108864;")
@@ -156,6 +157,16 @@ std::optional<int> Connection::CopyLog() {
   return copied;
 }
 
+bool Connection::EmptyLog() {
+  sqlite3* handle = database_.getHandle();
+  const int code =
+      sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  if (code != SQLITE_OK && code != SQLITE_BUSY) {
+    throw SQLite::Exception(handle, code);
+  }
+  return code == SQLITE_OK;
+}
+
 void Connection::InterruptWhen(std::function<bool()> is_over) {
   constexpr int kSteps = 100'000;  // of SQLite's machine, about a millisecond
   is_over_ = std::move(is_over);
@@ -163,6 +174,14 @@ void Connection::InterruptWhen(std::function<bool()> is_over) {
     return static_cast<Connection*>(self)->is_over_() ? 1 : 0;
   };
   sqlite3_progress_handler(database_.getHandle(), kSteps, ask, this);
+}
+
+OverwritingDeletions::~OverwritingDeletions() {
+  try {
+    connection_.Execute("PRAGMA secure_delete = FAST");
+  } catch (const SQLite::Exception&) {
+    // Later deletions are then overwritten as well, at the price of time.
+  }
 }
 
 Snapshot::~Snapshot() {

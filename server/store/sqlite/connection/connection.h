@@ -100,6 +100,9 @@ class Connection {
   // Copies as much of the log as readers let it, beside them and a writer. How many of its pages
   // are in the database now; none: another connection is at it.
   std::optional<int> CopyLog();
+  // Copies all of the log and leaves its file empty: nothing stays there of what was overwritten in
+  // the database. False: readers or a writer are in the way.
+  bool EmptyLog();
   // Asked now and then while a statement runs: true ends it with SQLITE_INTERRUPT. It must not
   // throw.
   void InterruptWhen(std::function<bool()> is_over);
@@ -112,6 +115,21 @@ class Connection {
   std::function<bool()> is_over_;
   SQLite::Database database_;
   std::unordered_map<const char*, std::unique_ptr<SQLite::Statement>> statements_;
+};
+
+// As long as it is there, what the connection deletes is overwritten, also in pages that are free
+// from then on.
+class OverwritingDeletions {
+ public:
+  explicit OverwritingDeletions(Connection& connection) : connection_(connection) {
+    connection_.Execute("PRAGMA secure_delete = ON");
+  }
+  OverwritingDeletions(const OverwritingDeletions&) = delete;
+  OverwritingDeletions& operator=(const OverwritingDeletions&) = delete;
+  ~OverwritingDeletions();
+
+ private:
+  Connection& connection_;
 };
 
 // A read transaction: everything inside sees one state of the atlas.

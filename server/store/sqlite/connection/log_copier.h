@@ -4,6 +4,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -31,6 +32,9 @@ class LogCopier {
   LogCopier& operator=(const LogCopier&) = delete;
   ~LogCopier();
 
+  // All of the log is copied and its file emptied, on the copier's thread, as soon as nobody reads
+  // what was before: tried again once a second until then. From any thread.
+  void EmptySoon();
   // The disk kept it from copying: what was committed is in the log. From any thread.
   std::optional<WriteRefusal> last_failure() const;
 
@@ -38,6 +42,8 @@ class LogCopier {
   void NoteCommit(int log_pages);  // the writer's thread
   void Loop();
   void Copy();
+  void Empty();
+  void NoteFailure(const std::exception& error);
 
   const Limits limits_;
   SyncGuard& guard_;
@@ -47,6 +53,7 @@ class LogCopier {
   std::condition_variable has_work_;
   int copied_ = 0;  // pages of the log
   bool is_due_ = false;
+  bool is_to_be_empty_ = false;
   bool is_stopping_ = false;
   std::optional<WriteRefusal> last_failure_;
   std::thread thread_;

@@ -83,7 +83,11 @@ std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
   std::unique_lock lock(mutex_);
   has_work_.wait(lock, [this] { return is_stopping_ || !queue_.empty(); });
   const std::size_t size = std::min(queue_.size(), options_.max_group);
-  const auto end = queue_.begin() + static_cast<std::ptrdiff_t>(size);
+  auto end = queue_.begin() + static_cast<std::ptrdiff_t>(size);
+  end = std::find_if(queue_.begin(), end, [](const Operation& next) { return next.is_alone; });
+  if (end == queue_.begin() && size > 0) {
+    ++end;
+  }
   std::vector<Operation> group(std::make_move_iterator(queue_.begin()),
                                std::make_move_iterator(end));
   queue_.erase(queue_.begin(), end);
@@ -143,9 +147,12 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     }
     connection_->Execute("BEGIN IMMEDIATE");
     for (std::size_t i = 0; i < group.size(); ++i) {
-      results[i] = RunOne(group[i]);
+      results[i] = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
       if (!connection_->is_in_transaction()) {
         return results[i];  // SQLite gave the whole transaction up
+      }
+      if (group[i].is_alone && !results[i].ok()) {
+        return RollBack(results[i]);
       }
     }
     if (Status status = guard_.status(); !status.ok()) {

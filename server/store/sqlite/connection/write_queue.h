@@ -37,11 +37,13 @@ class WriteQueue {
     };
   };
   struct Operation {
-    std::function<Status(Connection&)> run;     // in a savepoint
+    std::function<Status(Connection&)> run;     // in a savepoint, unless it is alone
     std::function<void(const Status&)> finish;  // after the commit; must not block
     // Before that: once all can see what it wrote, or it is certain that nobody will, and before
     // the revision tells of it; must not block, nor throw. May be empty.
     std::function<void()> settle = {};
+    // A transaction of its own, without a savepoint, which would keep in memory what it overwrites.
+    bool is_alone = false;
   };
 
   // `guard` outlives this: once it says so, everything is refused.
@@ -85,5 +87,24 @@ class WriteQueue {
   std::optional<WriteRefusal> last_refusal_;
   std::thread thread_;
 };
+
+// `work`, which returns a Result<T>, as a write; `done` gets what it returned once that is on disk.
+template <typename T, typename Work>
+WriteQueue::Operation MakeWrite(std::function<void(Result<T>)> done, Work work) {
+  auto result = std::make_shared<Result<T>>(Error(StatusCode::kInternal, "store: not run"));
+  WriteQueue::Operation operation;
+  operation.run = [result, work = std::move(work)](Connection& connection) {
+    *result = work(connection);
+    return result->has_value() ? Status() : result->error();
+  };
+  operation.finish = [result, done = std::move(done)](const Status& status) {
+    if (status.ok()) {
+      done(std::move(*result));
+    } else {
+      done(Error(status));
+    }
+  };
+  return operation;
+}
 
 }  // namespace atlas

@@ -1,5 +1,6 @@
 #include "server/store/sqlite/tables/compaction_table.h"
 
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -66,6 +67,44 @@ Result<TombstoneRow> ReadTombstone(Query& row) {
   return result;
 }
 
+Result<CompactionRow> ReadCompactionRow(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, before_ms, author, dropped, bytes, checksum FROM compactions "
+      "WHERE id = ?");
+  row.Bind(id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of compaction ", id, " is missing"));
+  }
+  return ReadCompaction(row);
+}
+
+// What a session lost to a compaction.
+struct Loss {
+  std::uint64_t dropped = 0;
+  std::uint64_t bytes = 0;
+};
+
+// By compaction.
+Result<std::map<std::int64_t, Loss>> SumTombstones(Connection& connection,
+                                                   std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT session_id, sequence, time_ms, blob_bytes, blob_hash, compaction_id, checksum "
+      "FROM tombstones WHERE session_id = ?");
+  row.Bind(session_id);
+  std::map<std::int64_t, Loss> losses;
+  while (row.Step()) {
+    const auto tombstone = ReadTombstone(row);
+    if (!tombstone) {
+      return Error(tombstone.error());
+    }
+    Loss& loss = losses[tombstone->compaction_id];
+    ++loss.dropped;
+    loss.bytes += tombstone->blob_bytes;
+  }
+  return losses;
+}
+
 std::uint64_t CountTombstones(Connection& connection, std::int64_t compaction_id) {
   Query row = connection.Prepare("SELECT count(*) FROM tombstones WHERE compaction_id = ?");
   row.Bind(compaction_id);
@@ -119,6 +158,37 @@ Result<std::optional<TombstoneRow>> FindTombstone(Connection& connection,
     return Error(tombstone.error());
   }
   return *tombstone;
+}
+
+bool HasTombstoneBetween(Connection& connection,
+                         std::int64_t session_id,
+                         std::uint32_t after,
+                         std::uint32_t before) {
+  Query row = connection.Prepare(
+      "SELECT 1 FROM tombstones WHERE session_id = ? AND sequence > ? AND sequence < ? LIMIT 1");
+  row.Bind(session_id).Bind(after).Bind(before);
+  return row.Step();
+}
+
+Result<std::uint64_t> DeleteTombstones(Connection& connection, std::int64_t session_id) {
+  const auto losses = SumTombstones(connection, session_id);
+  if (!losses) {
+    return Error(losses.error());
+  }
+  std::uint64_t deleted = 0;
+  for (const auto& [compaction_id, loss] : *losses) {
+    auto compaction = ReadCompactionRow(connection, compaction_id);
+    if (!compaction) {
+      return Error(compaction.error());
+    }
+    compaction->dropped -= loss.dropped;
+    compaction->bytes -= loss.bytes;
+    connection.Prepare("DELETE FROM compactions WHERE id = ?").Bind(compaction_id).Run();
+    WriteCompaction(connection, *compaction);
+    deleted += loss.dropped;
+  }
+  connection.Prepare("DELETE FROM tombstones WHERE session_id = ?").Bind(session_id).Run();
+  return deleted;
 }
 
 Status CheckTombstones(Connection& connection, std::int64_t session_id, std::uint64_t expected) {

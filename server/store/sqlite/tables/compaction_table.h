@@ -37,6 +37,13 @@ void WriteTombstone(Connection& connection, const TombstoneRow& row);
 Result<std::optional<TombstoneRow>> FindTombstone(Connection& connection,
                                                   std::int64_t session_id,
                                                   std::uint32_t sequence);
+// Whether a compaction dropped one with a sequence number between these.
+bool HasTombstoneBetween(Connection& connection,
+                         std::int64_t session_id,
+                         std::uint32_t after,
+                         std::uint32_t before);
+// All of a session, and out of what their compactions say that they dropped. How many.
+Result<std::uint64_t> DeleteTombstones(Connection& connection, std::int64_t session_id);
 
 // kInvalidData when a tombstone of the session is damaged, or there are not as many as `expected`.
 Status CheckTombstones(Connection& connection, std::int64_t session_id, std::uint64_t expected);

@@ -258,6 +258,36 @@ std::int64_t FindKeyframeId(Connection& connection,
   return row.Step() ? row.Int() : 0;
 }
 
+std::vector<std::int64_t> ListSessionKeyframes(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare("SELECT id FROM keyframes WHERE session_id = ? ORDER BY sequence");
+  row.Bind(session_id);
+  std::vector<std::int64_t> ids;
+  while (row.Step()) {
+    row.Rewind();
+    ids.push_back(row.Int());
+  }
+  return ids;
+}
+
+std::int64_t FindKeyframeBefore(Connection& connection,
+                                std::int64_t session_id,
+                                std::uint32_t sequence) {
+  Query row = connection.Prepare(
+      "SELECT id FROM keyframes WHERE session_id = ? AND sequence < ? "
+      "ORDER BY sequence DESC LIMIT 1");
+  row.Bind(session_id).Bind(sequence);
+  return row.Step() ? row.Int() : 0;
+}
+
+std::int64_t FindKeyframeBehind(Connection& connection,
+                                std::int64_t session_id,
+                                std::uint32_t sequence) {
+  Query row = connection.Prepare(
+      "SELECT id FROM keyframes WHERE session_id = ? AND sequence > ? ORDER BY sequence LIMIT 1");
+  row.Bind(session_id).Bind(sequence);
+  return row.Step() ? row.Int() : 0;
+}
+
 Status CheckKeyframe(Connection& connection, std::int64_t id) {
   const auto record = ReadKeyframeRecord(connection, id);
   if (!record) {

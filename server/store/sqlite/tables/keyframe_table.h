@@ -40,6 +40,15 @@ Result<Bytes> ReadBlob(Connection& connection, std::int64_t id);
 std::int64_t FindKeyframeId(Connection& connection,
                             std::int64_t session_id,
                             std::uint32_t sequence);
+// By the same index: the ids of a session's keyframes in the order of their sequence numbers.
+std::vector<std::int64_t> ListSessionKeyframes(Connection& connection, std::int64_t session_id);
+// The one before a sequence number, and the one behind it; 0: there is none.
+std::int64_t FindKeyframeBefore(Connection& connection,
+                                std::int64_t session_id,
+                                std::uint32_t sequence);
+std::int64_t FindKeyframeBehind(Connection& connection,
+                                std::int64_t session_id,
+                                std::uint32_t sequence);
 // kInvalidData when the row, its session, its pose, its tiles of now or its blob is damaged: fusion
 // cannot have it.
 Status CheckKeyframe(Connection& connection, std::int64_t id);

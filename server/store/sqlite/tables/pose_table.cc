@@ -139,6 +139,22 @@ Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
   return stored->pose;
 }
 
+Result<std::optional<QuantizedPose>> ReadUploadedPose(Connection& connection,
+                                                      std::int64_t keyframe_id) {
+  Query row = connection.Prepare(
+      "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "
+      "FROM pose_history WHERE keyframe_id = ? ORDER BY revision LIMIT 1");
+  row.Bind(keyframe_id);
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  const auto stored = ReadHistoryRow(row);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  return stored->batch == 0 ? std::optional(stored->pose) : std::nullopt;
+}
+
 std::vector<Result<PoseChange>> ReadPoseHistory(Connection& connection, std::int64_t keyframe_id) {
   Query row = connection.Prepare(
       "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "

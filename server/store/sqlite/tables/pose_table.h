@@ -18,6 +18,10 @@ Result<QuantizedPose> ReadPose(Connection& connection, std::int64_t keyframe_id)
 Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
                                                 std::int64_t keyframe_id,
                                                 std::uint64_t revision);
+// The pose that the keyframe was uploaded with; nullopt: that line was damaged, and taken out.
+// kInvalidData when it is damaged.
+Result<std::optional<QuantizedPose>> ReadUploadedPose(Connection& connection,
+                                                      std::int64_t keyframe_id);
 
 struct PoseChange {
   std::int64_t keyframe_id = 0;

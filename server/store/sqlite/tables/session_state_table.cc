@@ -1,6 +1,8 @@
 #include "server/store/sqlite/tables/session_state_table.h"
 
 #include <optional>
+#include <string_view>
+#include <utility>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
@@ -40,16 +42,17 @@ Status Missing(std::int64_t session_id) {
                 StrCat("store: the history of session ", session_id, " is not whole"));
 }
 
-// The state of the only row of a query.
-Result<SessionState> ReadState(Query& row, std::int64_t session_id) {
+// The only row of a query.
+Result<SessionStateRow> ReadOnly(Query& row, std::int64_t session_id) {
   if (!row.Step()) {
     return Error(Missing(session_id));
   }
-  const auto stored = ReadRow(row);
-  if (!stored) {
-    return Error(stored.error());
-  }
-  return stored->state;
+  return ReadRow(row);
+}
+
+Result<SessionState> ReadState(Query& row, std::int64_t session_id) {
+  const auto stored = ReadOnly(row, session_id);
+  return stored ? Result<SessionState>(stored->state) : Error(stored.error());
 }
 
 }  // namespace
@@ -78,6 +81,15 @@ Result<SessionState> ReadSessionStateAt(Connection& connection,
   return ReadState(row, session_id);
 }
 
+Result<std::string> ReadStateReason(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
+      "WHERE session_id = ? ORDER BY revision DESC LIMIT 1");
+  row.Bind(session_id);
+  auto stored = ReadOnly(row, session_id);
+  return stored ? Result<std::string>(std::move(stored->reason)) : Error(stored.error());
+}
+
 Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id) {
   Query row = connection.Prepare(
       "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
@@ -100,6 +112,10 @@ Status CheckSessionStates(Connection& connection, std::int64_t session_id, Sessi
     last = stored->state;
   }
   return last == current ? Status() : Missing(session_id);
+}
+
+void DeleteSessionStates(Connection& connection, std::int64_t session_id) {
+  connection.Prepare("DELETE FROM session_states WHERE session_id = ?").Bind(session_id).Run();
 }
 
 }  // namespace atlas

@@ -24,9 +24,12 @@ void WriteSessionState(Connection& connection, const SessionStateRow& row);
 Result<SessionState> ReadSessionStateAt(Connection& connection,
                                         std::int64_t session_id,
                                         std::uint64_t revision);
+// Why it is in the state it is in, if somebody said.
+Result<std::string> ReadStateReason(Connection& connection, std::int64_t session_id);
 // What a retracted session was before.
 Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id);
 // kInvalidData when a line is damaged or the last is not the current state.
 Status CheckSessionStates(Connection& connection, std::int64_t session_id, SessionState current);
+void DeleteSessionStates(Connection& connection, std::int64_t session_id);
 
 }  // namespace atlas

@@ -150,6 +150,13 @@ Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
   std::vector<SessionRecord> sessions;
   sessions.reserve(page->size());
   for (SessionRow& session : *page) {
+    if (session.record.state != SessionState::kLive) {
+      auto reason = ReadStateReason(connection, session.id);
+      if (!reason) {
+        return Error(reason.error());
+      }
+      session.record.reason = std::move(*reason);
+    }
     sessions.push_back(std::move(session.record));
   }
   return sessions;
@@ -194,6 +201,12 @@ void WriteSession(Connection& connection, const SessionRow& row) {
       .Bind(r.compacted)
       .Bind(HashOf(row))
       .Run();
+}
+
+std::uint64_t CountQuarantined(Connection& connection) {
+  Query row = connection.Prepare("SELECT count(*) FROM sessions WHERE state = ?");
+  row.Bind(static_cast<std::int64_t>(SessionState::kQuarantined));
+  return row.Step() ? row.Unsigned() : 0;
 }
 
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
@@ -273,7 +286,7 @@ SessionRow AddSession(Connection& connection, const SessionKey& key) {
   return row;
 }
 
-void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe) {
+SessionRow CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe) {
   SessionRecord& r = session.record;
   const bool is_first = HasNoneYet(r);
   r.first_time_ms = is_first ? keyframe.time_ms : std::min(r.first_time_ms, keyframe.time_ms);
@@ -282,6 +295,7 @@ void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe
   ++r.keyframes;
   r.bytes += keyframe.blob.size();
   WriteSession(connection, session);
+  return session;
 }
 
 }  // namespace atlas

@@ -29,6 +29,8 @@ Result<SessionRow> ReadSession(Connection& connection, std::int64_t id);
 // kInvalidData when its row, a line of its history or a tombstone of its keyframes is damaged.
 Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 
+// How many are in quarantine.
+std::uint64_t CountQuarantined(Connection& connection);
 // Ids of those whose rows are damaged.
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection);
 // Writes the row anew, from the index of names, the history of states and the keyframes.
@@ -43,6 +45,6 @@ int RecountSessions(Connection& connection);
 SessionRow AddSession(Connection& connection, const SessionKey& key);
 void WriteSession(Connection& connection, const SessionRow& row);
 // Counts one more keyframe in.
-void CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);
+SessionRow CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);
 
 }  // namespace atlas

@@ -6,6 +6,7 @@
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
+#include "server/store/sqlite/tables/session_table.h"
 
 namespace atlas {
 
@@ -66,6 +67,7 @@ StoreCounts ReadStoreCounts(Connection& connection) {
   counts.keyframe_bytes = ReadCounter(connection, Counter::kKeyframeBytes);
   counts.compacted = ReadCounter(connection, Counter::kCompacted);
   counts.sessions = ReadCounter(connection, Counter::kSessions);
+  counts.quarantined = CountQuarantined(connection);
   counts.tiles = ReadCounter(connection, Counter::kTiles);
   counts.tile_bytes = ReadCounter(connection, Counter::kTileBytes);
   counts.cells = ReadCounter(connection, Counter::kCells);

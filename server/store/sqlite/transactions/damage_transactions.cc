@@ -11,7 +11,6 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/table_sums.h"
-#include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
@@ -21,6 +20,7 @@
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/transactions/counter_check.h"
+#include "server/store/sqlite/transactions/history_horizon.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
 namespace atlas {
@@ -91,14 +91,6 @@ std::uint64_t FirstRevision(Connection& connection, std::int64_t id) {
     }
   }
   return first;
-}
-
-// Nothing of before can be read as it was; surveys that were kept are made anew.
-void MoveHorizon(Connection& connection, const std::string& author) {
-  const std::uint64_t revision = NextRevision(connection);
-  SetCounter(connection, Counter::kHistoryHorizon, revision);
-  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kCompactions, 1));
-  WriteCompaction(connection, {id, revision, 0, author, 0, 0});
 }
 
 void GiveUp(Connection& connection, const KeyframeRepair& repair, const Status& why) {

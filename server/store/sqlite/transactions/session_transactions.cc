@@ -1,72 +1,110 @@
 #include "server/store/sqlite/transactions/session_transactions.h"
 
+#include <utility>
+
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
-#include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
-#include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"
+#include "server/store/sqlite/transactions/purge_transaction.h"
+#include "server/store/sqlite/transactions/session_judgement.h"
+#include "server/store/sqlite/transactions/session_transition.h"
 
 namespace atlas {
 namespace {
 
 constexpr std::uint32_t kPage = 256;  // sessions read at a time
 
-Result<SessionState> StateAfter(Connection& connection,
-                                const SessionRow& session,
-                                SessionAction action) {
-  if (action == SessionAction::kRetract) {
-    return SessionState::kRetracted;
+// What a retracted session is when it is back. One that nobody released is judged by what came
+// meanwhile, too.
+Result<SessionJudgement> JudgeRestored(Connection& connection,
+                                       const SessionRow& session,
+                                       const SessionChange& change) {
+  const auto before = ReadStateBeforeRetraction(connection, session.id);
+  if (!before) {
+    return Error(before.error());
   }
-  return session.record.state == SessionState::kRetracted
-             ? ReadStateBeforeRetraction(connection, session.id)
-             : session.record.state;
+  SessionJudgement judgement{*before, ""};
+  if (*before != SessionState::kReleased && change.limits) {
+    judgement = JudgeSession(connection, session, *change.limits);
+  }
+  if (judgement.state != SessionState::kQuarantined) {
+    judgement.reason = change.reason;
+  }
+  return judgement;
+}
+
+Result<SessionJudgement> StateAfter(Connection& connection,
+                                    const SessionRow& session,
+                                    const SessionChange& change) {
+  const SessionState state = session.record.state;
+  switch (change.action) {
+    case SessionAction::kRetract:
+      return SessionJudgement{SessionState::kRetracted, change.reason};
+    case SessionAction::kRestore:
+      return state == SessionState::kRetracted ? JudgeRestored(connection, session, change)
+                                               : SessionJudgement{state, ""};
+    case SessionAction::kRelease:
+      if (state == SessionState::kRetracted) {
+        return Error(StatusCode::kConflict,
+                     StrCat("session ", change.key, " is retracted: restore it first"));
+      }
+      return SessionJudgement{SessionState::kReleased, change.reason};
+    case SessionAction::kPurge:
+      break;
+  }
+  return SessionJudgement{SessionState::kPurged, change.reason};
 }
 
 EventKind KindOf(SessionAction action) {
-  return action == SessionAction::kRetract ? EventKind::kRetract : EventKind::kRestore;
-}
-
-std::uint32_t MarkSession(Connection& connection, std::int64_t session_id, std::uint64_t revision) {
-  const std::vector<TileId> tiles = ReadSessionFootprint(connection, session_id);
-  for (const TileId& tile : tiles) {
-    MarkTile(connection, tile, revision, revision);
+  switch (action) {
+    case SessionAction::kRetract:
+      return EventKind::kRetract;
+    case SessionAction::kRestore:
+      return EventKind::kRestore;
+    case SessionAction::kRelease:
+      return EventKind::kSessionReleased;
+    case SessionAction::kPurge:
+      break;
   }
-  TouchSessionFootprint(connection, session_id, revision);
-  return static_cast<std::uint32_t>(tiles.size());
+  return EventKind::kSessionPurged;
 }
 
-SessionChangeResult EnterState(Connection& connection,
-                               SessionRow session,
-                               SessionState state,
-                               const SessionChange& change) {
-  const bool was_in_map = IsInMap(session.record.state);
-  SessionChangeResult result{state, true};
+Result<SessionChangeResult> Enter(Connection& connection,
+                                  const SessionRow& session,
+                                  const SessionJudgement& after,
+                                  const SessionChange& change) {
+  SessionChangeResult result{after.state, true};
   result.sessions = 1;
   result.revision = NextRevision(connection);
-  session.record.state = state;
-  WriteSession(connection, session);
-  WriteSessionState(connection, {session.id, result.revision, state, change.author, change.reason});
-  if (was_in_map != IsInMap(state)) {
-    result.tiles_marked = MarkSession(connection, session.id, result.revision);
-  }
+  result.tiles_marked =
+      EnterState(connection, session, {after.state, result.revision, change.author, after.reason});
   AddEvent(connection, {KindOf(change.action), change.author, StrCat(change.key), change.reason});
+  if (after.state == SessionState::kQuarantined) {
+    AddEvent(connection,
+             {EventKind::kSessionQuarantined, kAtlasItself, StrCat(change.key), after.reason});
+  }
   return result;
 }
 
 Result<SessionChangeResult> ChangeOne(Connection& connection,
                                       const SessionRow& session,
                                       const SessionChange& change) {
-  const auto state = StateAfter(connection, session, change.action);
-  if (!state) {
-    return Error(state.error());
+  if (session.record.state == SessionState::kPurged && change.action != SessionAction::kPurge) {
+    return Error(StatusCode::kConflict,
+                 StrCat("session ", change.key, " was purged: nothing is left of it"));
   }
-  if (*state == session.record.state) {
-    return SessionChangeResult{*state, false, 0, ReadCounter(connection, Counter::kRevision)};
+  const auto after = StateAfter(connection, session, change);
+  if (!after) {
+    return Error(after.error());
   }
-  return EnterState(connection, session, *state, change);
+  if (after->state == session.record.state) {
+    return SessionChangeResult{after->state, false, 0, ReadCounter(connection, Counter::kRevision)};
+  }
+  return after->state == SessionState::kPurged ? PurgeSession(connection, session, change)
+                                               : Enter(connection, session, *after, change);
 }
 
 Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionChange& change) {
@@ -83,6 +121,9 @@ Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionC
     }
     for (const SessionRow& session : *sessions) {
       one.key = session.record.key;
+      if (session.record.state == SessionState::kPurged) {
+        continue;
+      }
       const auto result = ChangeOne(connection, session, one);
       if (!result) {
         return result;

@@ -20,6 +20,8 @@
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/damage_transactions.h"
+#include "server/store/sqlite/transactions/session_judgement.h"
+#include "server/store/sqlite/transactions/session_transition.h"
 
 namespace atlas {
 namespace {
@@ -78,15 +80,18 @@ PutKeyframeResult AddKeyframe(Connection& connection,
   if (HasNoneYet(session.record)) {
     WriteSessionState(connection, {session.id, revision, session.record.state, author, ""});
   }
-  const bool is_in_map = IsInMap(session.record.state);
-  if (is_in_map) {
-    MarkTiles(connection, keyframe.footprint, revision);
-  }
-  CountKeyframe(connection, session, keyframe);
+  const SessionRow counted = CountKeyframe(connection, session, keyframe);
   AddToCounter(connection, Counter::kKeyframes, 1);
   AddToCounter(connection, Counter::kKeyframeBytes,
                static_cast<std::int64_t>(keyframe.blob.size()));
-  return {false, revision, is_in_map ? static_cast<std::uint32_t>(keyframe.footprint.size()) : 0u};
+  PutKeyframeResult result{false, revision, 0, JudgeArrival(connection, counted, keyframe)};
+  if (result.judgement) {
+    result.tiles_marked = EnterJudgedState(connection, counted, *result.judgement, revision);
+  } else if (IsInMap(session.record.state)) {
+    MarkTiles(connection, keyframe.footprint, revision);
+    result.tiles_marked = static_cast<std::uint32_t>(keyframe.footprint.size());
+  }
+  return result;
 }
 
 // What one pose of a batch comes to.
@@ -180,6 +185,11 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
   const auto session = FindOrBeginSession(connection, keyframe);
   if (!session) {
     return Error(session.error());
+  }
+  if (session->record.state == SessionState::kPurged) {
+    return Error(StatusCode::kConflict,
+                 StrCat("keyframe ", keyframe.key,
+                        ": its session was purged and takes none any more; use another name"));
   }
   const auto stored = FindUpload(connection, session->id, keyframe.key.sequence);
   if (stored && !*stored) {

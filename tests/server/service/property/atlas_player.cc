@@ -31,14 +31,19 @@ std::string NameOf(std::uint64_t key) {
 
 // What an answer says beside its revision.
 std::string TextOf(const PutKeyframeResult& put) {
-  return StrCat(put.is_duplicate ? "duplicate" : "new", ", ", put.tiles_marked, " tiles marked");
+  return StrCat(put.is_duplicate ? "duplicate" : "new", ", ", put.tiles_marked, " tiles marked",
+                put.judgement ? StrCat(", session now in state ", int(put.judgement->state)) : "");
 }
 std::string TextOf(const PoseBatchResult& batch) {
   return StrCat(batch.updated, " poses updated, ", batch.tiles_marked, " tiles marked");
 }
 std::string TextOf(const SessionChangeResult& change) {
   return StrCat(change.is_changed ? "now" : "still", " in state ", int(change.state), ", ",
-                change.tiles_marked, " tiles marked");
+                change.tiles_marked, " tiles marked, ", change.keyframes, " keyframes deleted");
+}
+// What does not depend on which of several keyframes came first.
+Result<PutKeyframeResult> WithoutOrder(const Result<PutKeyframeResult>& put) {
+  return put ? Result<PutKeyframeResult>({put->is_duplicate, 0, 0, std::nullopt}) : put;
 }
 template <typename T>
 std::string TextOf(const Result<T>& answer) {
@@ -112,6 +117,7 @@ void AtlasPlayer::Open(const DaemonSetup& setup) {
   service.fusion.building.survey_files.directory = directory_ / "data" / "surveys";
   service.past_cache_bytes = setup.building.keyframe_bytes;
   service.scratch_directory = directory_;
+  service.plausibility = script_.plausibility;
   service_ = std::make_unique<AtlasService>(
       *store_, [] { return kNow_ms; }, [](LogLevel, const std::string&) {}, service);
 }
@@ -191,9 +197,10 @@ void AtlasPlayer::UploadTwice(const std::vector<Placing>& placings) {
       std::swap(a, b);
     }
     const std::string what = StrCat("upload of frame ", placings[i].frame);
-    CheckAnswer(what.c_str(), a, model_.Put(placings[i]));
+    CheckAnswer(what.c_str(), WithoutOrder(a), WithoutOrder(model_.Put(placings[i])));
     CheckAnswer(what.c_str(), b, model_.Put(placings[i]));
   }
+  model_.TouchSessionsOf(placings);
 }
 
 void AtlasPlayer::MovePoses(const std::vector<Placing>& placings) {
@@ -216,6 +223,9 @@ void AtlasPlayer::ChangeSession(const Step& step) {
   unanswered_.emplace_back([this, answer = answer.share(), name = StrCat("session ", step.session),
                             expected = model_.Change(step.session, step.action)] {
     CheckAnswer(name.c_str(), answer.get(), expected);
+    if (answer.get() && answer.get()->is_changed && expected->state == SessionState::kPurged) {
+      horizon_ = answer.get()->revision;
+    }
   });
 }
 

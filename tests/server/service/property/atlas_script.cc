@@ -29,6 +29,20 @@ const char* NameOf(StepKind kind) {
   return "?";
 }
 
+const char* NameOf(SessionAction action) {
+  switch (action) {
+    case SessionAction::kRetract:
+      return "retract";
+    case SessionAction::kRestore:
+      return "restore";
+    case SessionAction::kRelease:
+      return "release";
+    case SessionAction::kPurge:
+      return "purge";
+  }
+  return "?";
+}
+
 std::ostream& operator<<(std::ostream& out, const Placing& placing) {
   const QuantizedPose& pose = placing.pose;
   out << "frame " << placing.frame;
@@ -57,8 +71,7 @@ std::ostream& operator<<(std::ostream& out, const Step& step) {
     out << "\n      " << placing;
   }
   if (step.kind == StepKind::kChangeSession) {
-    out << ": " << (step.action == SessionAction::kRetract ? "retract " : "restore ")
-        << step.session;
+    out << ": " << NameOf(step.action) << ' ' << step.session;
   }
   if (step.kind == StepKind::kCompact) {
     out << " before " << step.before_ms << " ms";
@@ -79,6 +92,9 @@ std::ostream& operator<<(std::ostream& out, const AtlasScript& script) {
         << frame.contents[0].keyframe->grid.radius_cells << ", time " << frame.contents[0].time_ms
         << " ms\n";
   }
+  const PlausibilityLimits& limits = script.plausibility;
+  out << "plausible: " << limits.max_speed_mps << " m/s and " << limits.max_jump_m << " m, "
+      << limits.max_climb_mps << " m/s and " << limits.max_height_jump_m << " m up or down\n";
   out << "open: " << script.setup << '\n';
   for (std::size_t i = 0; i < script.steps.size(); ++i) {
     out << "step " << i << ": " << script.steps[i] << '\n';

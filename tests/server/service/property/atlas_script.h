@@ -45,7 +45,7 @@ enum class StepKind {
   kUpload,         // each placing of the step, without waiting for the answer
   kUploadTwice,    // all of them from two threads at once, the second in reverse order
   kMovePoses,      // one batch
-  kChangeSession,  // retract or restore
+  kChangeSession,  // retract, restore, release or purge
   kCompact,        // what was taken before `before_ms`
   kAwaitAnswers,   // to all that was sent
   kCompare,        // when clean: with the oracle
@@ -71,7 +71,8 @@ struct Step {
 struct AtlasScript {
   MapProfile profile;
   std::vector<ScriptFrame> frames;
-  DaemonSetup setup;  // of the first opening
+  PlausibilityLimits plausibility = {0.0, 0.0, 0.0, 0.0};  // none
+  DaemonSetup setup;                                       // of the first opening
   std::vector<Step> steps;
   bool is_verified = false;  // at the end, against a rebuild from nothing
 };

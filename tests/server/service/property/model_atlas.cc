@@ -10,23 +10,34 @@
 #include "core/fusion/observation/keyframe_placement.h"
 #include "core/tile/tile_codec.h"
 #include "core/tile/tile_pyramid.h"
+#include "server/store/plausibility.h"
 #include "tests/core/fusion/oracle/plain_fusion.h"
 
 namespace atlas::testing {
 
 Result<PutKeyframeResult> ModelAtlas::Put(const Placing& placing) {
+  Session& session = sessions_[SessionOf(placing.frame)];
+  if (session.state == SessionState::kPurged) {
+    return Error(StatusCode::kConflict, "purged");
+  }
   const auto found = frames_.find(placing.frame);
   if (found != frames_.end()) {
     return found->second.content == placing.content ? Result<PutKeyframeResult>({true, 0, 0})
                                                     : Error(StatusCode::kConflict, "other content");
   }
-  frames_[placing.frame] = {placing.content, placing.pose, false};
-  sessions_.emplace(SessionOf(placing.frame), true);
-  if (!IsLive(placing.frame)) {
-    return PutKeyframeResult{};
+  frames_[placing.frame] = {placing.content, placing.pose, false, placing.pose};
+  PutKeyframeResult result;
+  const bool is_judged =
+      session.state == SessionState::kLive || session.state == SessionState::kQuarantined;
+  const SessionState now = is_judged ? Judge(SessionOf(placing.frame)) : session.state;
+  if (std::exchange(session.state, now) != now) {
+    result.judgement = SessionJudgement{now, ""};
+    result.tiles_marked = Touch(TilesOf(SessionOf(placing.frame)));
+  } else if (IsLive(placing.frame)) {
+    const std::vector<TileId> footprint = Footprint(placing.frame);
+    result.tiles_marked = Touch({footprint.begin(), footprint.end()});
   }
-  const std::vector<TileId> footprint = Footprint(placing.frame);
-  return PutKeyframeResult{false, 0, Touch({footprint.begin(), footprint.end()})};
+  return result;
 }
 
 Result<PoseBatchResult> ModelAtlas::Move(const std::vector<Placing>& placings) {
@@ -50,11 +61,11 @@ Result<PoseBatchResult> ModelAtlas::Move(const std::vector<Placing>& placings) {
     }
   };
   for (const Placing& placing : placings) {
-    auto& [content, pose, is_dropped] = frames_.at(placing.frame);
-    if (!is_dropped && pose != placing.pose) {
+    Frame& frame = frames_.at(placing.frame);
+    if (!frame.is_dropped && frame.pose != placing.pose) {
       ++result.updated;
       add_footprint(placing.frame);
-      pose = placing.pose;
+      frame.pose = placing.pose;
       add_footprint(placing.frame);
     }
   }
@@ -62,24 +73,99 @@ Result<PoseBatchResult> ModelAtlas::Move(const std::vector<Placing>& placings) {
   return result;
 }
 
+// By all neighbours in sequence; a keyframe that was dropped is nobody's.
+SessionState ModelAtlas::Judge(const SessionKey& key) const {
+  std::map<std::uint32_t, const Frame*> by_sequence;
+  std::map<std::uint32_t, UploadedPlace> places;
+  for (const auto& [index, frame] : frames_) {
+    const ScriptFrame& script = script_.frames[index];
+    if (script.key.session == key) {
+      const QuantizedPose& pose = frame.uploaded_pose;
+      by_sequence[script.key.sequence] = &frame;
+      places[script.key.sequence] = {script.key.sequence, script.contents[frame.content].time_ms,
+                                     pose.x_um, pose.y_um, pose.z_um};
+    }
+  }
+  for (auto next = by_sequence.begin(); next != by_sequence.end();) {
+    const auto one = next++;
+    if (next != by_sequence.end() && !one->second->is_dropped && !next->second->is_dropped &&
+        FindImplausible(places[one->first], places[next->first], script_.plausibility)) {
+      return SessionState::kQuarantined;
+    }
+  }
+  return SessionState::kLive;
+}
+
+std::set<TileId> ModelAtlas::TilesOf(const SessionKey& key) const {
+  std::set<TileId> tiles;
+  for (const auto& [index, frame] : frames_) {
+    if (SessionOf(index) == key && !frame.is_dropped) {
+      const std::vector<TileId> footprint = Footprint(index);
+      tiles.insert(footprint.begin(), footprint.end());
+    }
+  }
+  return tiles;
+}
+
+void ModelAtlas::TouchSessionsOf(const std::vector<Placing>& placings) {
+  for (const Placing& placing : placings) {
+    Touch(TilesOf(SessionOf(placing.frame)));
+  }
+}
+
+SessionState ModelAtlas::StateAfter(const SessionKey& key, SessionAction action) const {
+  const Session& session = sessions_.at(key);
+  switch (action) {
+    case SessionAction::kRetract:
+      return SessionState::kRetracted;
+    case SessionAction::kRestore:
+      if (session.state != SessionState::kRetracted) {
+        return session.state;
+      }
+      return session.is_released ? SessionState::kReleased : Judge(key);
+    case SessionAction::kRelease:
+      return SessionState::kReleased;
+    case SessionAction::kPurge:
+      break;
+  }
+  return SessionState::kPurged;
+}
+
+// How many keyframes there were.
+std::uint64_t ModelAtlas::Forget(const SessionKey& key) {
+  std::uint64_t stored = 0;
+  for (auto next = frames_.begin(); next != frames_.end();) {
+    const auto one = next++;
+    if (SessionOf(one->first) == key) {
+      stored += one->second.is_dropped ? 0u : 1u;
+      frames_.erase(one);
+    }
+  }
+  return stored;
+}
+
 Result<SessionChangeResult> ModelAtlas::Change(const SessionKey& key, SessionAction action) {
-  const auto session = sessions_.find(key);
-  if (session == sessions_.end()) {
+  const auto found = sessions_.find(key);
+  if (found == sessions_.end()) {
     return Error(StatusCode::kNotFound, "no such session");
   }
-  const bool is_live = action == SessionAction::kRestore;
+  Session& session = found->second;
+  const bool is_purged = session.state == SessionState::kPurged;
+  const bool is_retracted = session.state == SessionState::kRetracted;
+  if ((is_purged && action != SessionAction::kPurge) ||
+      (is_retracted && action == SessionAction::kRelease)) {
+    return Error(StatusCode::kConflict, "not in this state");
+  }
   SessionChangeResult result;
-  result.state = is_live ? SessionState::kLive : SessionState::kRetracted;
-  result.is_changed = std::exchange(session->second, is_live) != is_live;
-  if (result.is_changed) {
-    std::set<TileId> tiles;
-    for (const auto& [index, frame] : frames_) {
-      if (SessionOf(index) == key && !frame.is_dropped) {
-        const std::vector<TileId> footprint = Footprint(index);
-        tiles.insert(footprint.begin(), footprint.end());
-      }
-    }
-    result.tiles_marked = Touch(tiles);
+  result.state = StateAfter(key, action);
+  const bool was_in_map = IsInMap(session.state);
+  result.is_changed = std::exchange(session.state, result.state) != result.state;
+  session.is_released = session.is_released || action == SessionAction::kRelease;
+  if (was_in_map != IsInMap(result.state)) {
+    result.tiles_marked = Touch(TilesOf(key));
+  }
+  if (result.is_changed && action == SessionAction::kPurge) {
+    result.keyframes = Forget(key);
   }
   return result;
 }

@@ -30,6 +30,8 @@ class ModelAtlas {
   Result<PutKeyframeResult> Put(const Placing& placing);
   Result<PoseBatchResult> Move(const std::vector<Placing>& placings);
   Result<SessionChangeResult> Change(const SessionKey& key, SessionAction action);
+  // Keyframes that came in another order may have put their sessions out and in again.
+  void TouchSessionsOf(const std::vector<Placing>& placings);
   // Makes the accepted keyframes `remaining` ones; the others were dropped, and may be sent again.
   // Empty, or what should not have been dropped: what was not taken before `before_ms`, or is in no
   // live session.
@@ -44,12 +46,21 @@ class ModelAtlas {
     std::size_t content = 0;
     QuantizedPose pose;
     bool is_dropped = false;
+    QuantizedPose uploaded_pose = {};
+  };
+  struct Session {
+    SessionState state = SessionState::kLive;
+    bool is_released = false;
   };
 
   const SessionKey& SessionOf(std::size_t frame) const { return script_.frames[frame].key.session; }
   bool IsLive(std::size_t frame) const {
-    return sessions_.at(SessionOf(frame)) && !frames_.at(frame).is_dropped;
+    return IsInMap(sessions_.at(SessionOf(frame)).state) && !frames_.at(frame).is_dropped;
   }
+  SessionState Judge(const SessionKey& key) const;
+  SessionState StateAfter(const SessionKey& key, SessionAction action) const;
+  std::set<TileId> TilesOf(const SessionKey& key) const;
+  std::uint64_t Forget(const SessionKey& key);
   PlacedKeyframe Placed(std::size_t index, const Frame& frame) const;
   std::vector<TileId> Footprint(std::size_t index) const;
   std::uint32_t Touch(const std::set<TileId>& tiles);
@@ -58,7 +69,7 @@ class ModelAtlas {
 
   const AtlasScript& script_;
   std::map<std::size_t, Frame> frames_;  // by their number in the script
-  std::map<SessionKey, bool> sessions_;  // whether they are in the map
+  std::map<SessionKey, Session> sessions_;
   std::set<std::uint64_t> touched_;
 };
 

@@ -25,6 +25,7 @@ class Drawing {
   AtlasScript Draw() {
     DrawProfile();
     DrawFrames();
+    DrawLimits();
     script_.setup = DrawSetup();
     DrawSteps();
     script_.is_verified = OneIn(16);
@@ -44,6 +45,7 @@ class Drawing {
 
   void DrawProfile();
   void DrawFrames();
+  void DrawLimits();
   void DrawSession(const SessionKey& key);
   Keyframe DrawKeyframe();
   FrameContent MakeContent(Keyframe keyframe, std::uint32_t sequence);
@@ -117,6 +119,18 @@ void Drawing::DrawFrames() {
     unsent_.push_back(i);
     std::swap(unsent_.back(), unsent_[Below(static_cast<std::uint32_t>(i + 1))]);
   }
+}
+
+// As a rule so that some sessions are quarantined now and then: frames are 3 m apart, and 0.5 s.
+void Drawing::DrawLimits() {
+  if (OneIn(3)) {
+    return;
+  }
+  PlausibilityLimits& limits = script_.plausibility;
+  limits.max_speed_mps = OneOf(std::array<double, 4>{0.0, 0.5, 3.0, 90.0});
+  limits.max_jump_m = OneOf(std::array<double, 4>{0.5, 2.0, 4.0, 250.0});
+  limits.max_climb_mps = OneOf(std::array<double, 3>{0.0, 0.5, 15.0});
+  limits.max_height_jump_m = OneOf(std::array<double, 3>{0.5, 3.0, 20.0});
 }
 
 void Drawing::DrawSession(const SessionKey& key) {
@@ -268,7 +282,11 @@ void Drawing::AddChange() {
   Step step;
   step.kind = StepKind::kChangeSession;
   step.session = sessions_[Below(static_cast<std::uint32_t>(sessions_.size()))];
-  step.action = OneIn(2) ? SessionAction::kRestore : SessionAction::kRetract;
+  const std::uint32_t chance = Below(16);
+  step.action = chance < 6    ? SessionAction::kRetract
+                : chance < 12 ? SessionAction::kRestore
+                : chance < 15 ? SessionAction::kRelease
+                              : SessionAction::kPurge;
   script_.steps.push_back(step);
   if (OneIn(4)) {
     script_.steps.push_back(std::move(step));

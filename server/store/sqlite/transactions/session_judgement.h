@@ -1,0 +1,26 @@
+// Which state a session is in because of what its keyframes look like: quarantined when two of them
+// that are neighbours in sequence are implausible (plausibility.h) at the poses that they were
+// uploaded with. That is a matter of which keyframes are there, not of the order in which they
+// came. Nobody judges over a gap that a compaction left, nor where a row is damaged.
+#pragma once
+
+#include <optional>
+
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/tables/session_table.h"
+#include "server/store/store_types.h"
+
+namespace atlas {
+
+// By all of its keyframes: live or quarantined.
+SessionJudgement JudgeSession(Connection& connection,
+                              const SessionRow& session,
+                              const PlausibilityLimits& limits);
+
+// What a keyframe that was just added makes of its session; nullopt: it stays what it is. Looks at
+// its neighbours alone, as a rule. Only live and quarantined sessions are judged.
+std::optional<SessionJudgement> JudgeArrival(Connection& connection,
+                                             const SessionRow& session,
+                                             const NewKeyframe& keyframe);
+
+}  // namespace atlas
