@@ -58,9 +58,9 @@ struct DaemonConfig {
   bool is_compacting = false;  // when the store is nearly full
   // How far keyframes that follow each other may be apart (server/store/plausibility.h).
   int quarantine_speed_mps = 90;  // 0: as far as they like, as with the climb
-  int quarantine_jump_m = 250;
+  int quarantine_jump_m = 50;
   int quarantine_climb_mps = 15;
-  int quarantine_height_jump_m = 20;
+  int quarantine_height_jump_m = 10;
   std::optional<HostPort> http;  // the operations port; none: off
 
   // Who comes in. PEM files; a certificate has a key, and makes the daemon speak TLS alone.

@@ -12,9 +12,9 @@ namespace atlas {
 // keyframes may be apart is the jump, however little time passed, and what the speed makes of that.
 struct PlausibilityLimits {
   double max_speed_mps = 90.0;  // 0: as far as they like
-  double max_jump_m = 250.0;
+  double max_jump_m = 50.0;
   double max_climb_mps = 15.0;  // the same up or down; 0: likewise
-  double max_height_jump_m = 20.0;
+  double max_height_jump_m = 10.0;
 
   friend bool operator==(const PlausibilityLimits&, const PlausibilityLimits&) = default;
 };
@@ -29,8 +29,7 @@ struct UploadedPlace {
 };
 
 // What cannot be, in one line for people: "keyframe 17 to 18: 812 m in 0.10 s, at most 90 m/s and
-// 250 m".
-// Which of the two is `a` does not matter.
+// 50 m". Which of the two is `a` does not matter.
 std::optional<std::string> FindImplausible(const UploadedPlace& a,
                                            const UploadedPlace& b,
                                            const PlausibilityLimits& limits);

@@ -85,7 +85,7 @@ TEST_F(QuarantineServiceTest, TheLogSaysWhyAndWhatToDo) {
   UploadWithWild(3);
   const std::string log = Log();
   EXPECT_NE(log.find("session bus/night is quarantined"), std::string::npos) << log;
-  EXPECT_NE(log.find("keyframe 2 to 3: 5002 m in 0.10 s, at most 90 m/s and 250 m"),
+  EXPECT_NE(log.find("keyframe 2 to 3: 5002 m in 0.10 s, at most 90 m/s and 50 m"),
             std::string::npos)
       << log;
 }

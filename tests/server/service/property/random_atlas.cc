@@ -128,7 +128,7 @@ void Drawing::DrawLimits() {
   }
   PlausibilityLimits& limits = script_.plausibility;
   limits.max_speed_mps = OneOf(std::array<double, 4>{0.0, 0.5, 3.0, 90.0});
-  limits.max_jump_m = OneOf(std::array<double, 4>{0.5, 2.0, 4.0, 250.0});
+  limits.max_jump_m = OneOf(std::array<double, 4>{0.5, 2.0, 4.0, 50.0});
   limits.max_climb_mps = OneOf(std::array<double, 3>{0.0, 0.5, 15.0});
   limits.max_height_jump_m = OneOf(std::array<double, 3>{0.5, 3.0, 20.0});
 }
