@@ -66,6 +66,7 @@ Status SettleRestore(const DataDirectory& directory) {
 void Mend(Connection& writer, std::uint8_t levels) {
   writer.Execute("BEGIN IMMEDIATE");
   RestoreCounters(writer);
+  FinishMigration(writer);
   for (const std::int64_t session : ListDamagedSessions(writer)) {
     if (RestoreSession(writer, session, Vouching::kByChecksum)
             .ok()) {  // who needs one that cannot be, is told
@@ -99,7 +100,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     if (Status status = MigrateStore(*writer, options.on_upgrade); !status.ok()) {
       return Error(status.WithContext(directory.database_file().string()));
     }
-    auto identity = ReadIdentity(*writer);
+    auto identity = ReadMeta(*writer);
     if (!identity) {
       return Error(identity.error().WithContext(directory.database_file().string()));
     }

@@ -21,7 +21,7 @@ SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
 WATCH = atlas_pb2.Envelope(request_id=3, watch_request=atlas_pb2.WatchRequest(
     area=geometry.disc(1.5, -2, 100), interval_ms=1000))
 HELLO_REPLY = atlas_pb2.Envelope(request_id=1, hello_reply=atlas_pb2.HelloReply(
-    protocol_major=1, protocol_minor=8, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
+    protocol_major=1, protocol_minor=9, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
     max_frame_bytes=MAX_PAYLOAD_BYTES, name="car.7", role="vehicle", last_sequence=11))
 UPLOAD = atlas_pb2.Envelope(request_id=4, upload_keyframe=atlas_pb2.UploadKeyframe(
     key=atlas_pb2.KeyframeKey(vehicle="car.7", session="monday", sequence=12), time_ms=1_790_000_000_000,

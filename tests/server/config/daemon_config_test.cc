@@ -66,7 +66,7 @@ TEST_F(DaemonConfigTest, WhatPutsASessionIntoQuarantineCanBeSet) {
   };
   const auto usual = Parse({"--data", "/x"});
   ASSERT_TRUE(usual.has_value()) << usual.error().message();
-  EXPECT_EQ(limits(usual->config), (std::vector<int>{90, 250, 15, 20}));
+  EXPECT_EQ(limits(usual->config), (std::vector<int>{90, 50, 15, 10}));
   const auto other = Parse({"--config", File("data = '/x'\n[quarantine]\nmax_speed_mps = 0\n"
                                              "max_jump_m = 1\nmax_climb_mps = 2\n"
                                              "max_height_jump_m = 3\n")});

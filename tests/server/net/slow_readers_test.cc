@@ -39,7 +39,7 @@ class SlowReadersTest : public NetTest {
     net_.max_queued_bytes = 4'096;
     Serve();
     for (std::uint32_t i = 0; i < 48; ++i) {
-      UploadRequest upload = DriveUpload(i);
+      UploadRequest upload = DriveUpload(i, "day-" + std::to_string(i));
       upload.pose = PoseOf({100.0 * i, 0.0, 1.8, 0.0});
       ASSERT_TRUE(Upload(std::move(upload)));
     }

@@ -194,7 +194,7 @@ TEST_F(AtlasTest, RebuildFindsTilesThatAreNotWhatTheirKeyframesMake) {
 TEST_F(AtlasTest, ADamagedKeyframeStopsItsTilesAndNoOthers) {
   Open(0);
   UploadDrive(4);
-  UploadRequest far = DriveUpload(4);
+  UploadRequest far = DriveUpload(4, "elsewhere");
   far.pose = PoseOf({500, 500, 0, 0});
   ASSERT_TRUE(Upload(std::move(far)).has_value());
   Tamper("data", "UPDATE keyframes SET blob = zeroblob(length(blob)) WHERE id = 1");

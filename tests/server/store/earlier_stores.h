@@ -31,6 +31,7 @@ inline constexpr std::array kEarlierStores = {
     EarlierStore{"store_v2", 2},       EarlierStore{"store_v3_first", 3},
     EarlierStore{"store_v3", 3},       EarlierStore{"store_v3_starts", 3},
     EarlierStore{"store_v4_first", 4}, EarlierStore{"store_v4", 4},
+    EarlierStore{"store_v5", 5},
 };
 
 // A database that is opened for as long as this lives.

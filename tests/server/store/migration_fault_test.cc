@@ -93,7 +93,8 @@ INSTANTIATE_TEST_SUITE_P(Versions,
                          ::testing::Values(testing::EarlierStore{"store_v1_first", 1},
                                            testing::EarlierStore{"store_v2", 2},
                                            testing::EarlierStore{"store_v3_first", 3},
-                                           testing::EarlierStore{"store_v4", 4}),
+                                           testing::EarlierStore{"store_v4", 4},
+                                           testing::EarlierStore{"store_v5", 5}),
                          [](const auto& made) { return std::string(made.param.name); });
 
 TEST_P(MigrationFaultTest, ThePowerIsCutAtAnyCall) {

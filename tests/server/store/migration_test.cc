@@ -39,7 +39,9 @@ INSTANTIATE_TEST_SUITE_P(Versions,
 
 TEST_P(MigrationTest, AllThatWasInItIsThere) {
   Make();
-  Tamper("UPDATE dirty_tiles SET since = since - 1");  // marked twice
+  if (GetParam().version < 5) {                          // else that is damage
+    Tamper("UPDATE dirty_tiles SET since = since - 1");  // marked twice
+  }
   std::map<std::string, std::vector<std::string>> before;
   for (const std::string table :
        {"meta", "keyframes", "poses", "pose_history", "pose_batches", "session_states",
@@ -102,11 +104,11 @@ TEST_P(MigrationTest, TheUpgradeIsAnEventAndHappensOnce) {
   Make();
   Open();
   const auto events = store_->ListEvents(0, 100).value();
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].kind, EventKind::kUpgraded);
-  EXPECT_EQ(events[0].author, "atlasd");
-  EXPECT_EQ(events[0].detail, "from version " + std::to_string(GetParam().version));
-  EXPECT_EQ(events[0].revision, store_->ReadCounts()->revision);
+  ASSERT_EQ(events.size(), events_before_ + 1);
+  EXPECT_EQ(events.back().kind, EventKind::kUpgraded);
+  EXPECT_EQ(events.back().author, "atlasd");
+  EXPECT_EQ(events.back().detail, "from version " + std::to_string(GetParam().version));
+  EXPECT_EQ(events.back().revision, store_->ReadCounts()->revision);
   store_.reset();
   const auto dump = testing::DumpStore(Database());
   Open();
@@ -185,7 +187,7 @@ TEST_P(MigrationTest, WithoutTheDaemonItIsReadOnceItWasOpened) {
 
 TEST_P(MigrationTest, WhatCannotBeUpgradedStaysAsItWas) {
   const std::string version = std::to_string(GetParam().version);
-  const std::vector<std::pair<std::string, StatusCode>> cases = {
+  std::vector<std::pair<std::string, StatusCode>> cases = {
       {"PRAGMA user_version = 0", StatusCode::kUnsupported},
       {"PRAGMA user_version = -1", StatusCode::kUnsupported},
       {"PRAGMA user_version = " + std::to_string(kStoreSchemaVersion + 1),
@@ -193,9 +195,11 @@ TEST_P(MigrationTest, WhatCannotBeUpgradedStaysAsItWas) {
       {"PRAGMA application_id = 7", StatusCode::kInvalidData},
       {"UPDATE meta SET epoch = epoch + 1", StatusCode::kInvalidData},
       {"DELETE FROM meta", StatusCode::kInvalidData},
-      {"CREATE TABLE table_sums (x)", StatusCode::kInvalidData},
-      {"DROP TABLE dirty_tiles", StatusCode::kInvalidData},
   };
+  if (GetParam().version < 5) {
+    cases.emplace_back("CREATE TABLE table_sums (x)", StatusCode::kInvalidData);
+    cases.emplace_back("DROP TABLE dirty_tiles", StatusCode::kInvalidData);
+  }
   for (const auto& [damage, code] : cases) {
     SCOPED_TRACE(damage);
     fs::remove_all(options_.directory);
@@ -292,13 +296,13 @@ TEST_P(MigrationTest, ADamagedSessionIsNotBelieved) {
   if (is_older) {
     ASSERT_FALSE(session.has_value());
     EXPECT_EQ(session.error().code(), StatusCode::kInvalidData);
-    EXPECT_EQ(events.size(), 1u);
+    EXPECT_EQ(events.size(), events_before_ + 1);
     return;
   }
   ASSERT_TRUE(session.has_value()) << session.error().message();
   EXPECT_EQ((*session)->bytes, static_cast<std::uint64_t>(bytes));
-  ASSERT_EQ(events.size(), 2u);
-  EXPECT_EQ(events[1].kind, EventKind::kTablesRepaired);
+  ASSERT_EQ(events.size(), events_before_ + 2);
+  EXPECT_EQ(events.back().kind, EventKind::kTablesRepaired);
 }
 
 TEST_P(MigrationTest, ATileThatIsDamagedStaysSo) {
@@ -323,7 +327,9 @@ TEST_P(MigrationTest, NumbersThatRowsTellAreCountedAgain) {
       "UPDATE counters SET value = 99 WHERE name = 'keyframes';"
       "UPDATE counters SET value = 1 WHERE name IN ('revision', 'sessions', 'last_keyframe_id')");
   Open();
-  EXPECT_THAT(Detail(), HasSubstr("it counted 99 keyframes, and the rows say "));
+  if (GetParam().version < 5) {  // else they are restored as ever
+    EXPECT_THAT(Detail(), HasSubstr("it counted 99 keyframes, and the rows say "));
+  }
   EXPECT_TRUE(store_->CheckCounters().ok());
   EXPECT_GE(store_->revision(), static_cast<std::uint64_t>(revision));
   NewKeyframe keyframe = MakeKeyframe(0, {{0, 0, 0}});
@@ -336,7 +342,11 @@ TEST_P(MigrationTest, ASessionThatWasLostIsMissed) {
   Make();
   Tamper("DELETE FROM sessions WHERE id = 1");
   Open();
-  EXPECT_THAT(Detail(), HasSubstr("rows of 1 sessions are lost"));
+  if (GetParam().version < 5) {
+    EXPECT_THAT(Detail(), HasSubstr("rows of 1 sessions are lost"));
+  } else {
+    EXPECT_FALSE(store_->CheckCounters().ok()) << "the upgrade does not make it good";
+  }
   EXPECT_EQ(store_->ReadKeyframe(2).error().code(), StatusCode::kInvalidData) << "it was of it";
   const std::size_t left = store_->ListSessions({}, 1'000).value().size();
   NewKeyframe keyframe = MakeKeyframe(0, {{0, 0, 0}});

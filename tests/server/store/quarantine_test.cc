@@ -17,6 +17,8 @@ const TileId kB{0, 1, 0};
 const SessionKey kDay{"bus", "day"};
 
 // Where and when a keyframe of the session is.
+constexpr PlausibilityLimits kLimits{90.0, 250.0, 15.0, 20.0};
+
 struct Spot {
   std::int64_t x_m = 0;
   std::int64_t time_ms = 0;
@@ -29,7 +31,7 @@ class QuarantineTest : public StoreTest {
     keyframe.key.session.session = session;
     keyframe.time_ms = spot.time_ms;
     keyframe.pose = PoseAt(spot.x_m * 1'000'000);
-    keyframe.limits = PlausibilityLimits();
+    keyframe.limits = kLimits;
     return keyframe;
   }
   PutKeyframeResult PutAt(std::uint32_t sequence,
@@ -41,8 +43,7 @@ class QuarantineTest : public StoreTest {
   }
   Result<SessionChangeResult> Change(SessionAction action, const SessionKey& key = kDay) {
     return Await<SessionChangeResult>([&](auto done) {
-      store_->ChangeSession({key, action, "tester", "why not", PlausibilityLimits()},
-                            std::move(done));
+      store_->ChangeSession({key, action, "tester", "why not", kLimits}, std::move(done));
     });
   }
   SessionState State(const std::string& session = "day") {
@@ -170,7 +171,7 @@ TEST_F(QuarantineTest, TheVerdictIsAMatterOfTheSetAlone) {
       const auto place = [&spots](std::uint32_t at) {
         return UploadedPlace{at, spots[at].time_ms, spots[at].x_m * 1'000'000, 0, 0};
       };
-      is_any = is_any || FindImplausible(place(i), place(i + 1), {});
+      is_any = is_any || FindImplausible(place(i), place(i + 1), kLimits);
     }
     return is_any;
   };

@@ -16,6 +16,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::int64_t kFirstOfTheseTables = 5;  // no row is another since
+
 // Indexes are sorted for on disk: memory does not grow with the atlas.
 constexpr const char* kSortOnDisk = "PRAGMA temp_store = FILE";
 constexpr const char* kSortInMemory = "PRAGMA temp_store = MEMORY";
@@ -34,13 +36,21 @@ std::string RunSteps(Connection& connection, std::int64_t from, const MapProfile
   return MigrateFromVersion4(connection);
 }
 
-void RunInOneTransaction(Connection& connection, std::int64_t from, const MapProfile& profile) {
-  connection.Execute("BEGIN IMMEDIATE");
-  const std::string noticed = RunSteps(connection, from, profile);
+void AddUpgradeEvent(Connection& connection, std::int64_t from, const std::string& noticed) {
   AddEvent(connection, {EventKind::kUpgraded, kAtlasItself, StrCat("version ", kStoreSchemaVersion),
                         StrCat("from version ", from, noticed)});
+}
+
+void WriteVersion(Connection& connection) {
+  connection.Execute(StrCat("PRAGMA user_version = ", kStoreSchemaVersion).c_str());
+}
+
+void RunInOneTransaction(Connection& connection, std::int64_t from, const MapProfile& profile) {
+  connection.Execute("BEGIN IMMEDIATE");
+  AddUpgradeEvent(connection, from, RunSteps(connection, from, profile));
   WriteTableSums(connection);
-  connection.Execute(StrCat("PRAGMA user_version = ", kStoreSchemaVersion, "; COMMIT;").c_str());
+  WriteVersion(connection);
+  connection.Execute("COMMIT");
 }
 
 // Nothing of this program's making is wrong with a file that lacks a table, or has one too many.
@@ -69,6 +79,9 @@ Status MigrateStore(Connection& connection, const std::function<void(std::int64_
   if (on_begin) {
     on_begin(*from);
   }
+  if (*from >= kFirstOfTheseTables) {
+    return {};
+  }
   try {
     connection.Execute(kSortOnDisk);
     RunInOneTransaction(connection, *from, identity->profile);
@@ -76,6 +89,14 @@ Status MigrateStore(Connection& connection, const std::function<void(std::int64_
     return {};
   } catch (const std::exception& error) {
     return Failure(error, *from);
+  }
+}
+
+void FinishMigration(Connection& connection) {
+  const std::int64_t from = ReadSchemaVersion(connection).value();  // MigrateStore() read it
+  if (from != kStoreSchemaVersion) {
+    AddUpgradeEvent(connection, from, "");
+    WriteVersion(connection);
   }
 }
 

@@ -8,7 +8,7 @@
 namespace atlas {
 
 inline constexpr std::int64_t kStoreApplicationId = 0x52414131;  // "RAA1"
-inline constexpr std::int64_t kStoreSchemaVersion = 5;
+inline constexpr std::int64_t kStoreSchemaVersion = 6;
 
 // Makes the tables of an empty database and writes who it is, in one transaction.
 void CreateSchema(Connection& connection, const StoreIdentity& identity);
