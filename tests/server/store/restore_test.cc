@@ -1,5 +1,6 @@
 #include <fstream>
 
+#include "server/store/sqlite/schema/schema.h"
 #include "tests/server/store/backup_fixture.h"
 
 namespace atlas {
@@ -144,12 +145,25 @@ TEST_F(RestoreTest, RefusesWhatIsNoBackup) {
 
 TEST_F(RestoreTest, RefusesAnotherSchema) {
   Fill(1);
-  for (const char* version : {"6", "4"}) {
-    Tamper(std::string("PRAGMA user_version = ") + version);
+  for (const std::int64_t version : {kStoreSchemaVersion + 1, kFirstReadableVersion - 1}) {
+    Tamper("PRAGMA user_version = " + std::to_string(version));
     std::filesystem::copy_file(Database(), backup(),
                                std::filesystem::copy_options::overwrite_existing);
     ExpectRefused(StatusCode::kUnsupported);
   }
+}
+
+// Such as was made before the daemon was upgraded: it upgrades the atlas when it opens it.
+TEST_F(RestoreTest, TakesABackupOfAnEarlierVersionWhoseRowsAreTodays) {
+  Fill(3);
+  Tamper("PRAGMA user_version = " + std::to_string(kFirstReadableVersion));
+  std::filesystem::copy_file(Database(), backup(),
+                             std::filesystem::copy_options::overwrite_existing);
+  const auto done = Restore();
+  ASSERT_TRUE(done.has_value()) << done.error().message();
+  OpenRestored();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 3u);
+  EXPECT_EQ(store_->ListEvents(0, 100)->back().kind, EventKind::kUpgraded);
 }
 
 TEST_F(RestoreTest, RefusesAnotherPlace) {

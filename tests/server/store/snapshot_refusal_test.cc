@@ -61,7 +61,7 @@ TEST_F(SnapshotRefusalTest, WhatIsNoAtlasIsInvalid) {
 TEST_F(SnapshotRefusalTest, AnotherSchemaVersionIsUnsupported) {
   Fill();
   for (const auto& [version, advice] :
-       {std::pair{kStoreSchemaVersion - 1, "open it once with atlasd"},
+       {std::pair{kFirstReadableVersion - 1, "open it once with atlasd"},
         std::pair{kStoreSchemaVersion + 1, "use the version that wrote it"}}) {
     Tamper("PRAGMA user_version = " + std::to_string(version));
     const auto snapshot = OpenFile(Database());

@@ -16,8 +16,6 @@
 namespace atlas {
 namespace {
 
-constexpr std::int64_t kFirstOfTheseTables = 5;  // no row is another since
-
 // Indexes are sorted for on disk: memory does not grow with the atlas.
 constexpr const char* kSortOnDisk = "PRAGMA temp_store = FILE";
 constexpr const char* kSortInMemory = "PRAGMA temp_store = MEMORY";
@@ -79,7 +77,7 @@ Status MigrateStore(Connection& connection, const std::function<void(std::int64_
   if (on_begin) {
     on_begin(*from);
   }
-  if (*from >= kFirstOfTheseTables) {
+  if (*from >= kFirstReadableVersion) {
     return {};
   }
   try {

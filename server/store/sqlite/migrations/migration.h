@@ -20,8 +20,9 @@ namespace atlas {
 // sqlite_error.h.
 Status MigrateStore(Connection& connection, const std::function<void(std::int64_t)>& on_begin);
 
-// The same for a version whose tables are today's: there MigrateStore() changes nothing. Within the
-// transaction that makes good what is damaged, of a connection that keeps the sums of its tables.
+// The same for a version from kFirstReadableVersion on: there MigrateStore() changes nothing.
+// Within the transaction that makes good what is damaged, of a connection that keeps the sums of
+// its tables.
 void FinishMigration(Connection& connection);
 
 }  // namespace atlas

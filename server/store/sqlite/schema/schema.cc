@@ -224,10 +224,11 @@ Result<StoreIdentity> ReadIdentity(Connection& connection) {
   if (!version) {
     return Error(version.error());
   }
-  if (*version < kStoreSchemaVersion) {
-    return Error(StatusCode::kUnsupported,
-                 StrCat("store: schema version ", *version, ", this build reads ",
-                        kStoreSchemaVersion, "; open it once with atlasd, which upgrades it"));
+  if (*version < kFirstReadableVersion) {
+    return Error(
+        StatusCode::kUnsupported,
+        StrCat("store: schema version ", *version, ", this build reads ", kFirstReadableVersion,
+               " to ", kStoreSchemaVersion, "; open it once with atlasd, which upgrades it"));
   }
   return ReadMeta(connection);
 }

@@ -9,6 +9,8 @@ namespace atlas {
 
 inline constexpr std::int64_t kStoreApplicationId = 0x52414131;  // "RAA1"
 inline constexpr std::int64_t kStoreSchemaVersion = 6;
+// From this one on all rows are today's, and can be read as they are.
+inline constexpr std::int64_t kFirstReadableVersion = 5;
 
 // Makes the tables of an empty database and writes who it is, in one transaction.
 void CreateSchema(Connection& connection, const StoreIdentity& identity);
@@ -20,7 +22,7 @@ Result<std::int64_t> ReadSchemaVersion(Connection& connection);
 Result<StoreIdentity> ReadMeta(Connection& connection);
 // Of an atlas of today's version, inside a transaction.
 void WriteEpoch(Connection& connection, const StoreIdentity& identity, std::uint64_t epoch);
-// The same as ReadMeta, but kUnsupported on an earlier version, too.
+// The same as ReadMeta, but kUnsupported on a version before kFirstReadableVersion, too.
 Result<StoreIdentity> ReadIdentity(Connection& connection);
 
 }  // namespace atlas
