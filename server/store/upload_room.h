@@ -19,6 +19,7 @@ namespace atlas {
 struct UploadSize {
   std::string vehicle;
   std::uint64_t blob_bytes = 0;
+  // Looked at where there is a limit of them.
   std::uint64_t vehicle_bytes = 0;  // stored blobs of the vehicle
   std::uint64_t used_bytes = 0;     // pages of the database
 };
@@ -31,6 +32,7 @@ class UploadRoom {
   explicit UploadRoom(DiskRoom::Read read_free_bytes) : disk_(std::move(read_free_bytes)) {}
 
   void set_limits(const UploadLimits& limits);
+  UploadLimits limits() const;
   // kResourceExhausted, with one of kUploadRefusalReasons. What the system says
   // where it does not tell how much is free, and a floor is set.
   Status Check(const UploadSize& upload, Clock::time_point now);
@@ -44,7 +46,6 @@ class UploadRoom {
  private:
   Status CheckDisk(const UploadLimits& limits, Clock::time_point now);
   Status Refused(UploadRefusal why, Status status, Clock::time_point now);
-  UploadLimits limits() const;
 
   mutable std::mutex mutex_;
   UploadLimits limits_;

@@ -161,9 +161,15 @@ Result<SessionRow> FindOrBeginSession(Connection& connection, const NewKeyframe&
 
 Status CheckRoom(Connection& connection, const NewKeyframe& keyframe, UploadRoom& room) {
   const std::string& vehicle = keyframe.key.session.vehicle;
-  return room.Check({vehicle, keyframe.blob.size(), ReadVehicleBytes(connection, vehicle),
-                     ReadUsedBytes(connection)},
-                    UploadRoom::Clock::now());
+  const UploadLimits limits = room.limits();
+  UploadSize size{vehicle, keyframe.blob.size()};
+  if (limits.vehicle_bytes > 0) {
+    size.vehicle_bytes = ReadVehicleBytes(connection, vehicle);
+  }
+  if (limits.store_bytes > 0) {
+    size.used_bytes = ReadUsedBytes(connection);
+  }
+  return room.Check(size, UploadRoom::Clock::now());
 }
 
 Status CheckKeysDiffer(const PoseBatch& batch) {
