@@ -44,10 +44,13 @@ run() {
 
 scale=1
 ((long)) && scale=10
-unset ATLAS_PROPERTY_CASES  # how many there are is the script's to say
+# How many lives of an atlas there are is the script's to say.
+unset ATLAS_PROPERTY_CASES
+((long)) && export ATLAS_PROPERTY_CASES=10000
 export ATLAS_TEST_SCALE=$scale
 run dev all
 if ((sanitize)); then
+  unset ATLAS_PROPERTY_CASES
   export ATLAS_TEST_SCALE=0.1
   run asan all -L 'unit|integration' -LE data
   run tsan threads_tests -L threads

@@ -1,5 +1,5 @@
-// How many random worlds a test makes: ATLAS_TEST_SCALE times as many as usual (default 1; 0.1
-// under sanitizers, 10 with deploy/test.sh --long), and one at least.
+// How much a test tries: ATLAS_TEST_SCALE times as much as usual (default 1; 0.1 under sanitizers,
+// 10 with deploy/test.sh --long).
 #pragma once
 
 #include <algorithm>
@@ -9,10 +9,19 @@
 
 namespace atlas::testing {
 
-inline std::uint32_t Scaled(std::uint32_t usual) {
+inline double Scale() {
   const char* text = std::getenv("ATLAS_TEST_SCALE");
-  const double scale = text == nullptr ? 1.0 : std::atof(text);
-  return static_cast<std::uint32_t>(std::max(1.0, std::round(scale * usual)));
+  return text == nullptr ? 1.0 : std::atof(text);
+}
+
+// So many random worlds instead of the usual, and one at least.
+inline std::uint32_t Scaled(std::uint32_t usual) {
+  return static_cast<std::uint32_t>(std::max(1.0, std::round(Scale() * usual)));
+}
+
+// From one point of failure to the next: each, or with less than the usual scale one in as many.
+inline std::uint32_t Stride() {
+  return static_cast<std::uint32_t>(std::max(1.0, std::round(1.0 / std::max(Scale(), 0.01))));
 }
 
 }  // namespace atlas::testing

@@ -1,5 +1,6 @@
 // A backup and a restore whose disk fails at any one of its calls, once or from then on, or is
 // full, or loses its power: there is a whole one, or none, and the atlas that was there.
+#include "tests/core/support/test_scale.h"
 #include "tests/server/store/backup_fixture.h"
 #include "tests/server/store/faulty_vfs.h"
 
@@ -24,7 +25,7 @@ class BackupFaultTest : public BackupTest {
   template <typename Work, typename Judge>
   std::uint64_t FailEach(
       Calls calls, Until until, bool is_full, const Work& work, const Judge& judge) {
-    for (std::uint64_t number = 1;; ++number) {
+    for (std::uint64_t number = 1;; number += testing::Stride()) {
       vfs_.BeginAnew();
       vfs_.FailAt(number, calls, until, is_full);
       const bool is_done = work();

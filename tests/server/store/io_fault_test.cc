@@ -198,7 +198,7 @@ class IoFaultTest : public StoreTest {
   }
   template <typename Then>
   std::uint64_t FailEach(Calls calls, Until until, bool is_full, const Then& then) {
-    for (std::uint64_t number = 1;; ++number) {
+    for (std::uint64_t number = 1;; number += testing::Stride()) {
       store_.reset();
       std::filesystem::remove_all(options_.directory);
       ledger_ = Ledger();

@@ -1,6 +1,5 @@
 // An upgrade that is ended at any call to the disk: the atlas is whole, of its earlier version or
 // of today's.
-#include <algorithm>
 #include <optional>
 
 #include "tests/core/support/test_scale.h"
@@ -34,7 +33,7 @@ class MigrationFaultTest : public EarlierStoreTest {
     Make();
     fs::rename(options_.directory, directory_ / "original");
     const auto before = testing::DumpStore(directory_ / "original" / "atlas.db");
-    for (std::uint64_t number = 1;; number += Stride()) {
+    for (std::uint64_t number = 1;; number += testing::Stride()) {
       PutBack("original");
       vfs_.BeginAnew();
       vfs_.FailAt(number, fault.calls, fault.until, fault.is_full);
@@ -56,11 +55,6 @@ class MigrationFaultTest : public EarlierStoreTest {
   }
 
  private:
-  // Each call, or with less than the usual scale one in as many.
-  static std::uint64_t Stride() {
-    constexpr std::uint32_t kUsual = 10;
-    return std::max(1U, kUsual / std::min(kUsual, testing::Scaled(kUsual)));
-  }
   void PutBack(const std::string& name) {
     store_.reset();
     fs::remove_all(options_.directory);

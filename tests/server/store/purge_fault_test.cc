@@ -1,5 +1,6 @@
 // A purge whose disk fails at any of its calls, is full or loses its power, or whose process is
 // killed: all of the session is there afterwards, or nothing.
+#include "tests/core/support/test_scale.h"
 #include "tests/server/store/faulty_vfs.h"
 #include "tests/server/store/purge_fixture.h"
 
@@ -44,7 +45,7 @@ class PurgeFaultTest : public PurgeTest {
   // Each call in its turn, until none is left to fail; `then` whatever becomes of the disk.
   template <typename Then>
   void FailEach(Calls calls, Until until, bool is_full, const Then& then) {
-    for (std::uint64_t number = 1; !HasFailure(); ++number) {
+    for (std::uint64_t number = 1; !HasFailure(); number += testing::Stride()) {
       std::filesystem::remove_all(options_.directory);
       Fill();
       store_.reset();

@@ -9,6 +9,7 @@
 #include "server/store/sqlite/migrations/from_version_2.h"
 #include "server/store/sqlite/migrations/from_version_3.h"
 #include "server/store/sqlite/migrations/from_version_4.h"
+#include "server/store/sqlite/migrations/from_version_5.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
@@ -31,7 +32,9 @@ std::string RunSteps(Connection& connection, std::int64_t from, const MapProfile
   if (from < 4) {
     MigrateFromVersion3(connection);
   }
-  return MigrateFromVersion4(connection);
+  std::string noticed = MigrateFromVersion4(connection);
+  MigrateFromVersion5(connection);
+  return noticed;
 }
 
 void AddUpgradeEvent(Connection& connection, std::int64_t from, const std::string& noticed) {
@@ -93,6 +96,7 @@ Status MigrateStore(Connection& connection, const std::function<void(std::int64_
 void FinishMigration(Connection& connection) {
   const std::int64_t from = ReadSchemaVersion(connection).value();  // MigrateStore() read it
   if (from != kStoreSchemaVersion) {
+    MigrateFromVersion5(connection);
     AddUpgradeEvent(connection, from, "");
     WriteVersion(connection);
   }

@@ -29,6 +29,7 @@ CREATE TABLE sessions (
   compacted INTEGER NOT NULL,
   checksum INTEGER NOT NULL,
   UNIQUE (vehicle, session));
+CREATE INDEX quarantined_sessions ON sessions (id) WHERE state = 2;
 
 CREATE TABLE keyframes (
   id INTEGER PRIMARY KEY,
