@@ -10,7 +10,7 @@ seconds=${1:-60}
 shift || true
 [[ $seconds =~ ^[1-9][0-9]*$ ]] || { echo "usage: deploy/fuzz.sh [SECONDS] [TARGET...]" >&2; exit 2; }
 . deploy/packages.sh
-install_packages "${BUILD_PACKAGES[@]}" "${FUZZ_PACKAGES[@]}"
+install_packages "${BUILD_PACKAGES[@]}" "${TEST_PACKAGES[@]}" "${FUZZ_PACKAGES[@]}"
 if (($#)); then
   targets=("$@")
 else

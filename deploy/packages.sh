@@ -12,7 +12,7 @@ TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-pr
   xz-utils)
 BENCH_PACKAGES=(libbenchmark-dev openssl python3-matplotlib)
 TIDY_PACKAGES=(clang-tidy)
-FUZZ_PACKAGES=(clang libclang-rt-14-dev)
+FUZZ_PACKAGES=(clang libclang-rt-14-dev llvm)
 
 # install_packages PACKAGE...: asks apt only for what is missing.
 install_packages() {

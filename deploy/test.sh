@@ -19,6 +19,7 @@ done
 . deploy/packages.sh
 . deploy/data.sh
 install_packages "${BUILD_PACKAGES[@]}" "${TEST_PACKAGES[@]}"
+((sanitize == 0)) || install_packages "${FUZZ_PACKAGES[@]}"
 find_data "$root"
 [[ -n ${ATLAS_DATA:-} ]] || echo "ATLAS_DATA is not set and ../shared/data is not there: tests on real drives will be skipped"
 

@@ -156,7 +156,8 @@ TEST_F(RestoreTest, RefusesAnotherSchema) {
 // Such as was made before the daemon was upgraded: it upgrades the atlas when it opens it.
 TEST_F(RestoreTest, TakesABackupOfAnEarlierVersionWhoseRowsAreTodays) {
   Fill(3);
-  Tamper("PRAGMA user_version = " + std::to_string(kFirstReadableVersion));
+  Tamper("DROP INDEX quarantined_sessions; PRAGMA user_version = " +
+         std::to_string(kFirstReadableVersion));
   std::filesystem::copy_file(Database(), backup(),
                              std::filesystem::copy_options::overwrite_existing);
   const auto done = Restore();

@@ -128,7 +128,7 @@ TEST_F(RegionQueryTest, LevelsCanBeChosen) {
 TEST_F(RegionQueryTest, HostileDiscsAreHarmless) {
   for (const std::int64_t x : {INT64_MIN, std::int64_t{0}, INT64_MAX}) {
     for (const std::uint64_t radius : {std::uint64_t{0}, UINT64_MAX}) {
-      Run({RegionDisc{x, -x / 2, radius}});
+      Run({RegionDisc{x, -(x / 2), radius}});
     }
   }
 }
