@@ -134,7 +134,7 @@ class AtlasStore : public TileIndex {
   // the last change.
   virtual Result<StoredKeyframe> ReadKeyframe(std::int64_t id) = 0;
 
-  // nullopt: there is no such tile.
+  // nullopt: there is no such tile. kInvalidData, too: it is listed, and its row is not found.
   virtual Result<std::optional<StoredTile>> ReadTile(const TileId& id) = 0;
   // Tiles above `after_key` in key order, all levels, up to `limit`; `after_key` -1 is the start.
   virtual Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key,

@@ -1,6 +1,7 @@
 #include "tests/client/ledger/clean_atlas.h"
 
 #include <chrono>
+#include <optional>
 #include <stdexcept>
 
 #include "client/connection/atlas_client.h"
@@ -13,6 +14,18 @@ namespace {
 
 void Expect(const Status& status) {
   if (!status.ok()) throw std::runtime_error("a clean atlas: " + status.message());
+}
+
+// What brings a session into this state that was uploaded; nullopt: nothing is to be asked for.
+std::optional<SessionAction> ActionFor(SessionState state) {
+  switch (state) {
+    case SessionState::kRetracted:
+      return SessionAction::kRetract;
+    case SessionState::kReleased:
+      return SessionAction::kRelease;
+    default:
+      return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -32,9 +45,10 @@ Bytes CleanDigest(const StoredAtlas& atlas,
     Expect(uploader.Upload({key, frame.time_ms, frame.pose, blob}));
   }
   Expect(uploader.Finish());
-  for (const auto& [key, is_retracted] : atlas.retracted) {
-    if (!is_retracted) continue;
-    const auto changed = client->ChangeSession(key, SessionAction::kRetract, "");
+  for (const auto& [key, state] : atlas.states) {
+    const auto action = ActionFor(state);
+    if (!action) continue;
+    const auto changed = client->ChangeSession(key, *action, "");
     if (!changed) Expect(changed.error());
   }
   const auto digest = client->Digest(std::chrono::seconds(120));

@@ -202,6 +202,10 @@ void CrashFigures::Count(const LedgerState& ledger) {
     ++(batch.is_acknowledged ? pose_batches : unanswered);
   }
   session_changes += ledger.session_changes;
+  for (const auto& [number, session] : ledger.sessions) {
+    releases += session.done == SessionAction::kRelease ? 1U : 0U;
+    purges += session.done == SessionAction::kPurge ? 1U : 0U;
+  }
 }
 
 }  // namespace atlas::testing

@@ -28,6 +28,8 @@ struct CrashFigures {
   std::uint64_t keyframes = 0;          // acknowledged, or taken by a spool
   std::uint64_t pose_batches = 0;       // acknowledged, as are the next
   std::uint64_t session_changes = 0;
+  std::uint64_t releases = 0;  // sessions that were let out of quarantine
+  std::uint64_t purges = 0;
   std::uint64_t unanswered = 0;     // keyframes and pose batches: may be there
   std::vector<double> restarts_ms;  // exec until the first request is answered
   Verdict verdict;

@@ -17,7 +17,9 @@ namespace {
 
 constexpr std::array<VehicleKind, Fleet::kVehicles> kKinds = {
     VehicleKind::kDirect, VehicleKind::kDirect, VehicleKind::kDirect, VehicleKind::kResume,
-    VehicleKind::kResume, VehicleKind::kSpool,  VehicleKind::kSpool,  VehicleKind::kSpool};
+    VehicleKind::kResume, VehicleKind::kSpool,  VehicleKind::kSpool,  VehicleKind::kSpool,
+    VehicleKind::kLeap,   VehicleKind::kPurge};
+static_assert(kKinds[kLeapingVehicle] == VehicleKind::kLeap);
 
 std::string NameOf(VehicleKind kind) {
   switch (kind) {
@@ -27,6 +29,10 @@ std::string NameOf(VehicleKind kind) {
       return "resume";
     case VehicleKind::kSpool:
       return "spool";
+    case VehicleKind::kLeap:
+      return "leap";
+    case VehicleKind::kPurge:
+      return "purge";
   }
   return "";
 }

@@ -14,7 +14,7 @@ namespace atlas::testing {
 
 class Fleet {
  public:
-  static constexpr int kVehicles = 8;  // three direct, two that resume, three with a spool
+  static constexpr int kVehicles = 10;  // of all kinds
 
   Fleet(std::filesystem::path folder, std::uint16_t port, std::uint32_t seed);
   ~Fleet();

@@ -21,9 +21,13 @@ struct FrameId {
 };
 
 inline constexpr std::uint32_t kFramesOfASession = 32;
+// In every other session of this vehicle one keyframe is far from those beside it.
+inline constexpr int kLeapingVehicle = 8;
+inline constexpr std::uint32_t kLeapSequence = 6;
 
 MapProfile FleetProfile();  // cells of 0.2 m
 
+bool HasLeap(int vehicle, std::uint32_t session);
 SessionKey FleetSession(int vehicle, std::uint32_t session);
 KeyframeKey FleetKey(int vehicle, const FrameId& frame);
 std::int64_t FleetTime(const FrameId& frame);  // ms since 1970

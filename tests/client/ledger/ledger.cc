@@ -32,7 +32,29 @@ std::string TextFrom(const std::filesystem::path& file, std::uint64_t offset) {
   return text.str();
 }
 
+std::optional<SessionAction> ActionOf(std::string_view word) {
+  for (const SessionAction action : {SessionAction::kRetract, SessionAction::kRestore,
+                                     SessionAction::kRelease, SessionAction::kPurge}) {
+    if (word == WordOf(action)) return action;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
+
+std::string_view WordOf(SessionAction action) {
+  switch (action) {
+    case SessionAction::kRetract:
+      return "retract";
+    case SessionAction::kRestore:
+      return "restore";
+    case SessionAction::kRelease:
+      return "release";
+    case SessionAction::kPurge:
+      return "purge";
+  }
+  return "";
+}
 
 void LedgerState::Apply(std::string_view line) {
   const std::size_t space = std::min(line.find(' '), line.size());
@@ -53,7 +75,7 @@ void LedgerState::Apply(std::string_view line) {
     }
   } else if (word == "move" || word == "moved") {
     ApplyToPoses(word, rest);
-  } else if (word == "retract" || word == "restore" || word == "changed") {
+  } else if (word == "changed" || ActionOf(word)) {
     std::uint32_t session = 0;
     numbers >> session;
     ApplyToSession(word, session);
@@ -103,11 +125,11 @@ void LedgerState::ApplyToSession(std::string_view word, std::uint32_t number) {
   if (word == "changed") {
     --in_flight;
     ++session_changes;
-    session.is_retracted = session.asked_to_retract.value();
-    session.asked_to_retract.reset();
+    session.done = session.asked.value();
+    session.asked.reset();
   } else {
     ++in_flight;
-    session.asked_to_retract = word == "retract";
+    session.asked = ActionOf(word);
   }
 }
 

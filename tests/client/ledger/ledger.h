@@ -12,9 +12,12 @@
 #include <string_view>
 #include <vector>
 
+#include "core/geometry/session_action.h"
 #include "tests/client/ledger/fleet_frames.h"
 
 namespace atlas::testing {
+
+std::string_view WordOf(SessionAction action);
 
 // What the lines say. The words:
 //   start | connected | lost       of the process, of its connection
@@ -22,7 +25,7 @@ namespace atlas::testing {
 //   put S N | taken S N            of the spool
 //   send | sent                    all that the spool has; it is empty
 //   move V S:N S:N ... | moved V   poses, to version V
-//   retract S | restore S | changed S
+//   retract S | restore S | release S | purge S | changed S
 //   wrong WORDS                    an answer that there must not be
 struct LedgerState {
   struct Frame {
@@ -34,8 +37,12 @@ struct LedgerState {
     bool is_acknowledged = false;
   };
   struct Session {
-    bool is_retracted = false;             // as it was acknowledged
-    std::optional<bool> asked_to_retract;  // and not answered yet
+    std::optional<SessionAction> done;   // the last one that was acknowledged
+    std::optional<SessionAction> asked;  // and not answered yet
+
+    bool may_be_purged() const {
+      return done == SessionAction::kPurge || asked == SessionAction::kPurge;
+    }
   };
 
   std::map<FrameId, Frame> frames;

@@ -1,5 +1,6 @@
 // A vehicle of the ledger test in a process of its own. Usage: LEDGER SPOOL KIND NUMBER PORT SEED,
-// KIND one of direct, resume, spool. Ends with a wrong answer, or with the process that began it.
+// KIND one of direct, resume, spool, leap, purge. Ends with a wrong answer, or with the process
+// that began it.
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -15,10 +16,12 @@ int main(int argc, char** argv) {
   using atlas::testing::VehicleKind;
   const std::map<std::string, VehicleKind> kinds = {{"direct", VehicleKind::kDirect},
                                                     {"resume", VehicleKind::kResume},
-                                                    {"spool", VehicleKind::kSpool}};
+                                                    {"spool", VehicleKind::kSpool},
+                                                    {"leap", VehicleKind::kLeap},
+                                                    {"purge", VehicleKind::kPurge}};
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (argc != 7 || !kinds.contains(argv[3])) {
-    std::fputs("usage: LEDGER SPOOL direct|resume|spool NUMBER PORT SEED\n", stderr);
+    std::fputs("usage: LEDGER SPOOL direct|resume|spool|leap|purge NUMBER PORT SEED\n", stderr);
     return 2;
   }
   try {

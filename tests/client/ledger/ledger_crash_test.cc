@@ -1,5 +1,5 @@
 // What was acknowledged stays, whenever the daemon is killed, and whenever those are killed who
-// asked: eight vehicles with ledgers, one daemon, SIGKILL. ATLAS_TEST_SCALE=70 makes 2,100 kills of
+// asked: ten vehicles with ledgers, one daemon, SIGKILL. ATLAS_TEST_SCALE=70 makes 2,100 kills of
 // it. Who gets how far before a kill is the machine's to say: the seed fixes what is drawn, and no
 // more.
 #include <algorithm>
@@ -25,7 +25,7 @@ std::ostream& operator<<(std::ostream& out, const Verdict& verdict) {
   return out << verdict.lost << " lost, " << verdict.twice << " twice, " << verdict.foreign
              << " never sent, " << verdict.altered << " altered, " << verdict.misplaced
              << " at another pose, " << verdict.torn << " batches in part, " << verdict.misjudged
-             << " sessions in another state";
+             << " sessions in another state, " << verdict.left << " left of purged ones";
 }
 
 std::ostream& operator<<(std::ostream& out, const CrashFigures& figures) {
@@ -36,7 +36,8 @@ std::ostream& operator<<(std::ostream& out, const CrashFigures& figures) {
       << " while it started, " << figures.starts_dirty << " starts with tiles to fuse; "
       << figures.vehicle_kills << " vehicles killed\nledger: " << figures.keyframes
       << " keyframes, " << figures.pose_batches << " pose batches and " << figures.session_changes
-      << " changes of sessions acknowledged, " << figures.unanswered
+      << " changes of sessions acknowledged (" << figures.releases << " released, "
+      << figures.purges << " purged), " << figures.unanswered
       << " never answered\nledger: " << figures.verdict << "; " << figures.digest_mismatches
       << " mismatches in " << figures.checks << " digests";
   if (!restarts.empty()) {
@@ -78,6 +79,8 @@ TEST_F(LedgerCrashTest, WhatWasAcknowledgedIsThereOnceWheneverTheDaemonIsKilled)
   // Else nothing was tested. Three kills, under sanitizers, may all come between requests.
   if (figures.kills >= kKills) {
     EXPECT_GT(figures.requests_cut, 0U);
+    EXPECT_GT(figures.releases, 0U);
+    EXPECT_GT(figures.purges, 0U);
   }
 }
 

@@ -8,6 +8,7 @@
 #include "client/vehicle/stored_file.h"
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
+#include "server/store/plausibility.h"
 
 namespace atlas::testing {
 
@@ -19,6 +20,7 @@ void Verdict::Add(const Verdict& other) {
   misplaced += other.misplaced;
   torn += other.torn;
   misjudged += other.misjudged;
+  left += other.left;
   if (first.empty()) first = other.first;
 }
 
@@ -42,10 +44,14 @@ void LedgerJudge::JudgeFrames(int vehicle, const LedgerState& ledger, const Spoo
     const KeyframeKey key = FleetKey(vehicle, id);
     known_.insert(key);
     const auto stored = atlas_.frames.find(key);
+    const bool is_purged = IsPurged(key.session);
     if (stored != atlas_.frames.end()) {
+      if (is_purged) Note(verdict_.left, StrCat(key, " is there, and its session was purged"));
       const bool is_as_sent = stored->second.time_ms == FleetTime(id) &&
                               stored->second.blob_hash == Hash64(FleetBlob(key));
       if (!is_as_sent) Note(verdict_.altered, StrCat(key, " is not what was sent"));
+    } else if (is_purged) {
+      continue;  // whether somebody asked for it is a matter of the session
     } else if (frame.is_acknowledged) {
       Note(verdict_.lost, StrCat(key, " was acknowledged and is not there"));
     } else if (frame.is_taken && !spooled.contains(key)) {
@@ -85,8 +91,10 @@ void LedgerJudge::JudgePoses(int vehicle, const LedgerState& ledger) {
     bool has_happened = false;
     bool is_missing = false;
     for (const FrameId& id : batch.frames) {
-      has_happened |= stands[id] == version;
-      is_missing |= stands[id] < version;
+      const auto stand = stands.find(id);
+      if (stand == stands.end()) continue;  // purged, lost or misplaced
+      has_happened |= stand->second == version;
+      is_missing |= stand->second < version;
     }
     if (has_happened && is_missing) {
       Note(verdict_.torn, StrCat("car", vehicle, ": batch ", version, " happened in part"));
@@ -97,18 +105,60 @@ void LedgerJudge::JudgePoses(int vehicle, const LedgerState& ledger) {
 void LedgerJudge::JudgeSessions(int vehicle, const LedgerState& ledger) {
   for (const auto& [number, session] : ledger.sessions) {
     const SessionKey key = FleetSession(vehicle, number);
-    const auto stored = atlas_.retracted.find(key);
-    if (stored == atlas_.retracted.end()) continue;  // nothing of it is there
-    if (stored->second != session.is_retracted &&
-        stored->second != session.asked_to_retract.value_or(session.is_retracted)) {
-      Note(verdict_.misjudged, StrCat(key, stored->second ? " is retracted" : " is in the map"));
+    const auto stored = atlas_.states.find(key);
+    if (stored == atlas_.states.end()) {  // nothing of it is there
+      if (session.done == SessionAction::kPurge) Note(verdict_.misjudged, StrCat(key, " is new"));
+      continue;
+    }
+    const bool is_as_done = stored->second == StateAfter(vehicle, number, session.done);
+    const bool is_as_asked =
+        session.asked && stored->second == StateAfter(vehicle, number, session.asked);
+    if (!is_as_done && !is_as_asked) {
+      Note(verdict_.misjudged, StrCat(key, " is in state ", static_cast<int>(stored->second)));
     }
   }
 }
 
+SessionState LedgerJudge::StateAfter(int vehicle,
+                                     std::uint32_t session,
+                                     std::optional<SessionAction> action) const {
+  switch (action.value_or(SessionAction::kRestore)) {
+    case SessionAction::kRetract:
+      return SessionState::kRetracted;
+    case SessionAction::kRestore:
+      return IsImplausible(vehicle, session) ? SessionState::kQuarantined : SessionState::kLive;
+    case SessionAction::kRelease:
+      return SessionState::kReleased;
+    case SessionAction::kPurge:
+      break;
+  }
+  return SessionState::kPurged;
+}
+
+// By what of it is there, as it was uploaded.
+bool LedgerJudge::IsImplausible(int vehicle, std::uint32_t session) const {
+  std::optional<UploadedPlace> before;
+  for (FrameId id{session, 0}; id.sequence < kFramesOfASession; ++id.sequence) {
+    if (!atlas_.frames.contains(FleetKey(vehicle, id))) continue;
+    const QuantizedPose pose = FleetPose(vehicle, id, 0);
+    const UploadedPlace place{id.sequence, FleetTime(id), pose.x_um, pose.y_um, pose.z_um};
+    if (before && FindImplausible(*before, place, {})) return true;
+    before = place;
+  }
+  return false;
+}
+
+bool LedgerJudge::IsPurged(const SessionKey& key) const {
+  const auto stored = atlas_.states.find(key);
+  return stored != atlas_.states.end() && stored->second == SessionState::kPurged;
+}
+
 void LedgerJudge::JudgeAgainst(const StoredAtlas& earlier) {
   for (const auto& [key, frame] : earlier.frames) {
-    if (!atlas_.frames.contains(key)) Note(verdict_.lost, StrCat(key, " was there and is gone"));
+    const bool may_be_gone = IsPurged(key.session);
+    if (!may_be_gone && !atlas_.frames.contains(key)) {
+      Note(verdict_.lost, StrCat(key, " was there and is gone"));
+    }
   }
 }
 

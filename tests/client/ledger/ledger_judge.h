@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -18,12 +19,13 @@ struct Verdict {
   std::uint64_t altered = 0;    // with another time or other bytes than were sent
   std::uint64_t misplaced = 0;  // at a pose older than the last acknowledged one, or at nobody's
   std::uint64_t torn = 0;       // pose batches that happened in part
-  std::uint64_t misjudged = 0;  // sessions that are retracted or not, as nobody asked last
+  std::uint64_t misjudged = 0;  // sessions that are not as they look, and as nobody asked last
+  std::uint64_t left = 0;       // there, of a session that was purged
   std::string first;            // finding, in words
 
   void Add(const Verdict& other);
   std::uint64_t faults() const {
-    return lost + twice + foreign + altered + misplaced + torn + misjudged;
+    return lost + twice + foreign + altered + misplaced + torn + misjudged + left;
   }
 };
 
@@ -44,6 +46,12 @@ class LedgerJudge {
   void JudgeFrames(int vehicle, const LedgerState& ledger, const Spooled& spooled);
   void JudgePoses(int vehicle, const LedgerState& ledger);
   void JudgeSessions(int vehicle, const LedgerState& ledger);
+  // Of the session as it is: that which an action, or none, leaves.
+  SessionState StateAfter(int vehicle,
+                          std::uint32_t session,
+                          std::optional<SessionAction> action) const;
+  bool IsImplausible(int vehicle, std::uint32_t session) const;
+  bool IsPurged(const SessionKey& key) const;
   void Note(std::uint64_t& fault, const std::string& what);
 
   const StoredAtlas& atlas_;

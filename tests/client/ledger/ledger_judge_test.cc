@@ -19,10 +19,10 @@ const FrameId kSecond{0, 1};
 class LedgerJudgeTest : public ::testing::Test {
  protected:
   void Store(const FrameId& frame, std::uint32_t version) {
-    const KeyframeKey key = FleetKey(kCar, frame);
-    atlas_.frames[key] = {FleetTime(frame), FleetPose(kCar, frame, version),
+    const KeyframeKey key = FleetKey(car_, frame);
+    atlas_.frames[key] = {FleetTime(frame), FleetPose(car_, frame, version),
                           Hash64(FleetBlob(key))};
-    atlas_.retracted.insert({key.session, false});
+    atlas_.states.insert({key.session, SessionState::kLive});
   }
   void Write(const std::vector<std::string>& lines) {
     for (const std::string& line : lines) {
@@ -31,10 +31,11 @@ class LedgerJudgeTest : public ::testing::Test {
   }
   Verdict Judge(const LedgerJudge::Spooled& spooled = {}) const {
     LedgerJudge judge(atlas_);
-    judge.Judge(kCar, ledger_, spooled);
+    judge.Judge(car_, ledger_, spooled);
     return judge.Finish();
   }
 
+  int car_ = kCar;
   StoredAtlas atlas_;
   LedgerState ledger_;
 };
@@ -45,7 +46,7 @@ TEST_F(LedgerJudgeTest, WhatWasNotAnsweredMayBeThereOrNot) {
   EXPECT_EQ(Judge().faults(), 0U);
   Store(kFirst, 1);
   Store(kSecond, 0);
-  atlas_.retracted[FleetSession(kCar, 0)] = true;
+  atlas_.states[FleetSession(kCar, 0)] = SessionState::kRetracted;
   EXPECT_EQ(Judge().faults(), 0U);
 }
 
@@ -105,6 +106,46 @@ TEST_F(LedgerJudgeTest, ASessionIsAsItWasAcknowledged) {
   EXPECT_EQ(Judge().misjudged, 1U);
   Write({"restore 0"});
   EXPECT_EQ(Judge().faults(), 0U);
+}
+
+TEST_F(LedgerJudgeTest, WhatWasPurgedIsGoneAndNoOther) {
+  Write({"upload 0 0", "uploaded 0 0", "move 1 0:0", "moved 1", "purge 0"});
+  Store(kFirst, 1);
+  EXPECT_EQ(Judge().faults(), 0U) << "not answered";
+  Write({"changed 0"});
+  EXPECT_EQ(Judge().misjudged, 1U);
+  atlas_.states[FleetSession(kCar, 0)] = SessionState::kPurged;
+  EXPECT_EQ(Judge().left, 1U);
+  atlas_.frames.clear();
+  EXPECT_EQ(Judge().faults(), 0U);
+  atlas_.states.clear();
+  EXPECT_EQ(Judge().misjudged, 1U) << "its name is forgotten";
+}
+
+TEST_F(LedgerJudgeTest, NobodyPurgesWhatNobodyAskedToBePurged) {
+  Write({"upload 0 0", "uploaded 0 0"});
+  atlas_.states[FleetSession(kCar, 0)] = SessionState::kPurged;
+  EXPECT_EQ(Judge().misjudged, 1U);
+}
+
+TEST_F(LedgerJudgeTest, ASessionThatLeapsIsInQuarantineUntilItIsReleased) {
+  car_ = kLeapingVehicle;
+  const FrameId wild{0, kLeapSequence};
+  const SessionKey session = FleetSession(car_, 0);
+  Write({"upload 0 0", "uploaded 0 0", "upload 0 6", "uploaded 0 6"});
+  Store(kFirst, 0);
+  Store(wild, 0);
+  EXPECT_EQ(Judge().misjudged, 1U);
+  atlas_.states[session] = SessionState::kQuarantined;
+  EXPECT_EQ(Judge().faults(), 0U);
+  atlas_.states[session] = SessionState::kReleased;
+  EXPECT_EQ(Judge().misjudged, 1U);
+  Write({"release 0"});
+  EXPECT_EQ(Judge().faults(), 0U);
+  Write({"changed 0"});
+  EXPECT_EQ(Judge().faults(), 0U);
+  atlas_.states[session] = SessionState::kQuarantined;
+  EXPECT_EQ(Judge().misjudged, 1U);
 }
 
 TEST_F(LedgerJudgeTest, WhatWasThereIsThereStill) {

@@ -18,6 +18,7 @@ constexpr std::size_t kMaxUnanswered = 16;
 constexpr std::size_t kMaxSpooled = 40;
 constexpr std::uint32_t kFramesAtOnce = 3;
 constexpr std::uint32_t kPosesAtOnce = 5;
+constexpr std::size_t kLeastPurged = 8;
 constexpr std::uint32_t kMaxPause_ms = 12;
 
 Status Wrong(std::string what) {
@@ -30,6 +31,21 @@ bool IsOfTheLink(const Status& status) {
 
 std::string Named(std::string_view word, const FrameId& frame) {
   return StrCat(word, ' ', frame.session, ' ', frame.sequence);
+}
+
+// As the protocol names it, of a session without a leap.
+std::string_view StateAfter(SessionAction action) {
+  switch (action) {
+    case SessionAction::kRetract:
+      return "retracted";
+    case SessionAction::kRestore:
+      return "live";
+    case SessionAction::kRelease:
+      return "released";
+    case SessionAction::kPurge:
+      return "purged";
+  }
+  return "";
 }
 
 }  // namespace
@@ -138,7 +154,8 @@ std::vector<FrameId> LedgerVehicle::Unanswered() const {
 FrameId LedgerVehicle::NextFrame() const {
   if (state().frames.empty()) return {};
   FrameId next = state().frames.rbegin()->first;
-  const bool is_over = ++next.sequence == kFramesOfASession;
+  const bool is_over =
+      ++next.sequence == kFramesOfASession || state().sessions.at(next.session).may_be_purged();
   // A resumed session ends when all of it was answered.
   const bool may_begin = options_.kind != VehicleKind::kResume || Unanswered().empty();
   return is_over && may_begin ? FrameId{next.session + 1, 0} : next;
@@ -158,6 +175,11 @@ Status LedgerVehicle::Upload(AtlasClient& client) {
 }
 
 Status LedgerVehicle::UploadAgain(AtlasClient& client) {
+  for (const auto& [number, session] : state().sessions) {
+    if (session.done == SessionAction::kPurge && Below(2) == 0) {
+      return UploadPurged(client, number);
+    }
+  }
   const std::optional<FrameId> frame = DrawAcknowledged();
   if (!frame || options_.kind == VehicleKind::kResume) return Upload(client);
   const Bytes blob = FleetBlob(FleetKey(options_.number, *frame));
@@ -166,6 +188,17 @@ Status LedgerVehicle::UploadAgain(AtlasClient& client) {
   if (status.ok()) status = uploader.Finish();
   if (!status.ok() || uploader.totals().duplicates == 1) return status;
   return Wrong(Named("acknowledged, sent again and taken for new:", *frame));
+}
+
+// The name of a purged session takes nothing any more.
+Status LedgerVehicle::UploadPurged(AtlasClient& client, std::uint32_t session) {
+  const FrameId frame{session, 0};
+  const Bytes blob = FleetBlob(FleetKey(options_.number, frame));
+  KeyframeUploader uploader(client);
+  Status status = uploader.Upload(UploadOf(frame, blob));
+  if (status.ok()) status = uploader.Finish();
+  if (status.code() == StatusCode::kConflict) return {};
+  return status.ok() ? Wrong(Named("purged, sent again and taken:", frame)) : status;
 }
 
 Status LedgerVehicle::SendFrames(AtlasClient& client,
@@ -218,9 +251,25 @@ std::optional<FrameId> LedgerVehicle::DrawAcknowledged() {
   if (state().frames.empty()) return std::nullopt;
   const std::uint32_t sessions = state().frames.rbegin()->first.session + 1;
   const FrameId drawn{Below(sessions), Below(kFramesOfASession)};
-  const auto found = state().frames.find(drawn);
-  if (found == state().frames.end() || !found->second.is_acknowledged) return std::nullopt;
+  if (!IsAcknowledged(drawn) || state().sessions.at(drawn.session).may_be_purged()) {
+    return std::nullopt;
+  }
   return drawn;
+}
+
+bool LedgerVehicle::IsAcknowledged(const FrameId& frame) const {
+  const auto found = state().frames.find(frame);
+  return found != state().frames.end() && found->second.is_acknowledged;
+}
+
+bool LedgerVehicle::AreAcknowledged(std::uint32_t session, std::size_t at_least) const {
+  std::size_t sent = 0;
+  for (const auto& [id, frame] : state().frames) {
+    if (id.session != session) continue;
+    if (!frame.is_acknowledged) return false;
+    ++sent;
+  }
+  return sent >= at_least;
 }
 
 // A batch that the link failed at comes again, or is given up: then it happened, or not.
@@ -256,28 +305,41 @@ Status LedgerVehicle::MovePoses(AtlasClient& client) {
 
 // What was not answered is asked again, until it is.
 Status LedgerVehicle::ChangeSession(AtlasClient& client) {
-  const auto& sessions = state().sessions;
-  auto found = std::find_if(sessions.begin(), sessions.end(), [](const auto& entry) {
-    return entry.second.asked_to_retract.has_value();
-  });
-  const bool is_again = found != sessions.end();
-  if (!is_again) {
-    const auto frame = DrawAcknowledged();
-    if (!frame) return {};
-    found = sessions.find(frame->session);
-    // Most sessions are in the map most of the time.
-    if (!found->second.is_retracted && Below(3) > 0) return {};
+  for (const auto& [number, session] : state().sessions) {
+    if (session.asked) return Change(client, number, *session.asked, true);
   }
-  const std::uint32_t session = found->first;
-  const bool is_retract = is_again ? *found->second.asked_to_retract : !found->second.is_retracted;
-  ledger_.Write(StrCat(is_retract ? "retract " : "restore ", session));
-  const auto done =
-      client.ChangeSession(FleetSession(options_.number, session),
-                           is_retract ? SessionAction::kRetract : SessionAction::kRestore, "fleet");
+  const auto frame = DrawAcknowledged();
+  const auto action = frame ? DrawAction(frame->session) : std::nullopt;
+  return action ? Change(client, frame->session, *action, false) : Status();
+}
+
+std::optional<SessionAction> LedgerVehicle::DrawAction(std::uint32_t session) {
+  const auto done = state().sessions.at(session).done;
+  if (options_.kind == VehicleKind::kLeap) {
+    const bool is_in_quarantine = HasLeap(options_.number, session) &&
+                                  IsAcknowledged({session, kLeapSequence}) &&
+                                  IsAcknowledged({session, kLeapSequence - 1});
+    return is_in_quarantine && !done ? std::optional(SessionAction::kRelease) : std::nullopt;
+  }
+  if (done == SessionAction::kRetract) return SessionAction::kRestore;
+  // Most sessions are in the map most of the time.
+  if (Below(3) > 0) return std::nullopt;
+  if (options_.kind != VehicleKind::kPurge) return SessionAction::kRetract;
+  return AreAcknowledged(session, kLeastPurged) ? std::optional(SessionAction::kPurge)
+                                                : std::nullopt;
+}
+
+Status LedgerVehicle::Change(AtlasClient& client,
+                             std::uint32_t session,
+                             SessionAction action,
+                             bool is_again) {
+  // What was to be moved may be gone.
+  if (action == SessionAction::kPurge) lost_version_.reset();
+  ledger_.Write(StrCat(WordOf(action), ' ', session));
+  const auto done = client.ChangeSession(FleetSession(options_.number, session), action, "fleet");
   if (!done) return done.error();
   ledger_.Write(StrCat("changed ", session));
-  const bool is_right = done->state == (is_retract ? "retracted" : "live");
-  if (is_right && (is_again || done->is_changed)) return {};
+  if (done->state == StateAfter(action) && (is_again || done->is_changed)) return {};
   return Wrong(StrCat("session ", session, ": ", done->state, ", changed ", done->is_changed));
 }
 

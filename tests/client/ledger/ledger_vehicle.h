@@ -1,5 +1,5 @@
-// A vehicle that uploads, corrects poses, and retracts and restores sessions, for as long as it is
-// let live. It asks nothing that its ledger does not say, and checks every answer.
+// A vehicle that uploads, corrects poses, and retracts, restores, releases or purges sessions, for
+// as long as it is let live. It asks nothing that its ledger does not say, and checks every answer.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +21,8 @@ enum class VehicleKind {
   kDirect,  // sends again whatever was not answered, and now and then what was
   kResume,  // goes on behind what the handshake says is there
   kSpool,   // through the spool, which it fills without a link, too
+  kLeap,    // as kDirect; its sessions are quarantined, and released instead of retracted
+  kPurge,   // as kDirect; its sessions are purged instead
 };
 
 struct LedgerVehicleOptions {
@@ -49,6 +51,7 @@ class LedgerVehicle {
 
   Status Upload(AtlasClient& client);
   Status UploadAgain(AtlasClient& client);
+  Status UploadPurged(AtlasClient& client, std::uint32_t session);
   Status SendFrames(AtlasClient& client,
                     const std::vector<FrameId>& frames,
                     std::size_t may_be_duplicates);
@@ -56,11 +59,17 @@ class LedgerVehicle {
   Status SendSpool(AtlasClient& client);
   Status MovePoses(AtlasClient& client);
   Status ChangeSession(AtlasClient& client);
+  Status Change(AtlasClient& client, std::uint32_t session, SessionAction action, bool is_again);
+  // nullopt: the session stays as it is.
+  std::optional<SessionAction> DrawAction(std::uint32_t session);
 
   KeyframeUpload UploadOf(const FrameId& frame, ByteSpan blob) const;
   std::vector<FrameId> Unanswered() const;
   FrameId NextFrame() const;
-  // One that the daemon has for certain.
+  bool IsAcknowledged(const FrameId& frame) const;
+  // Of a session, all that were sent: that many and more.
+  bool AreAcknowledged(std::uint32_t session, std::size_t at_least) const;
+  // One that the daemon has for certain, of no session that may be purged.
   std::optional<FrameId> DrawAcknowledged();
   std::uint32_t Below(std::uint32_t count) { return static_cast<std::uint32_t>(random_() % count); }
   const LedgerState& state() const { return ledger_.state(); }

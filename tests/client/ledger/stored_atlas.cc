@@ -42,7 +42,7 @@ StoredAtlas ReadStoredAtlas(const std::filesystem::path& data) {
   }
   for (const SessionRecord& session : ValueOf(store->ListSessions({}, 1'000'000))) {
     Expect(store->CheckSession(session.key));
-    atlas.retracted[session.key] = session.state == SessionState::kRetracted;
+    atlas.states[session.key] = session.state;
   }
   Expect(store->CheckCounters());
   return atlas;

@@ -7,6 +7,7 @@
 
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/pose.h"
+#include "server/store/session_types.h"
 
 namespace atlas::testing {
 
@@ -18,7 +19,7 @@ struct StoredFrame {
 
 struct StoredAtlas {
   std::map<KeyframeKey, StoredFrame> frames;
-  std::map<SessionKey, bool> retracted;
+  std::map<SessionKey, SessionState> states;
   std::uint64_t twice = 0;  // rows under a key that has one
 };
 

@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include "tests/server/service/service_fixture.h"
+#include "tests/server/store/lost_rows.h"
 
 namespace atlas {
 namespace {
@@ -159,6 +160,37 @@ TEST_F(DamageTest, WhatIsToldElsewhereIsRestored) {
     Close();
     std::filesystem::remove_all(directory_ / "data");
   }
+}
+
+TEST_F(DamageTest, ATileThatIsListedAndNotFoundIsBuiltAgainForWhoAsks) {
+  Fill();
+  const TileId tile = store_->ListTiles(-1, 1)->at(0).id;
+  Tamper(testing::LoseTiles("key = " + std::to_string(tile.Key())));
+  EXPECT_EQ(service_->Digest(Long()).error().code(), StatusCode::kInvalidData);
+  EXPECT_EQ(service_->ReadTile(tile).error().code(), StatusCode::kInvalidData);
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+  EXPECT_TRUE(service_->ReadTile(tile)->has_value());
+  const auto report = service_->Verify({.rebuild = true}, Long());
+  EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
+}
+
+TEST_F(DamageTest, ATileThatIsListedAndNotFoundIsBuiltAgainForItsParent) {
+  Fill();
+  const TileId tile = store_->ListTiles(-1, 1)->at(0).id;
+  Tamper(testing::LoseTiles("key = " + std::to_string(tile.Key())));
+  Mark({tile.Parent()});
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+}
+
+TEST_F(DamageTest, TilesThatAreListedAndNotFoundAreRepaired) {
+  Fill();
+  Tamper(testing::LoseTiles("key % 3 = 0"));
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_GT(repaired->damaged, 0U);
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+  const auto report = service_->Verify({.rebuild = true}, Long());
+  EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
 }
 
 TEST_F(DamageTest, APoseComesBackFromItsHistoryByItself) {

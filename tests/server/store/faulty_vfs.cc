@@ -6,6 +6,8 @@
 
 #include <sqlite3.h>
 
+#include "tests/server/store/fault_plan.h"
+
 namespace atlas {
 namespace {
 
@@ -26,22 +28,6 @@ struct Plan {
 Plan& ThePlan() {
   static Plan plan;
   return plan;
-}
-
-// Whether this call is to fail.
-bool Fails(Calls kind, const char* what, const fs::path& path) {
-  Plan& plan = ThePlan();
-  const std::lock_guard lock(plan.mutex);
-  if (plan.calls != Calls::kAll && plan.calls != kind) {
-    return false;
-  }
-  ++plan.counted;
-  const bool is_due = plan.fail_at != 0 &&
-                      (plan.is_once ? plan.counted == plan.fail_at : plan.counted >= plan.fail_at);
-  if (is_due && plan.first.empty()) {
-    plan.first = std::string(what) + " " + path.filename().string();
-  }
-  return is_due;
 }
 
 bool IsFull() {
@@ -74,14 +60,13 @@ int Read(sqlite3_file* file, void* to, int bytes, sqlite3_int64 offset) {
   return Real(file)->pMethods->xRead(Real(file), to, bytes, offset);
 }
 int Write(sqlite3_file* file, const void* from, int bytes, sqlite3_int64 offset) {
-  const bool fails = Fails(Calls::kWrite, "write", PathOf(file));
+  const bool fails = IsToFail(Calls::kWrite, "write", PathOf(file));
   const int taken =
       fails ? bytes / 2 : bytes;  // of what a failing disk took a part is there, maybe
   const int code = Real(file)->pMethods->xWrite(Real(file), from, taken, offset);
   if (code == SQLITE_OK) {
-    ThePlan().files.NoteWrite(
-        PathOf(file), static_cast<std::uint64_t>(offset),
-        {static_cast<const std::uint8_t*>(from), static_cast<std::size_t>(taken)});
+    TheFiles().NoteWrite(PathOf(file), static_cast<std::uint64_t>(offset),
+                         {static_cast<const std::uint8_t*>(from), static_cast<std::size_t>(taken)});
   }
   if (fails) {
     return IsFull() ? SQLITE_FULL : SQLITE_IOERR_WRITE;
@@ -89,29 +74,30 @@ int Write(sqlite3_file* file, const void* from, int bytes, sqlite3_int64 offset)
   return code;
 }
 int Truncate(sqlite3_file* file, sqlite3_int64 size) {
-  if (Fails(Calls::kWrite, "truncate", PathOf(file))) {
+  if (IsToFail(Calls::kWrite, "truncate", PathOf(file))) {
     return SQLITE_IOERR_TRUNCATE;
   }
-  ThePlan().files.NoteTruncate(PathOf(file), static_cast<std::uint64_t>(size));
+  TheFiles().NoteTruncate(PathOf(file), static_cast<std::uint64_t>(size));
   return Real(file)->pMethods->xTruncate(Real(file), size);
 }
 // Noted, not done: what survives a power cut is the notes' to say.
 int Sync(sqlite3_file* file, int /*flags*/) {
-  if (Fails(Calls::kSync, "sync", PathOf(file))) {
-    ThePlan().files.NoteFailedSync(PathOf(file));
+  if (IsToFail(Calls::kSync, "sync", PathOf(file))) {
+    TheFiles().NoteFailedSync(PathOf(file));
     return SQLITE_IOERR_FSYNC;
   }
-  ThePlan().files.NoteSync(PathOf(file));
+  TheFiles().NoteSync(PathOf(file));
   return SQLITE_OK;
 }
 int FileSize(sqlite3_file* file, sqlite3_int64* size) {
-  return Fails(Calls::kAll, "size", PathOf(file))
+  return IsToFail(Calls::kAll, "size", PathOf(file))
              ? SQLITE_IOERR_FSTAT
              : Real(file)->pMethods->xFileSize(Real(file), size);
 }
 int Lock(sqlite3_file* file, int level) {
-  return Fails(Calls::kAll, "lock", PathOf(file)) ? SQLITE_IOERR_LOCK
-                                                  : Real(file)->pMethods->xLock(Real(file), level);
+  return IsToFail(Calls::kAll, "lock", PathOf(file))
+             ? SQLITE_IOERR_LOCK
+             : Real(file)->pMethods->xLock(Real(file), level);
 }
 int Unlock(sqlite3_file* file, int level) {
   return Real(file)->pMethods->xUnlock(Real(file), level);
@@ -129,7 +115,7 @@ int DeviceCharacteristics(sqlite3_file* file) {
   return Real(file)->pMethods->xDeviceCharacteristics(Real(file));
 }
 int ShmMap(sqlite3_file* file, int page, int bytes, int may_extend, void volatile** memory) {
-  return Fails(Calls::kAll, "map", PathOf(file))
+  return IsToFail(Calls::kAll, "map", PathOf(file))
              ? SQLITE_IOERR_SHMMAP
              : Real(file)->pMethods->xShmMap(Real(file), page, bytes, may_extend, memory);
 }
@@ -167,27 +153,27 @@ constexpr sqlite3_io_methods kMethods = {2,
 int Open(sqlite3_vfs* vfs, const char* path, sqlite3_file* file, int flags, int* out_flags) {
   file->pMethods = nullptr;
   fs::path kept = path == nullptr ? "" : path;
-  if (Fails(Calls::kAll, "open", kept)) {
+  if (IsToFail(Calls::kAll, "open", kept)) {
     return SQLITE_CANTOPEN;
   }
   const int code = RealVfs(vfs)->xOpen(RealVfs(vfs), path, Real(file), flags, out_flags);
   if (Real(file)->pMethods == nullptr) {
     return code;
   }
-  ThePlan().files.NoteOpen(kept);
+  TheFiles().NoteOpen(kept);
   reinterpret_cast<File*>(file)->path = new fs::path(std::move(kept));
   file->pMethods = &kMethods;
   return code;
 }
 int Delete(sqlite3_vfs* vfs, const char* path, int /*is_synced*/) {
-  if (Fails(Calls::kAll, "delete", path)) {
+  if (IsToFail(Calls::kAll, "delete", path)) {
     return SQLITE_IOERR_DELETE;
   }
-  ThePlan().files.NoteDelete(path);
+  TheFiles().NoteDelete(path);
   return RealVfs(vfs)->xDelete(RealVfs(vfs), path, 0);
 }
 int Access(sqlite3_vfs* vfs, const char* path, int flags, int* result) {
-  return Fails(Calls::kAll, "access", path)
+  return IsToFail(Calls::kAll, "access", path)
              ? SQLITE_IOERR_ACCESS
              : RealVfs(vfs)->xAccess(RealVfs(vfs), path, flags, result);
 }
@@ -239,6 +225,25 @@ sqlite3_vfs& TheVfs() {
 
 }  // namespace
 
+bool IsToFail(Calls kind, const char* what, const fs::path& path) {
+  Plan& plan = ThePlan();
+  const std::lock_guard lock(plan.mutex);
+  if (plan.calls != Calls::kAll && plan.calls != kind) {
+    return false;
+  }
+  ++plan.counted;
+  const bool is_due = plan.fail_at != 0 &&
+                      (plan.is_once ? plan.counted == plan.fail_at : plan.counted >= plan.fail_at);
+  if (is_due && plan.first.empty()) {
+    plan.first = std::string(what) + " " + path.filename().string();
+  }
+  return is_due;
+}
+
+VolatileFiles& TheFiles() {
+  return ThePlan().files;
+}
+
 FaultyVfs::FaultyVfs() {
   BeginAnew();
   sqlite3_vfs_register(&TheVfs(), 1);
@@ -261,11 +266,11 @@ void FaultyVfs::FailAt(std::uint64_t number, Calls calls, Until until, bool is_f
 }
 
 void FaultyVfs::BeginAnew() {
-  ThePlan().files.Forget();
+  TheFiles().Forget();
 }
 
 void FaultyVfs::LosePower(VolatileFiles::Loss loss, std::uint32_t seed) {
-  ThePlan().files.LosePower(loss, seed);
+  TheFiles().LosePower(loss, seed);
 }
 
 bool FaultyVfs::Heal() {

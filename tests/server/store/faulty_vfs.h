@@ -1,5 +1,6 @@
 // SQLite's layer to the system (sqlite.org/vfs.html), with calls that fail: the n-th, or it and all
-// behind it. For stores that are opened while it is installed.
+// behind it. For stores that are opened while it is installed. What the program does to folders
+// counts as well: files get other names, the folder is synced (faulty_folders.cc).
 #pragma once
 
 #include <cstdint>

@@ -7,15 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "tests/core/support/test_scale.h"
-#include "tests/server/store/faulty_vfs.h"
-#include "tests/server/store/store_fixture.h"
+#include "tests/server/store/io_fault_fixture.h"
 
 namespace atlas {
 namespace {
-
-using Calls = FaultyVfs::Calls;
-using Until = FaultyVfs::Until;
 
 const TileId kA{0, 0, 0};
 const TileId kB{0, 1, 0};
@@ -30,27 +25,12 @@ struct Ledger {
   std::uint64_t revision = 0;
 };
 
-class IoFaultTest : public StoreTest {
+class IoFaultTest : public IoFaultFixture {
  protected:
-  ~IoFaultTest() override { store_.reset(); }  // before the layer that it was opened with goes
-
-  // False: it cannot be opened.
-  bool TryOpen() {
-    store_.reset();
-    auto store = OpenSqliteStore(options_);
-    if (!store) {
-      EXPECT_FALSE(store.error().message().empty());
-      return false;
-    }
-    store_ = std::move(*store);
-    return true;
+  void Prepare() override {
+    ledger_ = Ledger();
+    fused_.reset();
   }
-  static NewKeyframe Large(std::uint32_t sequence, std::vector<TileId> footprint) {
-    NewKeyframe keyframe = MakeKeyframe(sequence, std::move(footprint));
-    keyframe.blob.resize(30'000, static_cast<std::uint8_t>(sequence));
-    return keyframe;
-  }
-
   void TryPut(std::uint32_t sequence, const std::vector<TileId>& footprint) {
     ledger_.tried.insert(sequence);
     const auto put = Put(Large(sequence, footprint));
@@ -104,7 +84,7 @@ class IoFaultTest : public StoreTest {
   }
 
   // A little of everything, with two openings.
-  void Live() {
+  void Live() override {
     if (!TryOpen()) {
       return;
     }
@@ -124,7 +104,7 @@ class IoFaultTest : public StoreTest {
   }
 
   // Of the store after its next opening, on a disk that works.
-  void ExpectAllThere() {
+  void ExpectAllThere() override {
     ASSERT_TRUE(TryOpen());
     const Status counted = store_->CheckCounters();
     EXPECT_TRUE(counted.ok()) << counted.message();
@@ -167,63 +147,10 @@ class IoFaultTest : public StoreTest {
     EXPECT_EQ(store_->ReadCounts()->keyframes, 4U);
   }
 
-  // As if the process was killed: what the system has stays.
-  void Kill() {
-    vfs_.FailAt(1, Calls::kAll, Until::kHealed);
-    store_.reset();
-    vfs_.Heal();
-  }
-  void CutPower() {
-    Kill();
-    vfs_.LosePower(VolatileFiles::Loss::kAll, 0);
-  }
-  void FailSyncs(std::uint64_t number) { vfs_.FailAt(number, Calls::kSync, Until::kOnce); }
-
-  // Each call in its turn, until none is left to fail. How many there were.
-  std::uint64_t FailEach(Calls calls, Until until, bool is_full = false) {
-    return FailEach(calls, until, is_full, [](std::uint64_t) {});
-  }
-  // From each call on nothing reaches the disk, and of what did not have to be there some is not.
-  // How often.
-  std::uint64_t CutPowerAtEach(VolatileFiles::Loss loss) {
-    std::uint64_t cuts = 0;
-    for (std::uint32_t round = 0; round < testing::Scaled(1) && !HasFailure(); ++round) {
-      SCOPED_TRACE("round " + std::to_string(round));
-      cuts += FailEach(Calls::kAll, Until::kHealed, false, [&](std::uint64_t number) {
-        vfs_.LosePower(loss, 1'000 * round + static_cast<std::uint32_t>(number));
-      });
-    }
-    RecordProperty("cuts", static_cast<int>(cuts));
-    return cuts;
-  }
-  template <typename Then>
-  std::uint64_t FailEach(Calls calls, Until until, bool is_full, const Then& then) {
-    for (std::uint64_t number = 1;; number += testing::Stride()) {
-      store_.reset();
-      std::filesystem::remove_all(options_.directory);
-      ledger_ = Ledger();
-      fused_.reset();
-      vfs_.BeginAnew();
-      vfs_.FailAt(number, calls, until, is_full);
-      Live();
-      store_.reset();
-      const bool has_failed = vfs_.Heal();
-      then(number);
-      SCOPED_TRACE("call " + std::to_string(number) + ", " + vfs_.first());
-      ExpectAllThere();
-      if (!has_failed || HasFailure()) {
-        return number - 1;
-      }
-    }
-  }
-
  private:
-  FaultyVfs vfs_;
   Ledger ledger_;
   std::optional<TileId> fused_;
 };
-
-using Loss = VolatileFiles::Loss;
 
 TEST_F(IoFaultTest, ThePowerIsCutAtAnyCallAndNothingUnsyncedIsThere) {
   EXPECT_GT(CutPowerAtEach(Loss::kAll), 300U);

@@ -1,17 +1,40 @@
 // Tiles, their revisions, and the dirty marks that lead to them.
 #include <limits>
+#include <optional>
 #include <set>
+#include <string>
 
 #include "server/store/tile_ranges.h"
+#include "tests/server/store/lost_rows.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace atlas {
 namespace {
 
-using TileStoreTest = StoreTest;
-
 const TileId kA{0, 0, 0};
 const TileId kB{0, 3, -2};
+
+class TileStoreTest : public StoreTest {
+ protected:
+  // One tile; its row is not found, and the index lists it.
+  void LoseTheTile() {
+    Open();
+    ASSERT_TRUE(Put(MakeKeyframe(1, {kA})).has_value());
+    ASSERT_TRUE(Finish(Claim().claims.at(0), Content(7)).has_value());
+    Tamper(testing::LoseTiles("key = " + std::to_string(kA.Key())));
+    Open();
+  }
+  Result<FinishResult> FuseAgain(const std::optional<TileContent>& content) {
+    Await<std::uint32_t>([&](auto done) { store_->MarkDirty({kA}, std::move(done)); }).value();
+    return Finish(Claim().claims.at(0), content);
+  }
+  void ExpectTiles(std::size_t count) {
+    EXPECT_EQ(store_->ListTiles(-1, 10)->size(), count);
+    EXPECT_EQ(store_->ReadCounts()->tiles, count);
+    const Status counted = store_->CheckCounters();
+    EXPECT_TRUE(counted.ok()) << counted.message();
+  }
+};
 
 TEST_F(TileStoreTest, FinishedTileIsServedAndMarksItsParentOnce) {
   Open();
@@ -176,6 +199,32 @@ TEST_F(TileStoreTest, ScanFindsExactlyTheRectangle) {
   EXPECT_EQ(store_->ListTiles(-1, 1000)->size(), 256u);
   EXPECT_EQ(store_->ListTiles(static_cast<std::int64_t>(seen[0].Key()), 5)->size(), 5u);
   EXPECT_EQ(store_->ListFootprintTiles(0, -1, 1000)->size(), 256u);
+}
+
+TEST_F(TileStoreTest, ATileThatIsListedAndNotFoundIsDamagedUntilItIsStoredAgain) {
+  LoseTheTile();
+  ASSERT_EQ(store_->ListTiles(-1, 10)->size(), 1u);
+  EXPECT_EQ(store_->ReadTile(kA).error().code(), StatusCode::kInvalidData);
+  EXPECT_EQ(store_->CheckCounters().code(), StatusCode::kInvalidData);
+  EXPECT_TRUE(FuseAgain(Content(7))->is_changed);
+  EXPECT_EQ(store_->ReadTile(kA).value()->blob, Content(7).blob);
+  ExpectTiles(1);
+}
+
+TEST_F(TileStoreTest, ATileThatIsListedAndNotFoundIsGoneOnceItIsEmpty) {
+  LoseTheTile();
+  EXPECT_TRUE(FuseAgain(std::nullopt)->is_changed);
+  EXPECT_FALSE(store_->ReadTile(kA).value().has_value());
+  ExpectTiles(0);
+}
+
+TEST_F(TileStoreTest, WhoRepairsIndexesForgetsNoTileThatTheyList) {
+  LoseTheTile();
+  const auto repaired = Await<std::uint32_t>(
+      [&](auto done) { store_->RepairTables(TableRepair::kRows, "tester", std::move(done)); });
+  EXPECT_EQ(repaired.value(), 1u);
+  EXPECT_EQ(store_->ReadTile(kA).error().code(), StatusCode::kInvalidData);
+  ExpectTiles(1);
 }
 
 TEST(TileRangesTest, CoverHoldsEveryKeyOfTheRectangle) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include <sys/stat.h>
+#include <fcntl.h>
 
 namespace atlas {
 namespace {
@@ -30,12 +30,6 @@ void Write(const fs::path& file, const Bytes& content) {
   }
 }
 
-// 0: there is none.
-std::uint64_t InodeOf(const fs::path& file) {
-  struct stat found {};
-  return ::stat(file.c_str(), &found) == 0 ? found.st_ino : 0;
-}
-
 bool Coin(std::mt19937& random) {
   return random() % 2 == 0;
 }
@@ -54,14 +48,6 @@ void VolatileFiles::NoteOpen(const fs::path& file) {
     state = State();  // another one under this name
     return;
   }
-  // A new atlas is made under another name.
-  if (const auto before = files_.find(file.string() + ".new");
-      before != files_.end() && !fs::exists(before->first) && fs::exists(file)) {
-    state = std::move(before->second);
-    files_.erase(before);
-    return;
-  }
-  state.inode = InodeOf(file);
   if (!state.durable && state.changes.empty() && fs::exists(file) && fs::file_size(file) > 0) {
     state.durable = ContentOf(file);
   }
@@ -89,8 +75,8 @@ void VolatileFiles::NoteSync(const fs::path& file) {
   state.durable = std::move(content);
   state.changes.clear();
   state.is_deleted = false;
-  if (is_new_log) {  // SQLite syncs its folder then: who was deleted does not come back
-    std::erase_if(files_, [](const auto& other) { return other.second.is_deleted; });
+  if (is_new_log) {  // SQLite syncs its folder then
+    SettleFolder(file.parent_path());
   }
 }
 
@@ -104,9 +90,34 @@ void VolatileFiles::NoteDelete(const fs::path& file) {
   files_[file].is_deleted = true;
 }
 
+void VolatileFiles::NoteRename(const fs::path& from, const fs::path& to) {
+  const std::lock_guard lock(mutex_);
+  renames_.push_back(
+      {from, to, fs::is_regular_file(to) ? std::optional(ContentOf(to)) : std::nullopt});
+  files_.erase(to);
+  if (auto known = files_.extract(from)) {
+    known.key() = to;
+    files_.insert(std::move(known));
+  }
+}
+
+void VolatileFiles::NoteFolderSync(const fs::path& folder) {
+  const std::lock_guard lock(mutex_);
+  SettleFolder(folder);
+}
+
+// Who was deleted does not come back, and names stay.
+void VolatileFiles::SettleFolder(const fs::path& folder) {
+  std::erase_if(files_, [&](const auto& file) {
+    return file.second.is_deleted && file.first.parent_path() == folder;
+  });
+  std::erase_if(renames_, [&](const Rename& rename) { return rename.to.parent_path() == folder; });
+}
+
 void VolatileFiles::Forget() {
   const std::lock_guard lock(mutex_);
   files_.clear();
+  renames_.clear();
 }
 
 // What of it came to the disk: all of it, but for lost sectors.
@@ -130,25 +141,18 @@ void VolatileFiles::Apply(const Change& change, Loss loss, std::mt19937& random,
   }
 }
 
-// Nobody tells of a file that is given another name once it is whole.
-void VolatileFiles::FollowRenames() {
-  const std::string suffix = ".partial";
-  std::map<fs::path, State> followed;
-  for (auto& [file, state] : files_) {
-    const std::string name = file.string();
-    fs::path now = file;
-    if (name.ends_with(suffix)) {
-      const fs::path whole = name.substr(0, name.size() - suffix.size());
-      now = InodeOf(whole) == state.inode ? whole : file;
+void VolatileFiles::UndoRenames(std::size_t kept) {
+  for (; renames_.size() > kept; renames_.pop_back()) {
+    const Rename& rename = renames_.back();
+    ::renameat(AT_FDCWD, rename.to.c_str(), AT_FDCWD, rename.from.c_str());  // if it is there still
+    if (rename.replaced) {
+      Write(rename.to, *rename.replaced);
     }
-    followed[now] = std::move(state);
   }
-  files_ = std::move(followed);
 }
 
 void VolatileFiles::LosePower(Loss loss, std::uint32_t seed) {
   const std::lock_guard lock(mutex_);
-  FollowRenames();
   std::mt19937 random(seed);
   for (const auto& [file, state] : files_) {
     const bool stays_deleted = state.is_deleted && (loss == Loss::kAll || Coin(random));
@@ -165,7 +169,13 @@ void VolatileFiles::LosePower(Loss loss, std::uint32_t seed) {
       Write(file, content);
     }
   }
+  std::size_t kept = 0;
+  while (loss != Loss::kAll && kept < renames_.size() && Coin(random)) {
+    ++kept;
+  }
+  UndoRenames(kept);
   files_.clear();
+  renames_.clear();
 }
 
 }  // namespace atlas

@@ -32,6 +32,10 @@ class VolatileFiles {
   // What was written since the last sync is read, and never comes to the disk.
   void NoteFailedSync(const std::filesystem::path& file);
   void NoteDelete(const std::filesystem::path& file);
+  // Before it is done. It survives a power cut once the folder was synced; until then the last ones
+  // may be undone.
+  void NoteRename(const std::filesystem::path& from, const std::filesystem::path& to);
+  void NoteFolderSync(const std::filesystem::path& folder);
   // From now on all files are durable as they are found.
   void Forget();
   // Makes the files what they are after a power cut now, and forgets them.
@@ -47,14 +51,20 @@ class VolatileFiles {
     std::optional<Bytes> durable;  // none: nobody would find it
     std::vector<Change> changes;   // since
     bool is_deleted = false;
-    std::uint64_t inode = 0;
+  };
+  struct Rename {
+    std::filesystem::path from;
+    std::filesystem::path to;
+    std::optional<Bytes> replaced;  // what was there before
   };
 
-  void FollowRenames();
+  void SettleFolder(const std::filesystem::path& folder);
+  void UndoRenames(std::size_t kept);
   static void Apply(const Change& change, Loss loss, std::mt19937& random, Bytes& content);
 
   std::mutex mutex_;
   std::map<std::filesystem::path, State> files_;
+  std::vector<Rename> renames_;  // that no sync made durable, in their order
 };
 
 }  // namespace atlas

@@ -7,6 +7,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/tile_block.h"
 #include "server/store/tile_ranges.h"
@@ -17,6 +18,7 @@ namespace {
 constexpr std::size_t kMaxRanges = 64;
 constexpr std::int64_t kPage = 1'024;
 constexpr std::int64_t kNoLimit = -1;
+constexpr std::int64_t kLastKey = std::numeric_limits<std::int64_t>::max();
 
 struct TileRow {
   std::uint64_t key = 0;
@@ -59,6 +61,15 @@ void ReadNumbers(Query& query, TileRow& row) {
   row.checksum = query.Int();
 }
 
+// The rows of a range of keys by the index, which is small, and by the table.
+constexpr const char* kByIndex =
+    "SELECT key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
+    "blob_hash, checksum FROM tiles INDEXED BY tile_summaries "
+    "WHERE key BETWEEN ? AND ? ORDER BY key LIMIT ?";
+constexpr const char* kByTable =
+    "SELECT key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
+    "blob_hash, checksum FROM tiles NOT INDEXED WHERE key BETWEEN ? AND ? ORDER BY key LIMIT ?";
+
 std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
   Query query = connection.Prepare(
       "SELECT revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
@@ -72,6 +83,25 @@ std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
   ReadNumbers(query, row);
   row.blob = query.Blob();
   return row;
+}
+
+bool IsFound(Connection& connection, const TileId& id) {
+  Query query = connection.Prepare("SELECT 1 FROM tiles NOT INDEXED WHERE key = ?");
+  query.Bind(id.Key());
+  return query.Step();
+}
+
+// What the index says of a tile; nullopt: nothing, or it is damaged and is not believed.
+std::optional<TileRow> ReadListed(Connection& connection, const TileId& id) {
+  Query query = connection.Prepare(kByIndex);
+  query.Bind(id.Key()).Bind(id.Key()).Bind(kNoLimit);
+  if (!query.Step()) {
+    return std::nullopt;
+  }
+  TileRow row;
+  row.key = query.Unsigned();
+  ReadNumbers(query, row);
+  return row.checksum == row.ExpectedChecksum() ? std::optional(row) : std::nullopt;
 }
 
 // Adds (sign 1) or takes away (sign -1) what the row counts for.
@@ -108,6 +138,16 @@ void DeleteRow(Connection& connection, const TileId& id) {
   connection.Prepare("DELETE FROM tiles WHERE key = ?").Bind(id.Key()).Run();
 }
 
+// A row that is not found while the index lists it is put back, without its blob: it is damaged
+// then as others are, and goes with its line in the index.
+std::optional<TileRow> PutBackLost(Connection& connection, const TileId& id) {
+  const std::optional<TileRow> row = ReadListed(connection, id);
+  if (row) {
+    WithoutCounting(connection, RowKind::kTile, [&] { InsertRow(connection, id, *row); });
+  }
+  return row;
+}
+
 // After a damaged row went, whose numbers nobody can take away from the counters.
 void Recount(Connection& connection) {
   const auto recount = [&connection](Counter counter, const char* sql) {
@@ -131,15 +171,6 @@ TileRow NewRow(const TileId& id, const TileContent& content) {
   row.blob = content.blob;
   return row;
 }
-
-// The rows of a range of keys by the index, which is small, and by the table.
-constexpr const char* kByIndex =
-    "SELECT key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
-    "blob_hash, checksum FROM tiles INDEXED BY tile_summaries "
-    "WHERE key BETWEEN ? AND ? ORDER BY key LIMIT ?";
-constexpr const char* kByTable =
-    "SELECT key, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
-    "blob_hash, checksum FROM tiles NOT INDEXED WHERE key BETWEEN ? AND ? ORDER BY key LIMIT ?";
 
 enum class Damaged { kFails, kIsListed };
 
@@ -182,6 +213,10 @@ std::vector<TileSummary> ReadRange(Connection& connection,
 
 Result<std::optional<StoredTile>> ReadTileRow(Connection& connection, const TileId& id) {
   std::optional<TileRow> row = ReadRow(connection, id);
+  if (!row && ReadListed(connection, id)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: tile ", id, " is damaged: it is listed, and its row is not found"));
+  }
   if (!row) {
     return std::nullopt;
   }
@@ -196,7 +231,10 @@ bool StoreTile(Connection& connection,
                const TileId& id,
                const std::optional<TileContent>& content,
                std::uint64_t fused_revision) {
-  const std::optional<TileRow> old = ReadRow(connection, id);
+  std::optional<TileRow> old = ReadRow(connection, id);
+  if (!old) {
+    old = PutBackLost(connection, id);
+  }
   if (!old && !content) {
     return false;
   }
@@ -220,6 +258,16 @@ bool StoreTile(Connection& connection,
     Recount(connection);
   }
   return true;
+}
+
+std::uint32_t PutBackLostTiles(Connection& connection) {
+  std::uint32_t put_back = 0;
+  for (const TileSummary& tile : ReadRange(connection, 0, kLastKey, kNoLimit)) {
+    if (!IsFound(connection, tile.id)) {
+      put_back += PutBackLost(connection, tile.id) ? 1U : 0U;
+    }
+  }
+  return put_back;
 }
 
 void ScanTileRows(Connection& connection,
@@ -251,7 +299,7 @@ std::vector<TileSummary> ReadTileBlockRows(Connection& connection, std::uint64_t
 std::vector<TileSummary> ListTileRows(Connection& connection,
                                       std::int64_t after_key,
                                       std::uint32_t limit) {
-  return ReadRange(connection, after_key + 1, std::numeric_limits<std::int64_t>::max(), limit);
+  return ReadRange(connection, after_key + 1, kLastKey, limit);
 }
 
 }  // namespace atlas

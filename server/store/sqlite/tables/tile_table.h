@@ -11,7 +11,8 @@
 
 namespace atlas {
 
-// nullopt: no such tile. kInvalidData: the row or its blob is damaged.
+// nullopt: no such tile. kInvalidData: the row or its blob is damaged, or the row is not found
+// where the index says that it is.
 Result<std::optional<StoredTile>> ReadTileRow(Connection& connection, const TileId& id);
 
 // Makes the table hold `content` for `id`; none: no row. True when that was a change: then the row
@@ -20,6 +21,10 @@ bool StoreTile(Connection& connection,
                const TileId& id,
                const std::optional<TileContent>& content,
                std::uint64_t fused_revision);
+
+// Rows that are not found and that the index lists, so that whoever makes the index anew does not
+// forget them: they are damaged from then on. How many.
+std::uint32_t PutBackLostTiles(Connection& connection);
 
 void ScanTileRows(Connection& connection,
                   const TileRect& rect,

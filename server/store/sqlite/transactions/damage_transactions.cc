@@ -19,6 +19,7 @@
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"
+#include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/history_horizon.h"
 #include "server/store/sqlite/transactions/transactions.h"
@@ -219,6 +220,7 @@ Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const Keyfra
 
 Result<std::uint32_t> RepairRowsInStore(Connection& connection, std::uint8_t levels) {
   auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
+  repaired += PutBackLostTiles(connection);
   connection.Execute("REINDEX");
   for (const std::int64_t id : ListDamagedSessions(connection)) {
     if (Status status = RestoreSession(connection, id, Vouching::kByNobody); !status.ok()) {
