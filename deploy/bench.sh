@@ -13,9 +13,13 @@ for argument in "$@"; do
 done
 . deploy/packages.sh
 . deploy/data.sh
-install_packages "${BUILD_PACKAGES[@]}" "${BENCH_PACKAGES[@]}" python3 xz-utils >&2
+install_packages "${BUILD_PACKAGES[@]}" "${BENCH_PACKAGES[@]}" "${PLOT_PACKAGES[@]}" python3 xz-utils >&2
 find_data "$root"
 unpack_package nginx build/nginx >&2
+unpack_package python3-matplotlib build/matplotlib >&2
+unpack_package python3-fonttools build/fonttools >&2
+modules=usr/lib/python3/dist-packages
+export PYTHONPATH=$root/build/matplotlib/$modules:$root/build/fonttools/$modules
 cmake --preset bench >/dev/null
 cmake --build build/bench >&2
 exec /usr/bin/python3 deploy/bench.py --bin build/bench/bin --nginx build/nginx/usr/sbin/nginx "$@"
