@@ -204,7 +204,7 @@ def draw_curbs(rows, path):
     figure.savefig(path, dpi=110)
 
 
-WITH_CLIENT = ("soak",)  # the one in Python, whose messages the build makes
+WITH_CLIENT = ("soak", "restart", "purge")  # the one in Python, whose messages the build makes
 
 
 def bench_with_client(name, bin_dir):
