@@ -15,6 +15,7 @@ BENCH_PACKAGES=(libbenchmark-dev openssl python3-protobuf python3-xxhash python3
 PLOT_PACKAGES=(python3-numpy python3-contourpy python3-cycler python3-dateutil python3-kiwisolver python3-packaging
   python3-pil python3-pyparsing python-matplotlib-data libqhull-r8.0)
 TIDY_PACKAGES=(clang-tidy)
+VALGRIND_PACKAGES=(valgrind)
 FUZZ_PACKAGES=(clang libclang-rt-14-dev)
 
 # install_packages PACKAGE...: asks apt only for what is missing.
