@@ -3,6 +3,7 @@
 the median of five runs."""
 
 import argparse
+import importlib
 import json
 import math
 import os
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 
+import bench_asked
 import bench_crowd
 import bench_follow
 import bench_load
@@ -202,6 +204,13 @@ def draw_curbs(rows, path):
     figure.savefig(path, dpi=110)
 
 
+WITH_CLIENT = ("soak", "restart", "purge")  # the one in Python, whose messages the build makes
+
+
+def bench_with_client(name, bin_dir):
+    importlib.import_module(f"bench_{name}").BENCHMARKS[name](bin_dir, emit, drive)
+
+
 BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               "localization": bench_localization, "fusion": bench_fusion, "accuracy": bench_accuracy,
               "curbs": bench_curbs,
@@ -209,23 +218,30 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
                                    **bench_memory.BENCHMARKS, **bench_unread.BENCHMARKS,
-                                   **bench_crowd.BENCHMARKS}.items()}}
+                                   **bench_crowd.BENCHMARKS}.items()},
+              **{name: lambda bin_dir, name=name: bench_with_client(name, bin_dir) for name in WITH_CLIENT}}
 
 
 def main():
     parser = argparse.ArgumentParser(prog="deploy/bench.sh", description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     parser.add_argument("--nginx", default="nginx", help=argparse.SUPPRESS)
-    parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too")
+    parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too; soak: 30 minutes")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
     bench_nginx.PROGRAM = args.nginx
-    bench_memory.LONG = args.long
+    bench_memory.LONG = bench_asked.LONG = args.long
+    missed = []
     for name in args.names or BENCHMARKS:
-        BENCHMARKS[name](args.bin)
+        try:
+            BENCHMARKS[name](args.bin)
+        except bench_asked.NotAsAsked as miss:
+            missed.append(str(miss))
+    if missed:
+        sys.exit(f"not as asked: {', '.join(missed)}")
 
 
 if __name__ == "__main__":

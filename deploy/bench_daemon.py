@@ -31,8 +31,9 @@ class Certificate:
 class Atlas:
     """A daemon in a directory of its own, and the command line speaking to it."""
 
-    def __init__(self, bin_dir, *flags, certificate=None):
-        self.bin = bin_dir
+    def __init__(self, bin_dir, *flags, certificate=None, under=()):
+        """`under`: a program that runs the daemon, and its arguments."""
+        self.bin, self.under = bin_dir, under
         self.folder = tempfile.TemporaryDirectory()
         self.client_flags = []
         if certificate:
@@ -42,7 +43,7 @@ class Atlas:
 
     def start(self, *flags):
         self.process = subprocess.Popen(
-            [self.bin / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
+            [*self.under, self.bin / "atlasd", "--data", self.folder.name + "/atlas", "--listen", "127.0.0.1:0",
              "--http", "127.0.0.1:0", "--log-level", "error", *flags], stdout=subprocess.PIPE, text=True)
         self.server, self.http = (self.process.stdout.readline().split()[1] for _ in range(2))
         self.port = self.server.rsplit(":")[-1]
@@ -64,10 +65,15 @@ class Atlas:
     def database(self):
         return pathlib.Path(self.folder.name) / "atlas/atlas.db"
 
-    def stop(self):
-        """Its files stay until the end."""
-        self.process.terminate()
+    def kill(self):
+        """As when the power of its machine goes, but for what the system has in its cache."""
+        self.process.kill()
         self.process.wait()
+
+    def stop(self):
+        """Its exit code. Its files stay until the end."""
+        self.process.terminate()
+        return self.process.wait()
 
     def run(self, *args):
         out = subprocess.run([str(part) for part in (self.bin / "atlas", *args, "--server", self.server,
@@ -75,11 +81,20 @@ class Atlas:
                              check=True, stdout=subprocess.PIPE, text=True).stdout
         return json.loads(out.strip().splitlines()[-1])
 
+    def metrics(self):
+        """The lines of the page: a name, with its labels, and a number."""
+        with urllib.request.urlopen(f"http://{self.http}/metrics", timeout=10) as page:
+            return [line for line in page.read().decode().splitlines() if not line.startswith("#")]
+
     def metric(self, name):
         """Of those without labels."""
-        with urllib.request.urlopen(f"http://{self.http}/metrics", timeout=10) as page:
-            lines = page.read().decode().splitlines()
-        return next(float(line.split()[1]) for line in lines if line.startswith(name + " "))
+        return next(float(line.split()[1]) for line in self.metrics() if line.startswith(name + " "))
+
+    def refused_requests(self):
+        """How many requests failed otherwise than by "not now", by kind and code."""
+        requests = (line.split() for line in self.metrics() if line.startswith("roadatlas_requests_total{"))
+        return {labels: int(float(count)) for labels, count in requests
+                if not any(f'code="{code}"' in labels for code in ("ok", "unavailable", "resource_exhausted"))}
 
     def resident_bytes(self):
         lines = pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines()

@@ -10,8 +10,12 @@ BUILD_PACKAGES=(
 )
 TEST_PACKAGES=(libgtest-dev libgmock-dev clang-format openssl python3 python3-protobuf python3-xxhash python3-zstandard
   xz-utils)
-BENCH_PACKAGES=(libbenchmark-dev openssl python3-matplotlib)
+BENCH_PACKAGES=(libbenchmark-dev openssl python3-protobuf python3-xxhash python3-zstandard)
+# What python3-matplotlib needs. It is unpacked itself: it comes with another Boost than ours, by way of fonttools.
+PLOT_PACKAGES=(python3-numpy python3-contourpy python3-cycler python3-dateutil python3-kiwisolver python3-packaging
+  python3-pil python3-pyparsing python-matplotlib-data libqhull-r8.0)
 TIDY_PACKAGES=(clang-tidy)
+VALGRIND_PACKAGES=(valgrind)
 FUZZ_PACKAGES=(clang libclang-rt-14-dev llvm)
 
 # install_packages PACKAGE...: asks apt only for what is missing.
@@ -35,7 +39,8 @@ install_packages() {
   "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# unpack_package PACKAGE DIR: its files without installing it, for a program whose package would start a service.
+# unpack_package PACKAGE DIR: its files without installing it, for a program whose package would start a service,
+# or one that comes with what others here do not go with.
 unpack_package() {
   local package=$1 folder=$2
   [[ -d $folder/usr ]] && return

@@ -3,7 +3,7 @@
 #   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, TSan over
 #               the tests labelled threads, and 10 s of each fuzzer
 #   --long      ten times as many random worlds in the tests that make them, the same payloads from
-#               g++ and clang++, and clang-tidy over all sources
+#               g++ and clang++, a daemon's life under valgrind, and clang-tidy over all sources
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
@@ -59,6 +59,7 @@ if ((sanitize)); then
 fi
 if ((long)); then
   deploy/compilers.sh
+  deploy/valgrind.sh
   echo "== clang-tidy"
   deploy/tidy.sh
 fi
