@@ -19,9 +19,10 @@ inline std::uint32_t Scaled(std::uint32_t usual) {
   return static_cast<std::uint32_t>(std::max(1.0, std::round(Scale() * usual)));
 }
 
-// From one point of failure to the next: each, or with less than the usual scale one in as many.
-inline std::uint32_t Stride() {
-  return static_cast<std::uint32_t>(std::max(1.0, std::round(1.0 / std::max(Scale(), 0.01))));
+// From one point of failure to the next: one in `usual`, more at a larger scale and less at a
+// smaller one.
+inline std::uint32_t Stride(std::uint32_t usual = 1) {
+  return static_cast<std::uint32_t>(std::max(1.0, std::round(usual / std::max(Scale(), 0.01))));
 }
 
 }  // namespace atlas::testing

@@ -16,6 +16,7 @@ class IoFaultFixture : public StoreTest {
   using Until = FaultyVfs::Until;
   using Loss = VolatileFiles::Loss;
 
+  explicit IoFaultFixture(std::uint32_t stride = testing::Stride()) : stride_(stride) {}
   ~IoFaultFixture() override { store_.reset(); }  // before the layer that it was opened with goes
 
   // What is there before each life: an empty folder, and a test that knows of no life yet.
@@ -77,7 +78,7 @@ class IoFaultFixture : public StoreTest {
   // `then` whatever becomes of the disk.
   template <typename Then>
   std::uint64_t FailEach(Calls calls, Until until, bool is_full, const Then& then) {
-    for (std::uint64_t number = 1;; number += testing::Stride()) {
+    for (std::uint64_t number = 1;; number += stride_) {
       store_.reset();
       std::filesystem::remove_all(options_.directory);
       Prepare();
@@ -95,6 +96,7 @@ class IoFaultFixture : public StoreTest {
     }
   }
 
+  const std::uint32_t stride_;
   FaultyVfs vfs_;
 };
 

@@ -8,7 +8,7 @@
 namespace atlas {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using SnapshotRefusalTest = SnapshotTest;
 
 TEST_F(SnapshotRefusalTest, WhatIsNoFileIsRefusedAndNotMade) {

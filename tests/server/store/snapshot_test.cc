@@ -6,7 +6,7 @@
 namespace atlas {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 TEST_F(SnapshotTest, AClosedAtlasIsReadAndNothingIsTouched) {
   Fill();

@@ -1,10 +1,8 @@
 // A store in a directory of its own, and short ways to write to it.
 #pragma once
 
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,17 +13,14 @@
 #include "server/store/atlas_store.h"
 #include "server/store/await.h"
 #include "server/store/sqlite/sqlite_store.h"
+#include "tests/core/support/memory_folder.h"
 
 namespace atlas {
 
 class StoreTest : public ::testing::Test {
  protected:
   StoreTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "atlas_store_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw std::runtime_error("cannot make " + name);
-    }
-    directory_ = name;
+    directory_ = testing::NewMemoryFolder("atlas_store");
     options_.directory = directory_ / "data";
     options_.new_profile = MapProfile();
     options_.new_atlas_id = {1, 2, 3};

@@ -222,7 +222,8 @@ TEST_F(TileStoreTest, WhoRepairsIndexesForgetsNoTileThatTheyList) {
   LoseTheTile();
   const auto repaired = Await<std::uint32_t>(
       [&](auto done) { store_->RepairTables(TableRepair::kRows, "tester", std::move(done)); });
-  EXPECT_EQ(repaired.value(), 1u);
+  ASSERT_TRUE(repaired.has_value()) << repaired.error().message();
+  EXPECT_EQ(*repaired, 1u);
   EXPECT_EQ(store_->ReadTile(kA).error().code(), StatusCode::kInvalidData);
   ExpectTiles(1);
 }

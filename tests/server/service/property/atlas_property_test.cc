@@ -7,14 +7,13 @@
 // way.
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "tests/core/support/memory_folder.h"
 #include "tests/core/support/test_scale.h"
 #include "tests/server/service/property/atlas_player.h"
 #include "tests/server/service/property/random_atlas.h"
@@ -34,24 +33,10 @@ std::optional<std::uint32_t> NumberFrom(const char* variable) {
              : std::optional(static_cast<std::uint32_t>(std::strtoul(text, nullptr, 10)));
 }
 
-// In memory where there is such a place: what is tested here is not the disk.
-std::filesystem::path NewDirectory() {
-  std::error_code ignored;
-  const std::filesystem::path memory = "/dev/shm";
-  const std::filesystem::path parent = std::filesystem::is_directory(memory, ignored)
-                                           ? memory
-                                           : std::filesystem::temp_directory_path();
-  std::string name = (parent / "atlas_property_XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw std::runtime_error("cannot make " + name);
-  }
-  return name;
-}
-
 void PlayCase(std::uint32_t seed, PlayCounts& counts) {
   const AtlasScript script =
       seed % 16 == 15 - seed / 16 % 16 ? RisingAtlas(seed) : RandomAtlas(seed);
-  const std::string failure = AtlasPlayer(script, NewDirectory(), counts).Play();
+  const std::string failure = AtlasPlayer(script, NewMemoryFolder("atlas_property"), counts).Play();
   ASSERT_EQ(failure, "") << "seed " << seed << " (again: ATLAS_PROPERTY_SEED=" << seed << ")\n"
                          << script;
 }
