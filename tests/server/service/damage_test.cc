@@ -187,7 +187,7 @@ TEST_F(DamageTest, TilesThatAreListedAndNotFoundAreRepaired) {
   Tamper(testing::LoseTiles("key % 3 = 0"));
   const auto repaired = Repair();
   ASSERT_TRUE(repaired) << repaired.error().message();
-  EXPECT_GT(repaired->damaged, 0U);
+  EXPECT_GT(repaired->restored, 0U);
   EXPECT_EQ(Digest().sha256, intact_.sha256);
   const auto report = service_->Verify({.rebuild = true}, Long());
   EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
