@@ -10,22 +10,22 @@ seconds=${1:-60}
 shift || true
 [[ $seconds =~ ^[1-9][0-9]*$ ]] || { echo "usage: deploy/fuzz.sh [SECONDS] [TARGET...]" >&2; exit 2; }
 . deploy/packages.sh
-install_packages "${BUILD_PACKAGES[@]}" "${TEST_PACKAGES[@]}" "${FUZZ_PACKAGES[@]}"
+install_packages "${BUILD_PACKAGES[@]}" "${FUZZ_PACKAGES[@]}"
 if (($#)); then
   targets=("$@")
 else
   mapfile -t targets < <(cd tests/fuzz && printf '%s\n' fuzz_*.cc | sed 's/^fuzz_//; s/\.cc$//')
 fi
 echo "== fuzz"
-cmake --preset asan >/dev/null
-cmake --build build/asan --target "${targets[@]/#/fuzz_}"
+cmake --preset fuzz >/dev/null
+cmake --build build/fuzz --target "${targets[@]/#/fuzz_}"
 mkdir -p build/fuzz/{logs,findings,corpus}
 
 # One input may take 10 s and 512 MiB, whatever it says of itself. The quarantine is less than usual: it
 # counts as memory.
 fuzz_one() {
   local target=$1 seconds=$2
-  local program=build/asan/bin/fuzz_$target corpus=build/fuzz/corpus/$target
+  local program=build/fuzz/bin/fuzz_$target corpus=build/fuzz/corpus/$target
   local committed=tests/fuzz/corpus/$target
   mkdir -p "$corpus"
   "$program" --write-seeds "$corpus" || return 1

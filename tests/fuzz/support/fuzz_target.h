@@ -1,5 +1,5 @@
 // What a fuzzer is made of. Each target defines kTarget; the rest is the same for all: with
-// libFuzzer (preset asan) it searches, without it replays (replay_main.cc).
+// libFuzzer (preset fuzz) it searches, without it replays (replay_main.cc).
 #pragma once
 
 #include <cstddef>
