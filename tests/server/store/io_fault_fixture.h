@@ -56,22 +56,22 @@ class IoFaultFixture : public StoreTest {
   }
   void FailSyncs(std::uint64_t number) { vfs_.FailAt(number, Calls::kSync, Until::kOnce); }
 
-  // Each call in its turn, until none is left to fail. How many there were.
+  // Each call in its turn, or one in `stride_`, until none is left to fail. How many there were.
   std::uint64_t FailEach(Calls calls, Until until, bool is_full = false) {
     return FailEach(calls, until, is_full, [](std::uint64_t) {});
   }
   // From each call on nothing reaches the disk, and of what did not have to be there some is not.
-  // How often.
+  // How many calls there were.
   std::uint64_t CutPowerAtEach(Loss loss) {
-    std::uint64_t cuts = 0;
+    std::uint64_t calls = 0;
     for (std::uint32_t round = 0; round < testing::Scaled(1) && !HasFailure(); ++round) {
       SCOPED_TRACE("round " + std::to_string(round));
-      cuts += FailEach(Calls::kAll, Until::kHealed, false, [&](std::uint64_t number) {
+      calls += FailEach(Calls::kAll, Until::kHealed, false, [&](std::uint64_t number) {
         vfs_.LosePower(loss, 1'000 * round + static_cast<std::uint32_t>(number));
       });
     }
-    RecordProperty("cuts", static_cast<int>(cuts));
-    return cuts;
+    RecordProperty("calls", static_cast<int>(calls));
+    return calls;
   }
 
  private:
