@@ -1,5 +1,6 @@
 #include "server/store/sqlite/atlas_opening.h"
 
+#include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <system_error>
@@ -26,11 +27,26 @@ DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem
   return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
 }
 
+// SQLite would take it for the new atlas's own.
+Status RefuseLogOfAnother(const DataDirectory& directory) {
+  const std::filesystem::path log = directory.database_file().string() + "-wal";
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(log, error);
+  if (error || bytes == 0) {
+    return {};
+  }
+  return {StatusCode::kConflict,
+          StrCat(log.string(),
+                 " is the log of an atlas that is not there: put atlas.db back beside it, or move "
+                 "the log away to begin a new atlas")};
+}
+
 Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
   if (!options.new_profile) {
     return Status(StatusCode::kNotFound,
                   StrCat("there is no atlas in ", options.directory.string()));
   }
+  ATLAS_RETURN_IF_ERROR(RefuseLogOfAnother(directory));
   ATLAS_RETURN_IF_ERROR(options.new_profile->Validate());
   directory.RemoveUnfinished();
   try {

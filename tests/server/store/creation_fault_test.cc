@@ -1,5 +1,6 @@
 // A new atlas whose disk fails, is full or loses its power at any call until it was opened for the
 // first time: the next opening gives a whole one, and nobody has to look after it.
+#include <filesystem>
 #include <string>
 
 #include "tests/server/store/io_fault_fixture.h"
@@ -65,6 +66,26 @@ class CreationFaultTest : public IoFaultFixture {
   int kept_ = 0;
   int made_again_ = 0;
 };
+
+// Whoever deletes atlas.db after a kill, to begin anew, leaves it.
+TEST_F(CreationFaultTest, NoAtlasIsMadeBesideTheLogOfAnother) {
+  Open();
+  ASSERT_TRUE(Put(Large(1, {TileId{0, 0, 0}})).has_value());
+  const std::filesystem::path log = Database().string() + "-wal";
+  const std::filesystem::path copy = directory_ / "log";
+  std::filesystem::copy_file(log, copy);
+  store_.reset();
+  std::filesystem::remove(Database());
+  std::filesystem::copy_file(copy, log);
+  const auto refused = OpenSqliteStore(options_);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code(), StatusCode::kConflict);
+  EXPECT_NE(refused.error().message().find(log.string()), std::string::npos);
+  EXPECT_EQ(std::filesystem::file_size(log), std::filesystem::file_size(copy));
+  std::filesystem::remove(log);
+  Open();
+  ExpectNew();
+}
 
 TEST_F(CreationFaultTest, ThePowerIsCutAndNothingUnsyncedIsThere) {
   CutPowerAtEach(Loss::kAll);
