@@ -74,7 +74,8 @@ Query& Query::Bind(std::string_view text) {
 }
 
 Query& Query::Bind(ByteSpan bytes) {
-  const void* data = bytes.empty() ? "" : static_cast<const void*>(bytes.data());  // else it is null
+  const void* data =
+      bytes.empty() ? "" : static_cast<const void*>(bytes.data());  // else it is null
   statement_->bindNoCopy(++parameter_, data, static_cast<int>(bytes.size()));
   return *this;
 }
