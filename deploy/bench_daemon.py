@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import threading
 import urllib.request
 
 
@@ -15,6 +16,22 @@ def rows_of(*command):
         yield json.loads(line)
     if process.wait():
         sys.exit(process.returncode)
+
+
+class Background:
+    """What runs beside a block, on a thread of its own: `run`, until `is_over`."""
+
+    def __init__(self, name):
+        self.is_over = threading.Event()
+        self.thread = threading.Thread(target=self.run, name=name)
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.is_over.set()
+        self.thread.join()
 
 
 class Certificate:

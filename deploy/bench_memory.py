@@ -2,10 +2,9 @@
 copies of a real drive. Docs/results.md, "Serving"."""
 
 import pathlib
-import threading
 import time
 
-from bench_daemon import Atlas, rows_of
+from bench_daemon import Atlas, Background, rows_of
 
 LONG = False  # 5 GiB, too
 NTH = 4  # keyframe: one every four metres or so, so that about half of the bytes are tiles
@@ -20,27 +19,18 @@ def memory_of(pid):
     return {name: int(fields[name].split()[0]) / 1024 for name in ("VmRSS", "VmHWM", "RssAnon", "RssFile")}
 
 
-class Watch:
+class Watch(Background):
     """The most of each over a while."""
 
     def __init__(self, pid):
+        super().__init__("watch")
         self.pid = pid
         self.most = memory_of(pid)
-        self.is_over = threading.Event()
-        self.thread = threading.Thread(target=self.run)
 
     def run(self):
         while not self.is_over.wait(0.2):
             for name, value in memory_of(self.pid).items():
                 self.most[name] = max(self.most[name], value)
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self.is_over.set()
-        self.thread.join()
 
 
 def serve(bin_dir, folder, gib, emit):

@@ -8,12 +8,11 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 
 import bench_asked
 import bench_soak_plot
-from bench_daemon import Atlas
+from bench_daemon import Atlas, Background
 from bench_soak_load import Street, actors_of
 from bench_traffic import Failures, record_street
 
@@ -29,20 +28,12 @@ ROOT = pathlib.Path(__file__).parent.parent
 SAMPLES = ROOT / "build/bench/soak.csv"
 
 
-class Sampler:
+class Sampler(Background):
     """A row a second, less where the machine is too busy for that, each written to SAMPLES at once."""
 
     def __init__(self, atlas, failures):
-        self.atlas, self.failures, self.rows, self.is_over = atlas, failures, [], threading.Event()
-        self.thread = threading.Thread(target=self.run)
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self.is_over.set()
-        self.thread.join()
+        super().__init__("sampler")
+        self.atlas, self.failures, self.rows = atlas, failures, []
 
     def run(self):
         began = time.monotonic()

@@ -12,7 +12,7 @@ import threading
 import atlas_pb2
 from roadatlas import AtlasClient, Code, RequestRefused, RoadAtlasError
 
-from bench_daemon import Atlas
+from bench_daemon import Atlas, Background
 
 NOT_NOW = (Code.UNAVAILABLE, Code.RESOURCE_EXHAUSTED)  # busy, or no room: typed, and to be tried again
 
@@ -75,22 +75,14 @@ class Failures:
                 self.others.append(f"{who}: {type(error).__name__}: {error}")
 
 
-class Actor:
+class Actor(Background):
     """Calls `act` with a client, every `period_s`, until it is told to stop; without a pause for 0. Connects again when
     the connection is lost."""
 
     def __init__(self, port, failures, name, period_s, act):
+        super().__init__(name)
         self.port, self.failures, self.name, self.period_s, self.act = int(port), failures, name, period_s, act
-        self.acts, self.is_over = 0, threading.Event()
-        self.thread = threading.Thread(target=self.run, name=name)
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self.is_over.set()
-        self.thread.join()
+        self.acts = 0
 
     def run(self):
         while not self.is_over.is_set():
