@@ -16,6 +16,7 @@ from harness import EXIT, Report
 
 DAY_S = 86_400
 SHORT_WAY_M = 100
+CITY_WAY_M = 160
 CAR_CLASS, MOVING_CAR_CLASS = 10, 252
 
 
@@ -65,25 +66,27 @@ def write_mesh(path):
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def write_poses(path, length_m):
-    path.write_text("".join(f"1 0 0 {x - length_m / 2} 0 1 0 0 0 0 1 1.8\n" for x in range(length_m + 1)),
-                    encoding="ascii")
+def write_poses(path, length_m, every_m=1):
+    path.write_text("".join(f"1 0 0 {x - length_m / 2} 0 1 0 0 0 0 1 1.8\n"
+                            for x in range(0, length_m + 1, every_m)), encoding="ascii")
 
 
 def parked_cases(simulation):
     report = simulation.report
-    visits = {day: simulation.drive("street", "--parked", day) for day in (0, 3, 4)}
+    way = simulation.work / "city_way.txt"
+    write_poses(way, CITY_WAY_M, every_m=4)
+    visits = {day: simulation.drive("city", "--trajectory", way, "--parked", day) for day in (0, 1, 3)}
     for day, folder in visits.items():
         times = [float(line) for line in (folder / "times.txt").read_text(encoding="ascii").split()]
         report.equal(f"day {day}: the first scan", times[0], float(DAY_S * day))
         report.check(f"day {day}: not a day long", times[-1] < DAY_S * (day + 1), times[-1])
     parked = {day: [box for box in boxes(folder) if box[0] == "all"] for day, folder in visits.items()}
     report.equal("nobody came on day 0", parked[0], [])
-    report.check("some parked on day 3", len(parked[3]) > 3 and {box[1] for box in parked[3]} == {CAR_CLASS},
-                 parked[3])
-    report.check("others parked on day 4", parked[3] != parked[4], parked[4])
-    again = simulation.drive("street", "--parked", 3, "--seed", 2)
-    report.equal("who drives there sees the same", [box for box in boxes(again) if box[0] == "all"], parked[3])
+    report.check("some parked on day 1", len(parked[1]) > 3 and {box[1] for box in parked[1]} == {CAR_CLASS},
+                 parked[1])
+    report.check("others parked on day 3", parked[3] != parked[1], parked[3])
+    again = simulation.drive("city", "--trajectory", way, "--parked", 1, "--seed", 2)
+    report.equal("who drives there sees the same", [box for box in boxes(again) if box[0] == "all"], parked[1])
     simulation.refused("a garage has no slots", ["garage", "--parked", 1], "--parked is for street and city")
     simulation.refused("a day to come", ["street", "--parked", 20_001], "expected a day up to 20000")
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/client/end_to_end/vehicle_fixture.h"
+#include "tests/core/support/test_scale.h"
 #include "tests/server/net/test_certificates.h"
 
 namespace atlas {
@@ -39,6 +40,7 @@ class DeadlineTest : public VehicleTest {
 
 TEST_F(DeadlineTest, CallsThatAreGivenUpAddUpToTheAtlas) {
   const fs::path data = NewData();
+  const std::uint32_t stores = testing::Scaled(20);
   HashById atlas;
   int rests = 0;
   {
@@ -47,7 +49,7 @@ TEST_F(DeadlineTest, CallsThatAreGivenUpAddUpToTheAtlas) {
     AtlasClient client = Connect(daemon);
     atlas = AtlasNow(client);
     ASSERT_GT(atlas.size(), 10U);
-    for (int store = 0; store < 20; ++store) {
+    for (std::uint32_t store = 0; store < stores; ++store) {
       FollowInGlimpses(client, atlas, rests);
     }
     EXPECT_EQ(daemon.Stop(SIGTERM), 0);
@@ -76,7 +78,7 @@ TEST_F(DeadlineTest, CallsThatAreGivenUpAddUpToTheAtlas) {
   }
   EXPECT_GT(calls, 3) << "TCP, TLS and the handshake, each in a call of its own at least";
   rests = 0;
-  for (int store = 0; store < 20; ++store) {
+  for (std::uint32_t store = 0; store < stores; ++store) {
     FollowInGlimpses(*progress.client, atlas, rests);
   }
   EXPECT_GT(rests, 0) << "nothing was given up";

@@ -141,10 +141,14 @@ TEST_F(WatchTest, ALinkThatBreaksEndsItAndTheNextConnectionSyncsWhatWasMissed) {
 
 TEST_F(WatchTest, TheCommandTellsALineATile) {
   DaemonProcess daemon(NewData(), kSmall);
+  const auto began = std::chrono::steady_clock::now();
   Fill(daemon);
-  auto watched = std::async(std::launch::async, [&daemon] {
+  const std::chrono::duration<double> filling = std::chrono::steady_clock::now() - began;
+  // Long enough for some drives, however slow this build is.
+  const std::string seconds = std::to_string(2.0 + 4.0 * filling.count());
+  auto watched = std::async(std::launch::async, [&daemon, &seconds] {
     return RunAtlas(daemon.address(), {"watch", "--center", "0,0", "--radius", "1000", "--level",
-                                       "1", "--interval", "0.1", "--for", "4"});
+                                       "1", "--interval", "0.1", "--for", seconds});
   });
   // The whole time, for it begins at its own.
   for (int drive = 0; watched.wait_for(milliseconds(0)) != std::future_status::ready; ++drive) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <future>
+#include <limits>
 #include <memory>
 #include <string>
 #include <thread>
@@ -70,15 +71,18 @@ class NetTest : public ServiceTest {
     }
     EXPECT_EQ(server_->ReadFigures().held_bytes, bytes);
   }
-  // What was queued until nothing changes any more, and is then.
+  // What was queued until nothing changes any more, and is then. A plan that takes long looks as if
+  // nothing changed: with more than `expected` queued, it is waited for.
   struct Queued {
     std::uint64_t most = 0;
     std::uint64_t at_rest = 0;
   };
-  Queued WaitUntilAtRest() const {
+  Queued WaitUntilAtRest(std::uint64_t expected = std::numeric_limits<std::uint64_t>::max()) const {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     std::uint64_t most = 0;
     NetFigures last;
-    for (int unchanged = 0; unchanged < 50;) {
+    for (int unchanged = 0; unchanged < 50 || (last.queued_bytes > expected &&
+                                               std::chrono::steady_clock::now() < deadline);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       const NetFigures now = server_->ReadFigures();
       most = std::max(most, now.queued_bytes);
