@@ -78,7 +78,7 @@ bool TryQuery(const wire::QueryRegion& message) {
 }
 
 bool TrySync(const wire::SyncRequest& message) {
-  const auto request = SyncFromWire(message, TinyAtlas::Profile());
+  const auto request = SyncFromWire(message, Atlas().service().identity());
   if (!request) {
     return false;
   }

@@ -92,18 +92,21 @@ Result<HeldTiles> HeldFromWire(const wire::SyncRequest& message) {
 
 // Another number when places are counted differently: a cursor of the daemon before is no place
 // then.
-constexpr std::uint64_t kOrderVersion = 3;
+constexpr std::uint64_t kOrderVersion = 4;
 
-// Of all that decides on the order.
-std::uint64_t HashOfOrder(const wire::SyncRequest& message) {
+// Of all that decides on the order. After a restore no cursor from before is a place: tiles behind
+// it are what they were earlier.
+std::uint64_t HashOfOrder(const wire::SyncRequest& message, const StoreIdentity& atlas) {
   ByteWriter order;
+  order.U64(atlas.epoch);
   order.U32(message.finest_level());
   order.U32(message.coarsest_level());
   order.Raw(BytesFromWire(message.area().SerializeAsString()));
   return Hash64(order.bytes()) + kOrderVersion;
 }
 
-Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& message) {
+Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& message,
+                                                 const StoreIdentity& atlas) {
   if (message.cursor().empty()) {
     return std::nullopt;
   }
@@ -114,8 +117,9 @@ Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& messag
   cursor.key = in.U64();
   const std::uint64_t order = in.U64();
   if (!in.ok() || in.remaining() > 0 || std::isnan(cursor.priority) ||
-      order != HashOfOrder(message)) {
-    return Error(Refuse("the cursor is not of a reply to this request: ask without one"));
+      order != HashOfOrder(message, atlas)) {
+    return Error(
+        Refuse("the cursor is not of a reply of this atlas to this request: ask without one"));
   }
   return cursor;
 }
@@ -134,8 +138,8 @@ Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profi
   return SyncArea::Create(*std::move(shape), profile);
 }
 
-Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile) {
-  Result<SyncArea> area = AreaFromWire(message.area(), profile);
+Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const StoreIdentity& atlas) {
+  Result<SyncArea> area = AreaFromWire(message.area(), atlas.profile);
   if (!area) {
     return Error(area.error());
   }
@@ -147,7 +151,7 @@ Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProf
   if (!held) {
     return Error(held.error());
   }
-  const Result<std::optional<SyncCursor>> cursor = CursorFromWire(message);
+  const Result<std::optional<SyncCursor>> cursor = CursorFromWire(message, atlas);
   if (!cursor) {
     return Error(cursor.error());
   }
@@ -155,18 +159,18 @@ Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProf
                      *sections,        *std::move(held),       *cursor};
 }
 
-Result<SyncOrder> TakeSync(wire::SyncRequest& message, const MapProfile& profile) {
+Result<SyncOrder> TakeSync(wire::SyncRequest& message, const StoreIdentity& atlas) {
   wire::SyncRequest taken;  // cleared, fields that are repeated would keep their memory
   taken.Swap(&message);
   message.set_budget_bytes(taken.budget_bytes());
   message.set_timeout_ms(taken.timeout_ms());
   message.set_wait_revision(taken.wait_revision());
   message.set_takes_deltas(taken.takes_deltas());
-  Result<SyncRequest> request = SyncFromWire(taken, profile);
+  Result<SyncRequest> request = SyncFromWire(taken, atlas);
   if (!request) {
     return Error(request.error());
   }
-  return SyncOrder{*std::move(request), HashOfOrder(taken)};
+  return SyncOrder{*std::move(request), HashOfOrder(taken, atlas)};
 }
 
 std::string CursorToWire(const SyncCursor& cursor, std::uint64_t order_hash) {

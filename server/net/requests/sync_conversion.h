@@ -11,8 +11,8 @@ namespace atlas {
 Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profile);
 
 // kInvalidArgument: an area that is none, a section number above 63, held tiles without hashes, a
-// cursor of another request.
-Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const MapProfile& profile);
+// cursor of another request, or from before the atlas was restored.
+Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const StoreIdentity& atlas);
 
 // The same without its message, for which cursors are.
 struct SyncOrder {
@@ -20,7 +20,7 @@ struct SyncOrder {
   std::uint64_t hash = 0;  // of all that decides on the order of tiles
 };
 // `message` is left with its numbers alone.
-Result<SyncOrder> TakeSync(wire::SyncRequest& message, const MapProfile& profile);
+Result<SyncOrder> TakeSync(wire::SyncRequest& message, const StoreIdentity& atlas);
 
 // To go on from: what SyncFromWire reads with a message of the same order.
 std::string CursorToWire(const SyncCursor& cursor, std::uint64_t order_hash);

@@ -76,14 +76,12 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block,
 
 // What was asked for, without its message.
 Status SyncReply::TakeOrder() {
-  Result<SyncOrder> order = TakeSync(*envelope_->mutable_sync_request(), profile());
+  Result<SyncOrder> order = TakeSync(*envelope_->mutable_sync_request(), service_.identity());
   if (!order) {
     return order.error();
   }
   const std::uint64_t now = service_.revision();
-  const bool is_lost = order->request.after &&
-                       !service_.identity().CheckNotLost(order->request.after->revision).ok();
-  if (is_lost || (order->request.after && order->request.after->revision > now)) {
+  if (order->request.after && order->request.after->revision > now) {
     return {StatusCode::kInvalidArgument,
             StrCat("sync: the cursor is of revision ", order->request.after->revision,
                    " and the atlas at ", now, ", an earlier copy: ask without it")};

@@ -146,9 +146,14 @@ TEST_F(BackupLifeTest, IsTheAtlasOfItsRevisionWhileAFleetDrives) {
 }
 
 TEST_F(BackupLifeTest, AVehicleThatGoesOnAfterARestoreLosesNothingThatItHas) {
-  Bytes whole;
   AtlasIdentity before;
   std::uint64_t lost = 0;
+  SyncQuery part;
+  part.area = DiscArea{{0.0, 0.0}, 1e6};
+  part.budget_bytes = 20'000;
+  const auto leave = [](const TileBlob&) {
+    return Status();
+  };
   const std::uint32_t backed_up = kFrames / 2 + 5;
   UploadSpool spool = *UploadSpool::Open({.folder = folder_ / "spool"});
   const auto put = [&spool](const FrameId& frame) {
@@ -162,6 +167,12 @@ TEST_F(BackupLifeTest, AVehicleThatGoesOnAfterARestoreLosesNothingThatItHas) {
     ASSERT_TRUE(UploadDirectly(Load(daemon, 1, Frames(0, 8))));
     AtlasClient client = Connect(daemon);
     EXPECT_EQ(client.atlas().last_sequence, backed_up - 1 - kFramesOfASession);
+    ASSERT_TRUE(client.WaitUntilFused(seconds(60)));
+    const auto first = client.Sync(part, leave);
+    ASSERT_TRUE(first) << first.error().message();
+    ASSERT_FALSE(first->cursor.empty()) << "all of it is within the budget";
+    part.cursor = first->cursor;
+    ASSERT_TRUE(client.Sync(part, leave));
     Backup(client, "monday");
     ASSERT_TRUE(UploadDirectly(Load(daemon, 0, Frames(backed_up, kFrames))));
     for (const FrameId& frame : Frames(0, 4)) put(frame);
@@ -187,9 +198,12 @@ TEST_F(BackupLifeTest, AVehicleThatGoesOnAfterARestoreLosesNothingThatItHas) {
   SyncQuery query;
   query.area = DiscArea{{0.0, 0.0}, 1e6};
   query.wait_revision = lost;
-  const auto waited = client.Sync(query, [](const TileBlob&) { return Status(); });
+  const auto waited = client.Sync(query, leave);
   ASSERT_FALSE(waited) << "what was lost is not there, whatever is";
   EXPECT_EQ(waited.error().code(), StatusCode::kNotFound);
+  const auto behind = client.Sync(part, leave);
+  ASSERT_FALSE(behind) << "what lies before it is what it was earlier";
+  EXPECT_EQ(behind.error().code(), StatusCode::kInvalidArgument);
   // One has all of its drive, and goes on behind what is there; one has what waits in its spool.
   const auto resumed = UploadResuming(Load(daemon, 0, Frames(0, kFrames)));
   ASSERT_TRUE(resumed) << resumed.error().message();
