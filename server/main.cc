@@ -160,18 +160,12 @@ LiveConfig::Prepare PrepareNameLimits(TcpServer& server) {
   };
 }
 
-LiveConfig::Prepare PrepareSessionLimit(AtlasService& service) {
+LiveConfig::Prepare PrepareUploadRules(AtlasService& service) {
   return [&service](const DaemonConfig& config) -> Result<LiveConfig::Commit> {
-    return [&service, limit = ServiceFrom(config).sessions_per_hour] {
-      service.set_sessions_per_hour(limit);
-    };
-  };
-}
-
-LiveConfig::Prepare PrepareRetention(AtlasService& service) {
-  return [&service](const DaemonConfig& config) -> Result<LiveConfig::Commit> {
-    return [&service, retention = ServiceFrom(config).retention] {
-      service.SetRetention(retention);
+    return [&service, options = ServiceFrom(config)] {
+      service.set_sessions_per_hour(options.sessions_per_hour);
+      service.SetRetention(options.retention);
+      service.SetPlausibility(options.plausibility);
     };
   };
 }
@@ -230,8 +224,7 @@ int Serve(LiveConfig& live, std::atomic<bool>& has_failed) {
   }
   live.AddPart(PrepareSecurity(server, !config.tls_certificate.empty()));
   live.AddPart(PrepareNameLimits(server));
-  live.AddPart(PrepareSessionLimit(service));
-  live.AddPart(PrepareRetention(service));
+  live.AddPart(PrepareUploadRules(service));
   const HangupWatch hangups([&live] { ReloadConfig(live); });
   std::fflush(stdout);
   spdlog::info("atlas in {}", config.data.string());

@@ -34,7 +34,7 @@ AtlasService::AtlasService(AtlasStore& store,
     : store_(store),
       clock_(std::move(clock)),
       log_(std::move(log)),
-      options_(options),
+      plausibility_(options.plausibility),
       starts_(std::make_shared<SessionStarts>(options.sessions_per_hour)),
       fusion_(
           store,
@@ -76,7 +76,7 @@ Result<NewKeyframe> AtlasService::CheckUpload(UploadRequest request) const {
 
 void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyframeResult> done) {
   keyframe.start = std::make_shared<SessionStart>(starts_);
-  keyframe.limits = options_.plausibility;
+  keyframe.limits = plausibility();
   const auto report = [this, session = keyframe.key.session,
                        done = std::move(done)](Result<PutKeyframeResult> result) {
     if (result && result->judgement) {
@@ -123,7 +123,7 @@ void AtlasService::ChangeSession(SessionChange change, AtlasStore::Done<SessionC
     done(Error(std::move(status)));
     return;
   }
-  change.limits = options_.plausibility;
+  change.limits = plausibility();
   store_.ChangeSession(std::move(change), Notifying(changes_, std::move(done)));
 }
 
@@ -247,6 +247,16 @@ void AtlasService::SetRetention(const Retention& retention) {
                                     FusionPresetName(preset), ", in which every keyframe counts"));
   }
   compaction_.set_on(retention.is_compacting && can_compact);
+}
+
+void AtlasService::SetPlausibility(const PlausibilityLimits& limits) {
+  const std::lock_guard lock(plausibility_mutex_);
+  plausibility_ = limits;
+}
+
+PlausibilityLimits AtlasService::plausibility() const {
+  const std::lock_guard lock(plausibility_mutex_);
+  return plausibility_;
 }
 
 Result<AtlasFacts> AtlasService::Backup(

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -90,6 +91,8 @@ class AtlasService {
   // From now on.
   void set_sessions_per_hour(std::uint32_t sessions) { starts_->set_per_hour(sessions); }
   void SetRetention(const Retention& retention);
+  // Of keyframes and changes from now on; a session stays what it is until then.
+  void SetPlausibility(const PlausibilityLimits& limits);
 
   // fusion_wait.h
   Result<WaitOutcome> WaitUntilClean(const Patience& patience) {
@@ -160,6 +163,7 @@ class AtlasService {
 
  private:
   void LogJudgement(const SessionKey& session, const SessionJudgement& judgement) const;
+  PlausibilityLimits plausibility() const;
   std::function<Status()> CheckPast(std::uint64_t revision, const Patience& patience) const;
   void RebuildDamaged(const TileId& id);
   Result<PoseBatch> PlacePoses(PoseBatchRequest request);
@@ -167,7 +171,8 @@ class AtlasService {
   AtlasStore& store_;
   WallClock clock_;
   LogSink log_;
-  ServiceOptions options_;
+  mutable std::mutex plausibility_mutex_;
+  PlausibilityLimits plausibility_;
   const std::shared_ptr<SessionStarts> starts_;
   ChangeSignal changes_;
   WatchHub watches_;
