@@ -1,11 +1,15 @@
 #include "core/base/bytes.h"
 
+#include <array>
+
 namespace atlas {
 
 void ByteWriter::Fixed(std::uint64_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) {
-    bytes_.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+  std::array<std::uint8_t, 8> little;
+  for (int i = 0; i < 8; ++i) {
+    little[i] = static_cast<std::uint8_t>(value >> (8 * i));
   }
+  bytes_.insert(bytes_.end(), little.begin(), little.begin() + bytes);
 }
 
 void ByteWriter::Varint(std::uint64_t value) {

@@ -8,18 +8,6 @@
 namespace atlas {
 namespace {
 
-constexpr int kCoordinateBits = 29;
-constexpr int kLevelShift = 2 * kCoordinateBits;
-
-// Spreads the low 32 bits over the even bits.
-std::uint64_t Spread(std::uint64_t v) {
-  v = (v | (v << 16)) & 0x0000FFFF0000FFFFULL;
-  v = (v | (v << 8)) & 0x00FF00FF00FF00FFULL;
-  v = (v | (v << 4)) & 0x0F0F0F0F0F0F0F0FULL;
-  v = (v | (v << 2)) & 0x3333333333333333ULL;
-  return (v | (v << 1)) & 0x5555555555555555ULL;
-}
-
 std::uint64_t Gather(std::uint64_t v) {
   v &= 0x5555555555555555ULL;
   v = (v | (v >> 1)) & 0x3333333333333333ULL;
@@ -29,20 +17,11 @@ std::uint64_t Gather(std::uint64_t v) {
   return (v | (v >> 16)) & 0x00000000FFFFFFFFULL;
 }
 
-std::uint64_t Bias(std::int32_t coordinate) {
-  assert(coordinate >= TileId::kMinCoordinate && coordinate <= TileId::kMaxCoordinate);
-  return static_cast<std::uint64_t>(coordinate - TileId::kMinCoordinate);
-}
-
 std::int32_t Unbias(std::uint64_t bits) {
   return static_cast<std::int32_t>(bits) + TileId::kMinCoordinate;
 }
 
 }  // namespace
-
-std::uint64_t TileId::Key() const {
-  return (std::uint64_t{level} << kLevelShift) | Spread(Bias(x)) | (Spread(Bias(y)) << 1);
-}
 
 Result<TileId> TileId::FromKey(std::uint64_t key) {
   if ((key >> 63) != 0) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <compare>
 #include <cstdint>
 #include <iosfwd>
@@ -23,7 +24,9 @@ struct TileId {
 
   // Frozen: level in bits 58..62, then the Morton code of (x + 2^28, y + 2^28), x in the even bits.
   // Requires coordinates in range. Non-negative as a signed 64-bit integer.
-  std::uint64_t Key() const;
+  constexpr std::uint64_t Key() const {
+    return (std::uint64_t{level} << kLevelShift) | Spread(Bias(x)) | (Spread(Bias(y)) << 1);
+  }
   // kInvalidData on a key that no tile has.
   static Result<TileId> FromKey(std::uint64_t key);
 
@@ -32,7 +35,29 @@ struct TileId {
 
   // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 sees a null pointer in <=>
   friend auto operator<=>(const TileId&, const TileId&) = default;
+
+ private:
+  static constexpr int kCoordinateBits = 29;
+  static constexpr int kLevelShift = 2 * kCoordinateBits;
+
+  static constexpr std::uint64_t Bias(std::int32_t coordinate) {
+    assert(coordinate >= kMinCoordinate && coordinate <= kMaxCoordinate);
+    return static_cast<std::uint64_t>(coordinate - kMinCoordinate);
+  }
+  // The low 32 bits over the even bits.
+  static constexpr std::uint64_t Spread(std::uint64_t v) {
+    v = (v | (v << 16)) & 0x0000FFFF0000FFFFULL;
+    v = (v | (v << 8)) & 0x00FF00FF00FF00FFULL;
+    v = (v | (v << 4)) & 0x0F0F0F0F0F0F0F0FULL;
+    v = (v | (v << 2)) & 0x3333333333333333ULL;
+    return (v | (v << 1)) & 0x5555555555555555ULL;
+  }
 };
+
+// What doubles from level to level, of its size on level 0: exact.
+inline double AtLevel(double size, std::uint8_t level) {
+  return size * static_cast<double>(std::uint64_t{1} << level);
+}
 
 std::ostream& operator<<(std::ostream& out, const TileId& id);  // "0/12/-3"
 

@@ -1,19 +1,17 @@
 #include "proto/wire/envelope.h"
 
-#include <algorithm>
+#include <span>
 #include <utility>
 
-#include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/wire_format_lite.h>
 
 #include "core/base/str_cat.h"
+#include "proto/wire/message_shape.h"
 
 namespace atlas {
 namespace {
 
-using google::protobuf::Descriptor;
-using google::protobuf::FieldDescriptor;
 using google::protobuf::internal::WireFormatLite;
 using google::protobuf::io::CodedInputStream;
 
@@ -37,7 +35,7 @@ class ShapeCheck {
   ShapeCheck(CodedInputStream& in, std::size_t max_bytes)
       : in_(in), bytes_left_(static_cast<std::int64_t>(max_bytes)) {}
 
-  Status Message(const Descriptor& type) {
+  Status Message(const MessageShape& type) {
     while (const std::uint32_t tag = in_.ReadTag()) {
       ATLAS_RETURN_IF_ERROR(Field(type, tag));
     }
@@ -47,52 +45,36 @@ class ShapeCheck {
   bool has_unknown() const { return unknown_ > 0; }
 
  private:
-  Status Field(const Descriptor& type, std::uint32_t tag) {
+  Status Field(const MessageShape& type, std::uint32_t tag) {
     const auto wire_type = WireFormatLite::GetTagWireType(tag);
     if (wire_type == WireFormatLite::WIRETYPE_START_GROUP ||
         wire_type == WireFormatLite::WIRETYPE_END_GROUP) {
       return Malformed();
     }
-    const FieldDescriptor* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
-    if (field != nullptr && !CanBe(*field, wire_type)) {
-      field = nullptr;  // Protobuf keeps it as one that it does not know
+    const FieldShape* field = type.Find(WireFormatLite::GetTagFieldNumber(tag));
+    if (field != nullptr && !field->CanBe(wire_type)) {
+      field = nullptr;
     }
     if (field == nullptr && ++unknown_ > kMaxUnknownFields) {
       return TooMany("unknown fields", kMaxUnknownFields);
     }
-    if (field != nullptr && field->is_repeated() && ++repeated_ > kMaxRepeatedFields) {
+    if (field != nullptr && field->is_repeated && ++repeated_ > kMaxRepeatedFields) {
       return TooMany("elements", kMaxRepeatedFields);
     }
-    const bool is_nested = field != nullptr && field->message_type() != nullptr &&
-                           wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED;
-    if (is_nested) {
-      return Nested(*field->message_type());
+    const bool is_delimited = wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED;
+    if (field != nullptr && field->nested != nullptr && is_delimited) {
+      return Nested(*field->nested);
     }
-    const bool is_blob = field != nullptr && field->type() == FieldDescriptor::TYPE_BYTES;
     const int begin = in_.CurrentPosition();
-    if (field != nullptr && wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED &&
-        HasVarints(*field)) {
+    if (field != nullptr && is_delimited && field->has_varints()) {
       ATLAS_RETURN_IF_ERROR(PackedVarints());
     } else if (!WireFormatLite::SkipField(&in_, tag)) {
       return Malformed();
     }
+    const bool is_blob = field != nullptr && field->is_blob;
     bytes_left_ -= is_blob ? 1 : 1 + in_.CurrentPosition() - begin;
     return bytes_left_ >= 0 ? Status()
                             : Status(StatusCode::kResourceExhausted, "envelope: more than blobs");
-  }
-
-  static WireFormatLite::WireType WireTypeOf(const FieldDescriptor& field) {
-    return WireFormatLite::WireTypeForFieldType(
-        static_cast<WireFormatLite::FieldType>(field.type()));
-  }
-
-  static bool CanBe(const FieldDescriptor& field, WireFormatLite::WireType wire_type) {
-    return wire_type == WireTypeOf(field) ||
-           (field.is_packable() && wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED);
-  }
-
-  static bool HasVarints(const FieldDescriptor& field) {
-    return field.is_packable() && WireTypeOf(field) == WireFormatLite::WIRETYPE_VARINT;
   }
 
   // Numbers of one byte take up to eight in memory. Those of fixed size take what they came in.
@@ -115,7 +97,7 @@ class ShapeCheck {
     return {};
   }
 
-  Status Nested(const Descriptor& type) {
+  Status Nested(const MessageShape& type) {
     int size = 0;
     if (!in_.ReadVarintSizeAsInt(&size)) {
       return Malformed();
@@ -139,7 +121,7 @@ Result<bool> CheckShape(ByteSpan payload, std::size_t max_bytes) {
   CodedInputStream in(payload.data(), static_cast<int>(payload.size()));
   in.SetRecursionLimit(kMaxDepth);
   ShapeCheck check(in, max_bytes);
-  Status status = check.Message(*wire::Envelope::descriptor());
+  Status status = check.Message(MessageShape::OfEnvelope());
   if (!status.ok()) {
     return Error(std::move(status));
   }
@@ -181,8 +163,8 @@ Result<Bytes> EncodeEnvelopeFrame(const wire::Envelope& envelope) {
   }
   Bytes frame(kFrameHeaderBytes + size);
   envelope.SerializeWithCachedSizesToArray(frame.data() + kFrameHeaderBytes);
-  const Bytes header = EncodeFrameHeader(ByteSpan(frame).subspan(kFrameHeaderBytes));
-  std::copy(header.begin(), header.end(), frame.begin());
+  WriteHeader(HeaderOf(ByteSpan(frame).subspan(kFrameHeaderBytes)),
+              std::span(frame).first<kFrameHeaderBytes>());
   return frame;
 }
 

@@ -1,5 +1,6 @@
 #include "proto/wire/frame.h"
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <utility>
@@ -35,17 +36,26 @@ Status BadMagic() {
 }  // namespace
 
 Bytes EncodeHeader(const FrameHeader& header) {
+  Bytes out(kFrameHeaderBytes);
+  WriteHeader(header, std::span<std::uint8_t, kFrameHeaderBytes>(out));
+  return out;
+}
+
+void WriteHeader(const FrameHeader& header, std::span<std::uint8_t, kFrameHeaderBytes> out) {
   assert(header.payload_bytes <= kMaxFrameBytes);
-  ByteWriter out;
-  out.Reserve(kFrameHeaderBytes);
-  out.Raw(kMagic);
-  out.U32(header.payload_bytes);
-  out.U32(header.checksum);
-  return out.Take();
+  std::copy(kMagic.begin(), kMagic.end(), out.begin());
+  for (std::size_t i = 0; i < 4; ++i) {
+    out[4 + i] = static_cast<std::uint8_t>(header.payload_bytes >> (8 * i));
+    out[8 + i] = static_cast<std::uint8_t>(header.checksum >> (8 * i));
+  }
+}
+
+FrameHeader HeaderOf(ByteSpan payload) {
+  return {static_cast<std::uint32_t>(payload.size()), PayloadChecksum(payload)};
 }
 
 Bytes EncodeFrameHeader(ByteSpan payload) {
-  return EncodeHeader({static_cast<std::uint32_t>(payload.size()), PayloadChecksum(payload)});
+  return EncodeHeader(HeaderOf(payload));
 }
 
 Result<FrameHeader> DecodeFrameHeader(ByteSpan header, std::uint32_t max_payload_bytes) {

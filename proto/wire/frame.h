@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "core/base/bytes.h"
@@ -25,9 +26,10 @@ struct FrameHeader {
   std::uint32_t checksum = 0;  // the low 32 bits of the payload's Hash64
 };
 
-// 12 bytes.
+void WriteHeader(const FrameHeader& header, std::span<std::uint8_t, kFrameHeaderBytes> out);
 Bytes EncodeHeader(const FrameHeader& header);
-// Those that go before `payload`.
+// The one that goes before `payload`.
+FrameHeader HeaderOf(ByteSpan payload);
 Bytes EncodeFrameHeader(ByteSpan payload);
 
 // Exactly kFrameHeaderBytes bytes in. kInvalidData when the magic is wrong (another protocol on

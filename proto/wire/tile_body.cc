@@ -1,6 +1,7 @@
 #include "proto/wire/tile_body.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -50,18 +51,20 @@ Result<TileBody> TileBody::Create(const TileBodyId& id, ByteSpan blob) {
 }
 
 Bytes TileBody::FrameAround(std::uint64_t request_id) const {
-  ByteWriter tail;
-  tail.Reserve(kMaxTailBytes);
-  tail.Varint(Tag(wire::Envelope::kRequestIdFieldNumber, kVarint));
-  tail.Varint(request_id);
+  constexpr std::array<std::uint8_t, kFrameHeaderBytes> kNoHeaderYet{};
+  ByteWriter out;
+  out.Reserve(kFrameHeaderBytes + kMaxTailBytes);
+  out.Raw(kNoHeaderYet);
+  out.Varint(Tag(wire::Envelope::kRequestIdFieldNumber, kVarint));
+  out.Varint(request_id);
+  Bytes around = out.Take();
+  const ByteSpan tail = ByteSpan(around).subspan(kFrameHeaderBytes);
   Hash64Stream hash = hash_;
-  hash.Add(tail.bytes());
-  ByteWriter around;
-  around.Reserve(kFrameHeaderBytes + kMaxTailBytes);
-  around.Raw(EncodeHeader({static_cast<std::uint32_t>(bytes_.size() + tail.size()),
-                           static_cast<std::uint32_t>(hash.value())}));
-  around.Raw(tail.bytes());
-  return around.Take();
+  hash.Add(tail);
+  WriteHeader({static_cast<std::uint32_t>(bytes_.size() + tail.size()),
+               static_cast<std::uint32_t>(hash.value())},
+              std::span(around).first<kFrameHeaderBytes>());
+  return around;
 }
 
 }  // namespace atlas

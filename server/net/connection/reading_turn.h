@@ -7,8 +7,8 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/cancellation_signal.hpp>
+#include <boost/asio/deferred.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
 #include "server/net/stream/peer_stream.h"
 
@@ -23,21 +23,23 @@ class ReadingTurn {
   boost::asio::awaitable<void> Next(PeerStream::Moved came, boost::asio::cancellation_slot stop) {
     bytes_ += came.bytes;
     ++reads_;
-    if (came.is_blocked) {
-      bytes_ = 0;
-      reads_ = 0;
-      co_await stream_.WaitUntilReadable(stop);
-    } else if (bytes_ >= kBytesInTurn || reads_ >= kReadsInTurn) {
-      bytes_ = 0;
-      reads_ = 0;
-      co_await boost::asio::post(stream_.executor(), boost::asio::use_awaitable);
+    if (!came.is_blocked && bytes_ < kBytesInTurn && reads_ < kReadsInTurn) {
+      return GoOn();
     }
+    bytes_ = 0;
+    reads_ = 0;
+    return came.is_blocked ? stream_.WaitUntilReadable(stop) : Pass();
   }
 
  private:
   // Of one peer that has more. A read may give one byte: a record of TLS that has no others.
   static constexpr std::size_t kBytesInTurn = 256u << 10;
   static constexpr int kReadsInTurn = 64;
+
+  static boost::asio::awaitable<void> GoOn() { co_return; }
+  boost::asio::awaitable<void> Pass() {
+    co_await boost::asio::post(stream_.executor(), boost::asio::deferred);
+  }
 
   PeerStream& stream_;
   std::size_t bytes_ = 0;  // in this turn
@@ -52,7 +54,7 @@ class AnsweringTurn {
 
   bool IsOver() const { return Clock::now() - began_ >= kLength; }
   boost::asio::awaitable<void> Pass() {
-    co_await boost::asio::post(stream_.executor(), boost::asio::use_awaitable);
+    co_await boost::asio::post(stream_.executor(), boost::asio::deferred);
     began_ = Clock::now();
   }
 

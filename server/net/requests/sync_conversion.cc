@@ -96,28 +96,27 @@ constexpr std::uint64_t kOrderVersion = 4;
 
 // Of all that decides on the order. After a restore no cursor from before is a place: tiles behind
 // it are what they were earlier.
-std::uint64_t HashOfOrder(const wire::SyncRequest& message, const StoreIdentity& atlas) {
+std::uint64_t HashOfOrder(const SyncRequest& request, const StoreIdentity& atlas) {
   ByteWriter order;
   order.U64(atlas.epoch);
-  order.U32(message.finest_level());
-  order.U32(message.coarsest_level());
-  order.Raw(BytesFromWire(message.area().SerializeAsString()));
+  order.U32(request.finest_level);
+  order.U32(request.coarsest_level);
+  order.U64(request.area.Hash());
   return Hash64(order.bytes()) + kOrderVersion;
 }
 
-Result<std::optional<SyncCursor>> CursorFromWire(const wire::SyncRequest& message,
-                                                 const StoreIdentity& atlas) {
-  if (message.cursor().empty()) {
-    return std::nullopt;
-  }
-  ByteReader in(BytesFromWire(message.cursor()));
+// The one of the message that `request` was made of.
+Result<SyncCursor> CursorFromWire(const std::string& message,
+                                  const SyncRequest& request,
+                                  const StoreIdentity& atlas) {
+  ByteReader in(BytesFromWire(message));
   SyncCursor cursor;
   cursor.revision = in.U64();
   cursor.priority = std::bit_cast<double>(in.U64());
   cursor.key = in.U64();
   const std::uint64_t order = in.U64();
   if (!in.ok() || in.remaining() > 0 || std::isnan(cursor.priority) ||
-      order != HashOfOrder(message, atlas)) {
+      order != HashOfOrder(request, atlas)) {
     return Error(
         Refuse("the cursor is not of a reply of this atlas to this request: ask without one"));
   }
@@ -151,34 +150,36 @@ Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const StoreId
   if (!held) {
     return Error(held.error());
   }
-  const Result<std::optional<SyncCursor>> cursor = CursorFromWire(message, atlas);
-  if (!cursor) {
-    return Error(cursor.error());
+  SyncRequest request{*std::move(area), message.finest_level(), message.coarsest_level(),
+                      *sections,        *std::move(held),       std::nullopt};
+  if (!message.cursor().empty()) {
+    const Result<SyncCursor> cursor = CursorFromWire(message.cursor(), request, atlas);
+    if (!cursor) {
+      return Error(cursor.error());
+    }
+    request.after = *cursor;
   }
-  return SyncRequest{*std::move(area), message.finest_level(), message.coarsest_level(),
-                     *sections,        *std::move(held),       *cursor};
+  return request;
 }
 
-Result<SyncOrder> TakeSync(wire::SyncRequest& message, const StoreIdentity& atlas) {
+Result<SyncRequest> TakeSync(wire::SyncRequest& message, const StoreIdentity& atlas) {
   wire::SyncRequest taken;  // cleared, fields that are repeated would keep their memory
   taken.Swap(&message);
   message.set_budget_bytes(taken.budget_bytes());
   message.set_timeout_ms(taken.timeout_ms());
   message.set_wait_revision(taken.wait_revision());
   message.set_takes_deltas(taken.takes_deltas());
-  Result<SyncRequest> request = SyncFromWire(taken, atlas);
-  if (!request) {
-    return Error(request.error());
-  }
-  return SyncOrder{*std::move(request), HashOfOrder(taken, atlas)};
+  return SyncFromWire(taken, atlas);
 }
 
-std::string CursorToWire(const SyncCursor& cursor, std::uint64_t order_hash) {
+std::string CursorToWire(const SyncCursor& cursor,
+                         const SyncRequest& request,
+                         const StoreIdentity& atlas) {
   ByteWriter out;
   out.U64(cursor.revision);
   out.U64(std::bit_cast<std::uint64_t>(cursor.priority));
   out.U64(cursor.key);
-  out.U64(order_hash);
+  out.U64(HashOfOrder(request, atlas));
   return BytesToWire(out.bytes());
 }
 
@@ -194,8 +195,12 @@ SyncBytes BytesOf(const wire::SyncRequest& message) {
 
 void HoldingsToWire(const SyncPlan& plan, wire::SyncManifest& out) {
   out.mutable_removed()->Add(plan.removed.begin(), plan.removed.end());
-  out.set_current_tiles(BytesToWire(plan.current_tiles));
-  out.set_current_blocks(BytesToWire(plan.current_blocks));
+  if (!plan.current_tiles.empty()) {
+    out.set_current_tiles(BytesToWire(plan.current_tiles));
+  }
+  if (!plan.current_blocks.empty()) {
+    out.set_current_blocks(BytesToWire(plan.current_blocks));
+  }
   out.set_not_modified(plan.not_modified);
   out.mutable_differing_blocks()->Add(plan.differing.begin(), plan.differing.end());
 }

@@ -14,16 +14,13 @@ Result<SyncArea> AreaFromWire(const wire::Area& message, const MapProfile& profi
 // cursor of another request, or from before the atlas was restored.
 Result<SyncRequest> SyncFromWire(const wire::SyncRequest& message, const StoreIdentity& atlas);
 
-// The same without its message, for which cursors are.
-struct SyncOrder {
-  SyncRequest request;
-  std::uint64_t hash = 0;  // of all that decides on the order of tiles
-};
-// `message` is left with its numbers alone.
-Result<SyncOrder> TakeSync(wire::SyncRequest& message, const StoreIdentity& atlas);
+// The same; `message` is left with its numbers alone.
+Result<SyncRequest> TakeSync(wire::SyncRequest& message, const StoreIdentity& atlas);
 
-// To go on from: what SyncFromWire reads with a message of the same order.
-std::string CursorToWire(const SyncCursor& cursor, std::uint64_t order_hash);
+// To go on from: what SyncFromWire reads with a message of the same area and levels.
+std::string CursorToWire(const SyncCursor& cursor,
+                         const SyncRequest& request,
+                         const StoreIdentity& atlas);
 
 // That a sync takes when it is read, at most, besides its message.
 struct SyncBytes {

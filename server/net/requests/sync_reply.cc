@@ -1,11 +1,14 @@
 #include "server/net/requests/sync_reply.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <google/protobuf/arena.h>
 
 #include "core/base/str_cat.h"
 #include "server/net/requests/atlas_wait.h"
@@ -27,6 +30,20 @@ constexpr std::size_t kEndBytes = kFrameHeaderBytes + 96;
 constexpr std::size_t kTileFrameBytes = kFrameHeaderBytes + 11;  // besides its body
 // Of a plan, however little room there is: 18 KiB. It is made again after these.
 constexpr std::size_t kLeastItems = 256;
+
+// For one message, most of which need no memory besides this.
+class ReplyArena {
+ public:
+  wire::Envelope& NewReply(std::uint64_t request_id) {
+    auto& reply = *google::protobuf::Arena::CreateMessage<wire::Envelope>(&arena_);
+    reply.set_request_id(request_id);
+    return reply;
+  }
+
+ private:
+  alignas(std::max_align_t) std::array<char, 2'048> first_block_;
+  google::protobuf::Arena arena_{first_block_.data(), first_block_.size()};
+};
 
 }  // namespace
 
@@ -52,8 +69,8 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block,
       return begun;
     }
   }
-  Batch batch;
-  batch.manifest = ReplyTo(*envelope_);
+  ReplyArena arena;
+  Batch batch{arena.NewReply(request_id())};
   const bool is_first = sent_bytes_ == 0;
   if (is_first) {
     *batch.manifest.mutable_sync_manifest() = holdings_;
@@ -76,18 +93,17 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block,
 
 // What was asked for, without its message.
 Status SyncReply::TakeOrder() {
-  Result<SyncOrder> order = TakeSync(*envelope_->mutable_sync_request(), service_.identity());
-  if (!order) {
-    return order.error();
+  Result<SyncRequest> request = TakeSync(*envelope_->mutable_sync_request(), service_.identity());
+  if (!request) {
+    return request.error();
   }
   const std::uint64_t now = service_.revision();
-  if (order->request.after && order->request.after->revision > now) {
+  if (request->after && request->after->revision > now) {
     return {StatusCode::kInvalidArgument,
-            StrCat("sync: the cursor is of revision ", order->request.after->revision,
+            StrCat("sync: the cursor is of revision ", request->after->revision,
                    " and the atlas at ", now, ", an earlier copy: ask without it")};
   }
-  order_hash_ = order->hash;
-  request_ = std::move(order->request);
+  request_ = *std::move(request);
   last_ = request_->after.value_or(
       SyncCursor{now, std::numeric_limits<double>::infinity(), ~std::uint64_t{0}});
   return {};
@@ -217,12 +233,13 @@ Status SyncReply::Emit(const Batch& batch, std::vector<ReplyFrame>& out) {
 }
 
 Result<Bytes> SyncReply::EndFrame(End how) const {
-  wire::Envelope envelope = ReplyTo(*envelope_);
+  ReplyArena arena;
+  wire::Envelope& envelope = arena.NewReply(request_id());
   wire::SyncEnd& end = *envelope.mutable_sync_end();
   end.set_tiles(sent_tiles_);
   end.set_revision(last_.revision);
   if (how == End::kCut) {
-    end.set_cursor(CursorToWire(last_, order_hash_));
+    end.set_cursor(CursorToWire(last_, *request_, service_.identity()));
   }
   end.set_bytes(sent_bytes_);
   for (int pass = 0; pass < 2; ++pass) {

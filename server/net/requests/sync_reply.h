@@ -68,7 +68,7 @@ class SyncReply {
   using Body = ReplyTiles::Body;
   enum class End { kWhole, kCut };
   struct Batch {
-    wire::Envelope manifest;
+    wire::Envelope& manifest;
     std::vector<Body> tiles;
     std::size_t tile_bytes = 0;
     std::optional<End> end;
@@ -92,7 +92,6 @@ class SyncReply {
   const std::shared_ptr<wire::Envelope> envelope_;
   const bool is_large_;
   std::optional<SyncRequest> request_;  // from Begin() on
-  std::uint64_t order_hash_ = 0;        // likewise
   std::optional<Clock::time_point> deadline_;
   SyncPlan plan_;
   std::size_t next_ = 0;         // item of the plan

@@ -1,12 +1,14 @@
 #include "server/service/sync/sync_area.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <type_traits>
 #include <utility>
 
+#include "core/base/hash.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -135,13 +137,13 @@ const std::vector<SyncArea::Leg>* SyncArea::shaping_legs() const {
 }
 
 double SyncArea::tile_side_m(std::uint8_t level) const {
-  return std::ldexp(tile_m_, level);
+  return AtLevel(tile_m_, level);
 }
 
 MapSquare SyncArea::SquareOf(const TileId& id, int bits) const {
   const double side_m = tile_side_m(id.level);
   const Vector2d min_m = side_m * Vector2d(id.x, id.y);
-  return {min_m, min_m + Vector2d::Constant(std::ldexp(side_m, bits))};
+  return {min_m, min_m + Vector2d::Constant(side_m * (1 << bits))};
 }
 
 bool SyncArea::IsWithinReach(const Leg& leg, const TileId& id, int bits) const {
@@ -210,6 +212,33 @@ std::size_t SyncArea::bytes() const {
     bytes += corridor->route_m.capacity() * sizeof(Vector2d);
   }
   return bytes;
+}
+
+std::uint64_t SyncArea::Hash() const {
+  ByteWriter out;
+  out.U8(static_cast<std::uint8_t>(shape_.index()));
+  const auto length = [&out](double length_m) {
+    out.U64(std::bit_cast<std::uint64_t>(length_m));
+  };
+  const auto point = [&length](const Vector2d& point_m) {
+    length(point_m.x());
+    length(point_m.y());
+  };
+  if (const auto* disc = std::get_if<DiscArea>(&shape_)) {
+    point(disc->center_m);
+    length(disc->radius_m);
+  } else if (const auto* box = std::get_if<BoxArea>(&shape_)) {
+    point(box->min_m);
+    point(box->max_m);
+  } else if (const auto* corridor = std::get_if<CorridorArea>(&shape_)) {
+    length(corridor->half_width_m);
+    std::for_each(corridor->route_m.begin(), corridor->route_m.end(), point);
+  } else {
+    const std::vector<std::uint64_t>& keys = *tile_keys();
+    out.Reserve((keys.size() + 1) * sizeof(std::uint64_t));
+    std::for_each(keys.begin(), keys.end(), [&out](std::uint64_t key) { out.U64(key); });
+  }
+  return Hash64(out.bytes());
 }
 
 double SyncArea::Nearer(double best_m, const Leg& leg, const MapSquare& square) {

@@ -47,6 +47,8 @@ class SyncArea {
   const std::vector<std::uint64_t>* tile_keys() const;
   // That it occupies.
   std::size_t bytes() const;
+  // Of all that it was made of: another one for another area.
+  std::uint64_t Hash() const;
   // Of the vehicle's way; none where the area says nothing of one.
   const std::vector<Leg>& legs() const { return legs_; }
   // Those that make the area, all within `reach_m` of them; null where something else does.

@@ -105,9 +105,12 @@ class Planner {
     constexpr std::int32_t kMin = TileId::kMinCoordinate;
     constexpr std::int32_t kMax = TileId::kMaxCoordinate;
     const auto end = std::upper_bound(keys.begin(), keys.end(), TileId{level_, kMax, kMax}.Key());
+    auto key = std::lower_bound(keys.begin(), end, TileId{level_, kMin, kMin}.Key());
+    if (key == end) {
+      return true;
+    }
     std::vector<std::uint64_t> blocks;
-    for (auto key = std::lower_bound(keys.begin(), end, TileId{level_, kMin, kMin}.Key());
-         key != end; ++key) {
+    for (; key != end; ++key) {
       const std::uint64_t block = TileBlockOf(*key);
       if (blocks.empty() || blocks.back() != block) {
         blocks.push_back(block);
@@ -181,23 +184,51 @@ class Planner {
       return {};
     }
     LookAt(block);
+    if (request_.area.tile_keys() != nullptr) {
+      return AddNamed(*request_.area.tile_keys(), block, tiles, held, is_same);
+    }
     for (const TileSummary& tile : tiles) {
-      if (!local_->Touches(tile.id)) {
-        continue;
+      if (local_->Touches(tile.id)) {
+        ATLAS_RETURN_IF_ERROR(AddWithin(tile, held, is_same));
       }
-      if (++tiles_ > limits_.max_tiles) {
-        return {StatusCode::kInvalidArgument,
-                StrCat("sync: more than ", limits_.max_tiles,
-                       " tiles are in this area: ask for coarser levels, or for parts of it")};
+    }
+    return {};
+  }
+
+  // Few of a block, mostly.
+  Status AddNamed(const std::vector<std::uint64_t>& keys,
+                  std::uint64_t block,
+                  std::span<const TileSummary> tiles,
+                  const HeldBlock* held,
+                  bool is_same) {
+    const auto is_before = [](const TileSummary& tile, std::uint64_t key) {
+      return tile.id.Key() < key;
+    };
+    auto tile = tiles.begin();
+    for (auto key = std::lower_bound(keys.begin(), keys.end(), FirstKeyOf(block));
+         key != keys.end() && TileBlockOf(*key) == block; ++key) {
+      tile = std::lower_bound(tile, tiles.end(), *key, is_before);
+      if (tile != tiles.end() && tile->id.Key() == *key) {
+        ATLAS_RETURN_IF_ERROR(AddWithin(*tile, held, is_same));
       }
-      const std::uint64_t key = tile.id.Key();
-      const bool is_of_held =
-          held != nullptr && (held->tiles >> (key - FirstKeyOf(block)) & 1u) != 0;
-      if (is_of_held) {
-        AddOfBlock(tile, *held, is_same);
-      } else {
-        Add(tile, request_.held.Find(key));
-      }
+    }
+    return {};
+  }
+
+  // One of the area, and the block of which it is, if that is held.
+  Status AddWithin(const TileSummary& tile, const HeldBlock* held, bool is_same) {
+    if (++tiles_ > limits_.max_tiles) {
+      return {StatusCode::kInvalidArgument,
+              StrCat("sync: more than ", limits_.max_tiles,
+                     " tiles are in this area: ask for coarser levels, or for parts of it")};
+    }
+    const std::uint64_t key = tile.id.Key();
+    const bool is_of_held =
+        held != nullptr && (held->tiles >> (key - FirstKeyOf(held->block)) & 1u) != 0;
+    if (is_of_held) {
+      AddOfBlock(tile, *held, is_same);
+    } else {
+      Add(tile, request_.held.Find(key));
     }
     return {};
   }
@@ -295,13 +326,16 @@ class Planner {
   // The error that a tile removes, over its area; a parent's is at least eight times its
   // children's.
   double WorthAt(std::uint8_t level, double distance_m) const {
-    const double side_m = std::ldexp(profile_.tile_size_m(), level);
+    const double side_m = AtLevel(profile_.tile_size_m(), level);
     const double near = 1.0 + distance_m / kNear_m;
     return GeometricError(level, profile_) * (side_m * side_m / (near * near * near));
   }
 
   // Never less than its parent's: that may be nearest to the way where more is to be driven.
   double DistanceOf(const TileId& id) {
+    if (request_.area.legs().empty()) {
+      return 0.0;
+    }
     KnownDistance& known = distances_[id.level];
     const std::uint64_t key = id.Key();
     if (known.key != key) {
@@ -384,7 +418,7 @@ class Planner {
 }  // namespace
 
 double GeometricError(std::uint8_t level, const MapProfile& profile) {
-  return std::ldexp(profile.cell_size_m(), level);
+  return AtLevel(profile.cell_size_m(), level);
 }
 
 Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request,

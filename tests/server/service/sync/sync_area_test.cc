@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <set>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -156,6 +158,33 @@ TEST(SyncAreaTest, HostileNumbersAreRefusedOrHarmless) {
   EXPECT_LE(rect.min_x, rect.max_x);
   EXPECT_TRUE(Make(DiscArea{{0, 0}, kInf}).Touches({0, 1'000'000, -1'000'000}));
   EXPECT_FALSE(std::isnan(far.Distance({0, TileId::kMaxCoordinate, TileId::kMinCoordinate})));
+}
+
+TEST(SyncAreaTest, EveryAreaHasAHashOfItsOwn) {
+  const std::vector<MapArea> areas = {
+      DiscArea{{0, 0}, 1.0},
+      DiscArea{{0, 0}, 2.0},
+      DiscArea{{0, 1}, 1.0},
+      DiscArea{{1, 0}, 1.0},
+      BoxArea{{0, 0}, {1, 0}},
+      BoxArea{{0, 0}, {0, 1}},
+      BoxArea{{0, 0}, {1, 1}},
+      CorridorArea{{{0, 0}}, 1.0},
+      CorridorArea{{{0, 0}}, 2.0},
+      CorridorArea{{{0, 0}, {0, 1}}, 1.0},
+      CorridorArea{{{0, 1}, {0, 0}}, 1.0},
+      TilesArea{},
+      TilesArea{{{0, 0, 0}}},
+      TilesArea{{{0, 0, 1}}},
+      TilesArea{{{0, 0, 0}, {0, 0, 1}}},
+      TilesArea{{{1, 0, 0}}},
+  };
+  std::set<std::uint64_t> hashes;
+  for (const MapArea& area : areas) {
+    hashes.insert(Make(area).Hash());
+    EXPECT_EQ(Make(area).Hash(), Make(area).Hash());
+  }
+  EXPECT_EQ(hashes.size(), areas.size());
 }
 
 }  // namespace
