@@ -6,7 +6,7 @@ namespace atlas {
 
 void ByteWriter::Fixed(std::uint64_t value, int bytes) {
   std::array<std::uint8_t, 8> little;
-  for (int i = 0; i < 8; ++i) {
+  for (std::size_t i = 0; i < little.size(); ++i) {
     little[i] = static_cast<std::uint8_t>(value >> (8 * i));
   }
   bytes_.insert(bytes_.end(), little.begin(), little.begin() + bytes);

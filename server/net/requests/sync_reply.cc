@@ -70,7 +70,7 @@ Result<SyncReply::Step> SyncReply::Next(bool may_block,
     }
   }
   ReplyArena arena;
-  Batch batch{arena.NewReply(request_id())};
+  Batch batch(arena.NewReply(request_id()));
   const bool is_first = sent_bytes_ == 0;
   if (is_first) {
     *batch.manifest.mutable_sync_manifest() = holdings_;

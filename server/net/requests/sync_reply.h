@@ -68,6 +68,8 @@ class SyncReply {
   using Body = ReplyTiles::Body;
   enum class End { kWhole, kCut };
   struct Batch {
+    explicit Batch(wire::Envelope& reply) : manifest(reply) {}
+
     wire::Envelope& manifest;
     std::vector<Body> tiles;
     std::size_t tile_bytes = 0;
