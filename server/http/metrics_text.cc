@@ -79,6 +79,16 @@ void AddAtlas(const ServiceStatus& status, Families& out) {
              status.building_s);
 }
 
+void AddLateConnections(const NetFigures& net, Families& out) {
+  MetricFamily& family =
+      Begin(out, "connections_late_total", "Connections closed because they were too slow.",
+            MetricType::Counter);
+  for (std::size_t i = 0; i < kLatenessNames.size(); ++i) {
+    AddCount(family, {{"cause", std::string(kLatenessNames[i])}},
+             static_cast<double>(net.late_connections[i]));
+  }
+}
+
 void AddRequests(const NetFigures& net, Families& out) {
   MetricFamily& family = Begin(out, "requests_total", "Requests that ended.", MetricType::Counter);
   for (std::size_t kind = 0; kind < kRequestKinds; ++kind) {
@@ -124,6 +134,7 @@ void AddNet(const NetFigures& net, Families& out) {
              "TLS handshakes that peers began and that did not succeed.", net.handshakes_failed);
   AddCounter(out, "broken_frames_total",
              "Frames that broke the protocol; each ended its connection.", net.broken_frames);
+  AddLateConnections(net, out);
   AddRequests(net, out);
   AddLateRequests(net, out);
   AddRequestDurations(net, out);

@@ -44,6 +44,13 @@ inline std::string_view RequestKindName(RequestKind kind) {
   return kRequestKindNames[static_cast<std::size_t>(kind)];
 }
 
+// Why a connection was closed that broke no rule but was too slow.
+enum class Lateness { kReplies, kFrame, kSilence };
+inline constexpr std::array<std::string_view, 3> kLatenessNames = {"replies", "frame", "silence"};
+inline constexpr std::array<const char*, 3> kLatenessTexts = {
+    "replies were not taken in time", "the rest of a frame did not come in time",
+    "nothing came in time"};
+
 // Of all threads; of the moment, but not of one moment.
 struct NetFigures {
   struct Kind {
@@ -56,6 +63,7 @@ struct NetFigures {
   std::uint64_t refused = 0;            // connections since the start
   std::uint64_t handshakes_failed = 0;  // of TLS, that peers began
   std::uint64_t broken_frames = 0;      // each of which ended its connection
+  std::array<std::uint64_t, kLatenessNames.size()> late_connections{};  // closed, by Lateness
   std::array<Kind, kRequestKinds> kinds;
   std::uint64_t received_bytes = 0;
   std::uint64_t sent_bytes = 0;
@@ -75,6 +83,7 @@ struct NetCounters {
   std::array<Kind, kRequestKinds> kinds;
   ThreadCounter handshakes_failed;
   ThreadCounter broken_frames;
+  std::array<ThreadCounter, kLatenessNames.size()> late_connections;
   ThreadCounter received_bytes;
   ThreadCounter sent_bytes;
   ThreadCounter in_flight;
@@ -89,6 +98,9 @@ struct NetCounters {
     }
     figures.handshakes_failed += handshakes_failed.value();
     figures.broken_frames += broken_frames.value();
+    for (std::size_t i = 0; i < late_connections.size(); ++i) {
+      figures.late_connections[i] += late_connections[i].value();
+    }
     figures.received_bytes += received_bytes.value();
     figures.sent_bytes += sent_bytes.value();
     figures.in_flight += in_flight.value();

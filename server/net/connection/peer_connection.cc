@@ -354,24 +354,25 @@ void PeerConnection::CheckDeadlines(Clock::time_point now) {
   if (phase_ == Phase::kClosed) {
     return;
   }
-  if (const char* const late = WhatIsLate(now); late != nullptr) {
-    peer_.Warn(late);
+  if (const std::optional<Lateness> late = WhatIsLate(now)) {
+    const auto index = static_cast<std::size_t>(*late);
+    peer_.Warn(kLatenessTexts[index]);
+    peer_.counters.late_connections[index].Add();
     CloseNow();
   }
 }
 
-const char* PeerConnection::WhatIsLate(Clock::time_point now) {
+std::optional<Lateness> PeerConnection::WhatIsLate(Clock::time_point now) {
   if (writer_.IsStalled(now)) {
     stream_.DropUnsent();  // else the system would keep it for as long as the peer likes
-    return "replies were not taken in time";
+    return Lateness::kReplies;
   }
   const bool is_expected = is_reading_ && !is_held_up_ && phase_ == Phase::kOpen &&
                            (requests_ == 0 || frame_clock_.is_mid_frame());
   if (!is_expected || now < frame_clock_.deadline()) {
-    return nullptr;
+    return std::nullopt;
   }
-  return frame_clock_.is_mid_frame() ? "the rest of a frame did not come in time"
-                                     : "nothing came in time";
+  return frame_clock_.is_mid_frame() ? Lateness::kFrame : Lateness::kSilence;
 }
 
 std::shared_ptr<const void> PeerConnection::HoldRequest(std::size_t bytes) {

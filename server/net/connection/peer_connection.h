@@ -111,7 +111,7 @@ class PeerConnection : public std::enable_shared_from_this<PeerConnection> {
   // Takes nothing any more; what was answered goes out first.
   void Refuse(const Status& why);
   // That the peer owes; null: nothing.
-  const char* WhatIsLate(Clock::time_point now);
+  std::optional<Lateness> WhatIsLate(Clock::time_point now);
   // As long as its name has sent too much.
   boost::asio::awaitable<void> KeepToRate(std::size_t bytes);
   // What a request that was read counts for, until it is destroyed.

@@ -81,7 +81,7 @@ asio::awaitable<Status> AnswerLog(RequestContext& context,
       message.limit() == 0 ? kMaxEvents : std::min(message.limit(), kMaxEvents);
   const ReplyWriter::Room room = co_await peer.out.TakeRoom(wanted * kEventBytes);
   if (!room) {
-    co_return Status();
+    co_return ReplyWriter::Room::Gone();
   }
   const auto limit =
       static_cast<std::uint32_t>(std::max<std::size_t>(1, room.bytes() / kEventBytes));

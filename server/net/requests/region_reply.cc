@@ -164,7 +164,7 @@ asio::awaitable<Status> SendRegion(AtlasService& service,
   for (bool is_last = false; !is_last;) {
     const ReplyWriter::Room room = co_await out.TakeRoom(batch_bytes);
     if (!room) {
-      co_return Status();
+      co_return ReplyWriter::Room::Gone();
     }
     if (!region.at_revision) {  // those are few, and looking for candidates again takes them long
       const std::size_t candidates = std::clamp(out.share_bytes() / RegionQuery::kCandidateBytes,

@@ -62,7 +62,7 @@ asio::awaitable<Status> AnswerSessions(RequestContext& context,
   co_await turn.Come();
   const ReplyWriter::Room room = co_await peer.out.TakeRoom(wanted * kSessionBytes + kReasonBytes);
   if (!room) {
-    co_return Status();
+    co_return ReplyWriter::Room::Gone();
   }
   const auto limit =
       static_cast<std::uint32_t>(std::clamp<std::size_t>(room.bytes() / kSessionBytes, 1, wanted));

@@ -259,7 +259,7 @@ asio::awaitable<Status> SendSync(std::shared_ptr<SyncReply> reply,
     kept.Set(reply->kept_bytes());
     const ReplyWriter::Room room = co_await out.TakeRoom(kReplyBatchBytes);
     if (!room) {
-      break;
+      co_return ReplyWriter::Room::Gone();
     }
     const SyncReply::Room next{room.bytes(), out.share_bytes()};
     Result<SyncReply::Step> step = reply->Next(false, *frames, next);

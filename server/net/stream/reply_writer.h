@@ -52,6 +52,10 @@ class ReplyWriter {
 
     explicit operator bool() const { return writer_ != nullptr; }
     std::size_t bytes() const { return bytes_; }
+    // What became of a reply for which there is none.
+    static Status Gone() {
+      return {StatusCode::kUnavailable, "the connection was closed before the reply was sent"};
+    }
 
    private:
     ReplyWriter* writer_ = nullptr;

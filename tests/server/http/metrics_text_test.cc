@@ -25,6 +25,7 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   figures.net.refused = 4;
   figures.net.handshakes_failed = 7;
   figures.net.broken_frames = 8;
+  figures.net.late_connections = {3, 2, 1};
   figures.writes.queued = 6;
   figures.room.used_bytes = 7;
   figures.room.limits = {8, 9, 10};
@@ -42,6 +43,8 @@ TEST(MetricsTextTest, FiguresAreShownAsTheyAre) {
   EXPECT_EQ(metrics.at("roadatlas_connections_refused_total"), 4);
   EXPECT_EQ(metrics.at("roadatlas_tls_handshakes_failed_total"), 7);
   EXPECT_EQ(metrics.at("roadatlas_broken_frames_total"), 8);
+  EXPECT_EQ(metrics.at("roadatlas_connections_late_total{cause=\"replies\"}"), 3);
+  EXPECT_EQ(metrics.at("roadatlas_connections_late_total{cause=\"silence\"}"), 1);
   EXPECT_EQ(metrics.at("roadatlas_store_writes_queued"), 6);
   EXPECT_EQ(metrics.at("roadatlas_store_used_bytes"), 7);
   EXPECT_EQ(metrics.at("roadatlas_store_limit_bytes"), 8);

@@ -232,6 +232,11 @@ TEST_F(SlowReadersTest, AReaderThatTakesNearlyNothingIsClosed) {
   }
   EXPECT_LT(ended, kRequests);
   ExpectServes();
+  const NetFigures figures = server_->ReadFigures();
+  EXPECT_EQ(figures.late_connections[static_cast<std::size_t>(Lateness::kReplies)], 1u);
+  const auto& queries = figures.kinds[static_cast<std::size_t>(RequestKind::kQueryRegion)].requests;
+  EXPECT_LE(queries[static_cast<std::size_t>(StatusCode::kOk)], kRequests - 1);
+  EXPECT_GT(queries[static_cast<std::size_t>(StatusCode::kUnavailable)], 0u) << "no reply, not ok";
 }
 
 TEST(WritePaceTest, ASlowLinkIsBorneAndATrickleIsNot) {
