@@ -65,6 +65,9 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
   options.on_upgrade = [](std::int64_t from) {
     spdlog::info("the atlas is of schema version {}: upgrading it, before anybody is served", from);
   };
+  options.on_damaged_log = [](const std::string& what) {
+    spdlog::error("{}", what);
+  };
   Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
   if (store) {
     if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {

@@ -25,6 +25,13 @@ AtlasStore::Done<T> Notifying(ChangeSignal& changes, AtlasStore::Done<T> done) {
   };
 }
 
+// Damage here is no fault of what a vehicle sends: it keeps that, and tries again.
+Status OfTheStore(const Status& damage) {
+  return {StatusCode::kUnavailable,
+          StrCat("the atlas is damaged, an operator has to look (atlas verify --repair): ",
+                 damage.message())};
+}
+
 }  // namespace
 
 AtlasService::AtlasService(AtlasStore& store,
@@ -82,9 +89,20 @@ void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyfram
     if (result && result->judgement) {
       LogJudgement(session, *result->judgement);
     }
+    if (!result && result.error().code() == StatusCode::kInvalidData) {
+      result = Error(OfTheStore(result.error()));
+    }
     done(std::move(result));
   };
   store_.PutKeyframe(std::move(keyframe), Notifying<PutKeyframeResult>(changes_, report));
+}
+
+Result<std::optional<SessionRecord>> AtlasService::FindSession(const SessionKey& key) {
+  auto found = store_.FindSession(key);
+  if (!found && found.error().code() == StatusCode::kInvalidData) {
+    return Error(OfTheStore(found.error()));
+  }
+  return found;
 }
 
 void AtlasService::LogJudgement(const SessionKey& session,

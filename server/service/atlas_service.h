@@ -125,10 +125,8 @@ class AtlasService {
   Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after, std::uint32_t limit) {
     return store_.ListSessions(after, limit);
   }
-  // nullopt: unknown.
-  Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) {
-    return store_.FindSession(key);
-  }
+  // nullopt: unknown. kUnavailable: its row is damaged.
+  Result<std::optional<SessionRecord>> FindSession(const SessionKey& key);
   // Of the last change on disk; never blocks.
   std::uint64_t revision() const { return store_.revision(); }
 

@@ -126,7 +126,8 @@ class AtlasStore : public TileIndex {
   // Those that touch or touched a level-0 tile, whether they are damaged or not.
   virtual Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) = 0;
   virtual Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() = 0;
-  // Ids above `after_id` in order, up to `limit`.
+  // Ids above `after_id` in order, up to `limit`: those, too, of which only a pose or a list of
+  // tiles is left.
   virtual Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                             std::uint32_t limit) = 0;
   // One keyframe with its pose, session and footprint, of one snapshot: every checksum around it is

@@ -26,6 +26,7 @@ enum class EventKind : std::uint8_t {
   kCountersRestored = 15,
   kTablesRepaired = 16,  // by who asked for repairs
   kBackup = 17,          // of the atlas as it was
+  kLogDamaged = 18,      // what was committed last is lost
 };
 
 // The author of what nobody asked for.
@@ -68,6 +69,8 @@ constexpr std::string_view EventName(EventKind kind) {
       return "tables_repaired";
     case EventKind::kBackup:
       return "backup";
+    case EventKind::kLogDamaged:
+      return "log_damaged";
   }
   return "unknown";  // of a later version
 }

@@ -16,8 +16,8 @@ Status StoreIdentity::CheckNotLost(std::uint64_t revision) const {
   }
   return {
       StatusCode::kNotFound,
-      StrCat("revision ", revision, " is lost: the atlas was restored from a backup of revision ",
-             *lost - kRevisionsLeftOut - 1)};
+      StrCat("revision ", revision, " is lost: the atlas went on from revision ",
+             *lost - kRevisionsLeftOut - 1, ", that of a backup or of what its log still told")};
 }
 
 }  // namespace atlas

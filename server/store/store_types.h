@@ -25,7 +25,7 @@ namespace atlas {
 struct StoreIdentity {
   MapProfile profile;
   std::array<std::uint8_t, 16> atlas_id{};
-  std::uint64_t epoch = 1;  // moves when the atlas is restored from a backup
+  std::uint64_t epoch = 1;  // moves when the atlas goes on from an earlier revision (new_line.h)
   // At which revisions it went on after that. Those left out before each may have been given to
   // what is lost.
   std::vector<std::uint64_t> restores = {};
@@ -145,6 +145,9 @@ struct StoredTile {
   std::uint64_t payload_hash = 0;
   Bytes blob;
 };
+
+// `since` of tiles that are not to be trusted: nor is what was kept to fuse them with.
+inline constexpr std::uint64_t kReflectsNothing = 1;
 
 // A right to build one dirty tile.
 struct TileClaim {

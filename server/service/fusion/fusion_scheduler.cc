@@ -179,6 +179,9 @@ void FusionScheduler::BuildClaims(Worker& worker,
     if (stop.stop_requested()) {
       worker.returns.push_back({claim, 0});
     } else {
+      if (claim.since <= kReflectsNothing) {
+        refresher_.Forget(claim.id);
+      }
       ids.push_back(claim.id);
     }
   }

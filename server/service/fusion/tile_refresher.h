@@ -36,6 +36,9 @@ class TileRefresher {
   // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's.
   void Build(std::span<const TileId> ids, const OnBuilt& on_built);
 
+  // A tile at hand is made of its keyframes alone, all of them.
+  void Forget(const TileId& id) { surveys_.Take(id); }
+
   // What is kept from one time to the next, in memory and on disk.
   std::size_t kept_bytes() const { return surveys_.bytes(); }
   std::size_t kept_disk_bytes() const { return survey_files_.bytes(); }

@@ -59,6 +59,7 @@ class AtlasVerifier {
   Status VerifyKeyframes();
   Status VerifyTiles();
   Status VerifyMissingTiles();
+  Result<bool> IsListed(std::int64_t id);
   Status CheckKeyframe(std::int64_t id);
   Status HandleKeyframe(std::int64_t id, const Status& damage);
   Status HandleTile(const TileId& id);
@@ -72,10 +73,10 @@ class AtlasVerifier {
 
   AtlasStore& store_;
   Options options_;
+  bool looks_for_missing_;  // tiles: on demand, and where rows vanished
   KeyframeCache keyframes_;
   TileCache tiles_{0};  // what is verified is read
   TileBuilder builder_;
-  std::uint64_t expected_keyframes_ = 0;  // what the sessions counted when it began
   VerifyReport report_;
 };
 

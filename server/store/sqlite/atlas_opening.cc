@@ -3,13 +3,17 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <functional>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/log_damage.h"
 #include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/migrations/migration.h"
+#include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/stored_bytes.h"
@@ -18,6 +22,7 @@
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/transactions/counter_check.h"
+#include "server/store/sqlite/transactions/new_line.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
 namespace atlas {
@@ -77,6 +82,60 @@ Status SettleRestore(const DataDirectory& directory) {
   return {};
 }
 
+// What can wait does on a full disk: all that is stored can be read there.
+void WhereThereIsRoom(const std::function<void()>& write) {
+  try {
+    write();
+  } catch (const std::exception& error) {
+    if (StatusFromException(error).code() != StatusCode::kResourceExhausted) {
+      throw;
+    }
+  }
+}
+
+struct DamagedLog {
+  std::filesystem::path kept;  // a copy
+  LogDamage damage;
+
+  bool is_lossy() const { return damage.lost_commits > 0; }
+};
+
+// Before SQLite drops what is behind the damage. Who knows better can look at the copy.
+Result<DamagedLog> KeepDamagedLog(const std::filesystem::path& log) {
+  const Result<LogDamage> found = FindLogDamage(log, HasRunSince(log));
+  if (!found) {
+    return Error(found.error());
+  }
+  DamagedLog damaged{{}, *found};
+  if (damaged.is_lossy()) {
+    std::error_code error;
+    for (int number = 1; number == 1 || std::filesystem::exists(damaged.kept, error); ++number) {
+      damaged.kept = log.string() + StrCat(".damaged-", number);
+    }
+    if (!std::filesystem::copy_file(log, damaged.kept, error)) {
+      return Error(StatusCode::kUnavailable,
+                   StrCat(log.string(), " is damaged at frame ", damaged.damage.frame,
+                          ", and no copy of it can be kept: ", error.message()));
+    }
+  }
+  return damaged;
+}
+
+// Vehicles are told by the epoch, as after a restore from a backup.
+std::string NoteLoss(Connection& writer, StoreIdentity& identity, const DamagedLog& log) {
+  writer.Execute("BEGIN IMMEDIATE");
+  const std::uint64_t before = ReadCounter(writer, Counter::kRevision);
+  const NewLine line = BeginLine(writer, identity);
+  identity.epoch = line.epoch;
+  const std::string what =
+      StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.lost_commits,
+             " commits are lost, the atlas goes on from revision ", before, " in epoch ",
+             line.epoch, "; a copy of the log is ", log.kept.filename().string());
+  AddEvent(writer, {EventKind::kLogDamaged, kAtlasItself, log.kept.filename().string(), what});
+  writer.Execute("COMMIT");
+  return what;
+}
+
 // What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
 // marked again.
 void Mend(Connection& writer, std::uint8_t levels) {
@@ -107,6 +166,10 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       return Error(std::move(status));
     }
   }
+  const auto log = KeepDamagedLog(directory.database_file().string() + "-wal");
+  if (!log) {
+    return Error(log.error());
+  }
   if (Status status = RenewLog(directory.database_file()); !status.ok()) {
     return Error(status.WithContext(directory.database_file().string()));
   }
@@ -122,10 +185,21 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     }
     writer->Execute("PRAGMA journal_mode = WAL");
     KeepTableSums(*writer);
-    DropAllLeases(*writer);
+    if (log->damage.has_rest) {  // else what is written from now on would stand before it
+      WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
+    }
+    WhereThereIsRoom([&] { DropAllLeases(*writer); });
     Mend(*writer, identity->profile.levels);
+    if (log->is_lossy()) {
+      const std::string what = NoteLoss(*writer, *identity, *log);
+      if (options.on_damaged_log) {
+        options.on_damaged_log(what);
+      }
+    }
     KeepVehicleBytes(*writer);
     identity->restores = RevisionsOf(*writer, EventKind::kBackupRestored);
+    const auto losses = RevisionsOf(*writer, EventKind::kLogDamaged);
+    identity->restores.insert(identity->restores.end(), losses.begin(), losses.end());
     const bool has_purged = !RevisionsOf(*writer, EventKind::kSessionPurged).empty();
     return OpenedAtlas{std::move(*identity), std::move(writer), has_purged};
   } catch (const std::exception& error) {

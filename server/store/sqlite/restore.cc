@@ -1,7 +1,5 @@
 #include "server/store/sqlite/restore.h"
 
-#include <algorithm>
-#include <chrono>
 #include <exception>
 #include <string>
 #include <system_error>
@@ -16,12 +14,11 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/database_files.h"
-#include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
-#include "server/store/sqlite/tables/start_table.h"
+#include "server/store/sqlite/transactions/new_line.h"
 
 namespace atlas {
 namespace fs = std::filesystem;
@@ -30,12 +27,6 @@ namespace {
 constexpr const char* kAuthor = "atlas-restore";
 constexpr const char* kAtlasName = "atlas.db";
 constexpr int kCache_kib = 1024;
-
-std::uint64_t NowMs() {
-  using std::chrono::milliseconds;
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(std::chrono::duration_cast<milliseconds>(now).count());
-}
 
 // The folder of the target; "." where only a name was given.
 fs::path FolderOf(const fs::path& target) {
@@ -83,14 +74,8 @@ Status CheckIdle(const fs::path& folder) {
   return directory ? Status() : directory.error();
 }
 
-// Two restores of one backup are two lines, too: the clock tells them apart.
-std::uint64_t NextEpoch(std::uint64_t epoch) {
-  return std::max(epoch + 1, NowMs());
-}
-
-// The copy becomes an atlas that goes on by itself. The start is noted before revisions are left
-// out, so that what was kept elsewhere of the lost ones is not of its line.
-Status BeginLine(const fs::path& copy, const std::string& backup, RestoredAtlas& restored) {
+// The copy becomes an atlas that goes on by itself.
+Status GoOn(const fs::path& copy, const std::string& backup, RestoredAtlas& restored) {
   Connection connection({copy, DatabaseOptions::Mode::kReadWrite, kCache_kib, 0});
   connection.Execute("PRAGMA journal_mode = MEMORY; BEGIN IMMEDIATE;");
   AddRowHash(connection);
@@ -99,11 +84,9 @@ Status BeginLine(const fs::path& copy, const std::string& backup, RestoredAtlas&
   if (!identity) {
     return identity.error();
   }
-  restored.epoch = NextEpoch(identity->epoch);
-  WriteEpoch(connection, *identity, restored.epoch);
-  NextRevision(connection);
-  restored.revision =
-      AddToCounter(connection, Counter::kRevision, static_cast<std::int64_t>(kRevisionsLeftOut));
+  const NewLine line = BeginLine(connection, *identity);
+  restored.epoch = line.epoch;
+  restored.revision = line.revision;
   AddEvent(connection, {EventKind::kBackupRestored, kAuthor, backup,
                         StrCat("revision ", restored.backup.revision, " of epoch ",
                                restored.backup.epoch, ", now epoch ", restored.epoch)});
@@ -128,7 +111,7 @@ Status MakeCopy(const RestoreOrder& order, const fs::path& target, RestoredAtlas
     const Snapshot snapshot(from);
     ATLAS_RETURN_IF_ERROR(CopyAtlas(from, target, order.work));
   }
-  ATLAS_RETURN_IF_ERROR(BeginLine(PartialOf(target), order.backup.filename().string(), restored));
+  ATLAS_RETURN_IF_ERROR(GoOn(PartialOf(target), order.backup.filename().string(), restored));
   const Result<AtlasFacts> copy = ReadAtlasBack(PartialOf(target), order.work);
   return copy ? CheckCopy(restored, *copy) : copy.error().WithContext("the copy was read back");
 }

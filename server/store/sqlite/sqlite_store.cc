@@ -162,11 +162,11 @@ class SqliteStore final : public AtlasStore {
   }
   void RepairTables(TableRepair what, std::string author, Done<std::uint32_t> done) override {
     const std::uint8_t levels = identity_.profile.levels;
-    Write<std::uint32_t>(std::move(done),
-                         [what, levels, a = std::move(author)](Connection& connection) {
-                           return what == TableRepair::kRows ? RepairRowsInStore(connection, levels)
-                                                             : RepairSumsInStore(connection, a);
-                         });
+    Write<std::uint32_t>(
+        std::move(done), [what, levels, a = std::move(author)](Connection& connection) {
+          return what == TableRepair::kRows ? RepairRowsInStore(connection, levels, a)
+                                            : RepairSumsInStore(connection, a);
+        });
   }
 
   Result<AtlasFacts> WriteBackup(const std::filesystem::path& file,

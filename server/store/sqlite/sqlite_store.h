@@ -29,6 +29,8 @@ struct SqliteStoreOptions {
   std::function<void(const Status&)> on_failed_sync = {};
   // Told the schema version of an atlas of an earlier one, before it is upgraded: that may take.
   std::function<void(std::int64_t)> on_upgrade = {};
+  // Told what is lost because the log is damaged (log_damage.h), and where the log is kept.
+  std::function<void(const std::string&)> on_damaged_log = {};
 };
 
 // Opens the atlas in the directory, or makes one if it is missing or empty and a profile is given.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
+#include "server/service/verification/atlas_verify.h"
 #include "tests/server/service/service_fixture.h"
 #include "tests/server/store/lost_rows.h"
 
@@ -107,7 +108,8 @@ TEST_F(DamageTest, OtherBytesHealNothing) {
   other.blob = DriveUpload(4).blob;
   EXPECT_EQ(Upload(std::move(other)).error().code(), StatusCode::kConflict);
   Tamper("UPDATE keyframes SET time_ms = time_ms + 1 WHERE sequence = 3");  // nor does anything
-  EXPECT_EQ(Upload(DriveUpload(3)).error().code(), StatusCode::kInvalidData);
+  EXPECT_EQ(Upload(DriveUpload(3)).error().code(), StatusCode::kUnavailable)
+      << "the vehicle keeps it";
 }
 
 TEST_F(DamageTest, WhatIsGivenUpWasNeverThere) {
@@ -142,7 +144,9 @@ TEST_F(DamageTest, WhatIsToldElsewhereIsRestored) {
         "DELETE FROM keyframe_tiles WHERE keyframe_id = 4",
         "UPDATE keyframe_tiles SET tile_key = tile_key + 64 WHERE keyframe_id = 4",
         "UPDATE tiles SET payload_hash = 1", "UPDATE tiles SET blob = zeroblob(blob_bytes)",
-        "DELETE FROM tiles WHERE key % 3 = 0", "UPDATE sessions SET state = 3",
+        "DELETE FROM tiles WHERE key % 3 = 0", "DELETE FROM tiles",
+        "DELETE FROM tiles WHERE key >> 58 = 2", "UPDATE sessions SET state = 3",
+        "DELETE FROM session_states", "DELETE FROM session_states; UPDATE sessions SET state = 3",
         "UPDATE sessions SET last_sequence = 1", "UPDATE counters SET value = value + 1",
         "DELETE FROM counters", "UPDATE dirty_tiles SET since = 1",
         "DROP INDEX changes_of_tile; CREATE INDEX changes_of_tile ON keyframe_tiles "
@@ -150,7 +154,7 @@ TEST_F(DamageTest, WhatIsToldElsewhereIsRestored) {
     SCOPED_TRACE(damage);
     Fill();
     Tamper(damage);
-    auto repaired = service_->Verify({.rebuild = true, .repair = true, .author = "who"}, Long());
+    const auto repaired = Repair();
     ASSERT_TRUE(repaired) << repaired.error().message();
     EXPECT_EQ(repaired->given_up, 0U);
     EXPECT_EQ(Digest().sha256, intact_.sha256);
@@ -160,6 +164,80 @@ TEST_F(DamageTest, WhatIsToldElsewhereIsRestored) {
     Close();
     std::filesystem::remove_all(directory_ / "data");
   }
+}
+
+// Of some rows of a keyframe the others are no keyframe; of none nobody knows.
+TEST_F(DamageTest, AKeyframeWhoseRowsAreGoneWasNeverThere) {
+  for (const char* damage :
+       {"DELETE FROM keyframes WHERE id = 4",
+        "DELETE FROM keyframes WHERE id = 4; DELETE FROM poses WHERE keyframe_id = 4",
+        "DELETE FROM keyframes WHERE id = 4; DELETE FROM keyframe_tiles WHERE keyframe_id = 4",
+        "DELETE FROM keyframes WHERE id = 4; DELETE FROM poses WHERE keyframe_id = 4;"
+        "DELETE FROM pose_history WHERE keyframe_id = 4;"
+        "DELETE FROM keyframe_tiles WHERE keyframe_id = 4"}) {
+    SCOPED_TRACE(damage);
+    surveys_ = {100'000, 100'000};  // which know of it
+    Fill();
+    const AtlasDigest without = DigestWithout(3);
+    Open(1);
+    Tamper(damage);
+    EXPECT_GT(service_->Verify({}, Long())->damaged, 0U);
+    ASSERT_TRUE(service_->Verify({.rebuild = true, .repair = true, .author = "who"}, Long()));
+    EXPECT_EQ(Digest().sha256, without.sha256);
+    const auto report = service_->Verify({.rebuild = true}, Long());
+    EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
+    ASSERT_TRUE(Upload(DriveUpload(3)));
+    EXPECT_EQ(Digest().sha256, intact_.sha256);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+    std::filesystem::remove_all(directory_ / "reference");
+  }
+}
+
+TEST_F(DamageTest, ASessionWithoutItsRowGetsAName) {
+  Fill();
+  Tamper("DELETE FROM sessions");
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(repaired->given_up, 0U);
+  const auto sessions = store_->ListSessions({}, 10).value();
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].key, (SessionKey{"lost", "session-1"}));
+  EXPECT_EQ(sessions[0].keyframes, kDrive);
+  EXPECT_THAT(Events(), ::testing::Contains(EventKind::kTablesRepaired));
+  EXPECT_EQ(Digest().tiles, intact_.tiles);
+  const auto report = service_->Verify({.rebuild = true}, Long());
+  EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
+}
+
+TEST_F(DamageTest, ASessionWithoutItsHistoryIsRetractedAndRestored) {
+  Fill();
+  Tamper("DELETE FROM session_states");
+  ASSERT_TRUE(Change("day", SessionAction::kRetract));
+  EXPECT_EQ(Change("day", SessionAction::kRestore).error().code(), StatusCode::kInvalidData);
+  ASSERT_TRUE(Repair());
+  const auto report = service_->Verify({}, Long());
+  EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
+  ASSERT_TRUE(Change("day", SessionAction::kRestore));
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+}
+
+TEST_F(DamageTest, WhatIsPurgedWhileItIsVerifiedIsNoDamage) {
+  Fill();
+  ASSERT_TRUE(Upload(DriveUpload(0, "night")));
+  Digest();
+  AtlasVerifier::Options options;
+  int calls = 0;
+  options.check_stop = [&] {
+    if (++calls == 3) {  // after both sessions: keyframes are listed, and the first is to be read
+      EXPECT_TRUE(Change("day", SessionAction::kPurge));
+    }
+    return Status();
+  };
+  const auto report = AtlasVerifier(*store_, options).Run();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_GT(calls, 3);
+  EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
 }
 
 TEST_F(DamageTest, ATileThatIsListedAndNotFoundIsBuiltAgainForWhoAsks) {

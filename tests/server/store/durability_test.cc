@@ -354,7 +354,9 @@ TEST_F(DiskTest, WhatFindsNoRoomInTheDatabaseIsTold) {
 
 TEST_F(DiskTest, AnAtlasOnAFullDiskIsOpened) {
   Open();
-  std::uint64_t accepted = 0;
+  ASSERT_TRUE(Put(MakeKeyframe(1'000, {{0, 1, 1}})));
+  ASSERT_EQ(Claim().claims.size(), 1u);  // a lease that the next start has to drop
+  std::uint64_t accepted = 1;
   for (std::uint32_t i = 0; Put(Big(i)).has_value(); ++i) {
     ++accepted;
   }

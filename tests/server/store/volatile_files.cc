@@ -1,6 +1,7 @@
 #include "tests/server/store/volatile_files.h"
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -167,6 +168,8 @@ void VolatileFiles::LosePower(Loss loss, std::uint32_t seed) {
       fs::remove(file);
     } else {
       Write(file, content);
+      fs::last_write_time(file, std::chrono::file_clock::from_sys(
+                                    std::chrono::sys_seconds()));  // before the system started
     }
   }
   std::size_t kept = 0;

@@ -109,6 +109,9 @@ Status CheckSessionStates(Connection& connection, std::int64_t session_id, Sessi
     if (!stored) {
       return stored.error();
     }
+    if (!last && stored->state == SessionState::kRetracted) {
+      return Missing(session_id);  // it was something before
+    }
     last = stored->state;
   }
   return last == current ? Status() : Missing(session_id);

@@ -278,6 +278,18 @@ int RecountSessions(Connection& connection) {
   return changed;
 }
 
+void AddLostSession(Connection& connection,
+                    std::int64_t id,
+                    const SessionKey& key,
+                    SessionState state) {
+  SessionRow row;
+  row.id = id;
+  row.record.key = key;
+  row.record.state = state;
+  CountRows(connection, row);
+  WriteSession(connection, row);
+}
+
 SessionRow AddSession(Connection& connection, const SessionKey& key) {
   SessionRow row;
   row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));

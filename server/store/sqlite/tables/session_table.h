@@ -41,6 +41,11 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
 // Counts what is stored of each. How many counted something else.
 int RecountSessions(Connection& connection);
 
+// One whose row is gone, under another name.
+void AddLostSession(Connection& connection,
+                    std::int64_t id,
+                    const SessionKey& key,
+                    SessionState state);
 // A new live one.
 SessionRow AddSession(Connection& connection, const SessionKey& key);
 void WriteSession(Connection& connection, const SessionRow& row);

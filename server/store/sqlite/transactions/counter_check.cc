@@ -78,16 +78,25 @@ Status CheckStructure(Connection& connection) {
 }  // namespace
 
 Status CheckCounters(Connection& connection) {
+  std::string findings;
+  const auto add = [&findings](const std::string& finding) {
+    findings += StrCat(findings.empty() ? "" : "; ", finding);
+  };
   for (const Recount& recount : kRecounts) {
     const std::uint64_t found = Count(connection, recount);
     const std::uint64_t counted = ReadCounter(connection, recount.counter);
     if (recount.told == Told::kExactly ? found != counted : found > counted) {
-      return Status(StatusCode::kInvalidData, StrCat("store: counter ", recount.name, " is ",
-                                                     counted, ", and the rows say ", found));
+      add(StrCat("store: counter ", recount.name, " is ", counted, ", and the rows say ", found));
     }
   }
-  ATLAS_RETURN_IF_ERROR(CheckTableSums(connection));
-  return CheckStructure(connection);
+  for (const auto check : {&CheckTableSums, &CheckStructure}) {
+    if (const Status status = check(connection); status.code() == StatusCode::kInvalidData) {
+      add(status.message());
+    } else if (!status.ok()) {
+      return status;
+    }
+  }
+  return findings.empty() ? Status() : Status(StatusCode::kInvalidData, findings);
 }
 
 int RecountCounters(Connection& connection) {

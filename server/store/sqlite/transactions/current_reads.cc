@@ -26,7 +26,12 @@ Result<FoundKeyframes> FindKeyframeRecords(Connection& connection,
 std::vector<std::int64_t> ListKeyframeRows(Connection& connection,
                                            std::int64_t after_id,
                                            std::uint32_t limit) {
-  Query row = connection.Prepare("SELECT id FROM keyframes WHERE id > ? ORDER BY id LIMIT ?");
+  Query row = connection.Prepare(
+      "SELECT id FROM (SELECT id FROM keyframes WHERE id > ?1 ORDER BY id LIMIT ?2) "
+      "UNION SELECT id FROM (SELECT keyframe_id AS id FROM poses WHERE keyframe_id > ?1 "
+      "ORDER BY keyframe_id LIMIT ?2) "
+      "UNION SELECT id FROM (SELECT DISTINCT keyframe_id AS id FROM keyframe_tiles "
+      "WHERE keyframe_id > ?1 ORDER BY keyframe_id LIMIT ?2) ORDER BY id LIMIT ?2");
   row.Bind(after_id).Bind(limit);
   std::vector<std::int64_t> ids;
   while (row.Step()) {

@@ -22,6 +22,7 @@
 #include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/history_horizon.h"
+#include "server/store/sqlite/transactions/session_repairs.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
 namespace atlas {
@@ -218,16 +219,17 @@ Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const Keyfra
   return RepairOutcome::kGivenUp;
 }
 
-Result<std::uint32_t> RepairRowsInStore(Connection& connection, std::uint8_t levels) {
+Result<std::uint32_t> RepairRowsInStore(Connection& connection,
+                                        std::uint8_t levels,
+                                        const std::string& author) {
   auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
   repaired += PutBackLostTiles(connection);
   connection.Execute("REINDEX");
-  for (const std::int64_t id : ListDamagedSessions(connection)) {
-    if (Status status = RestoreSession(connection, id, Vouching::kByNobody); !status.ok()) {
-      return Error(std::move(status));
-    }
-    ++repaired;
+  const auto sessions = RepairSessions(connection, author);
+  if (!sessions) {
+    return Error(sessions.error());
   }
+  repaired += *sessions;
   if (const Status marks = CheckMarks(connection); !marks.ok()) {
     MarkAllInStore(connection, marks.message(), levels);
     ++repaired;

@@ -278,7 +278,9 @@ Result<FinishResult> FinishTileInStore(Connection& connection,
 
 std::uint32_t MarkDirtyInStore(Connection& connection, const std::vector<TileId>& ids) {
   const std::uint64_t revision = NextRevision(connection);
-  MarkTiles(connection, ids, revision);
+  for (const TileId& id : ids) {
+    MarkTile(connection, id, revision, kReflectsNothing);
+  }
   return static_cast<std::uint32_t>(ids.size());
 }
 
@@ -288,7 +290,7 @@ void MarkAllInStore(Connection& connection, const std::string& why, std::uint8_t
   const std::set<TileId> tiles = AllTiles(connection, levels);
   const std::uint64_t revision = NextRevision(connection);
   for (const TileId& tile : tiles) {
-    MarkTile(connection, tile, revision, 1);
+    MarkTile(connection, tile, revision, kReflectsNothing);
   }
   AddEvent(connection, {EventKind::kMarksRestored, kAtlasItself, "",
                         StrCat(why, "; ", tiles.size(), " tiles")});
