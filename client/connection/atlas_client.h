@@ -90,14 +90,17 @@ class AtlasClient {
   // or not, every other one is.
   Result<std::vector<SessionSummary>> ListSessions();
   // Takes a session out of the map, or puts it back. kNotFound: unknown. One that is so already
-  // stays as it is.
+  // stays as it is. The reason is for people: one line of at most 256 bytes, or none.
   Result<SessionChangeSummary> ChangeSession(const SessionKey& key,
                                              SessionAction action,
-                                             const std::string& author);
-  // All of a vehicle's sessions in one step. kUnsupported: a daemon before 1.8.
+                                             const std::string& author,
+                                             const std::string& reason = {});
+  // All of a vehicle's sessions in one step. kNotFound: it has none, or none that is not purged.
+  // kUnsupported: a daemon before 1.8.
   Result<SessionChangeSummary> ChangeVehicle(const std::string& vehicle,
                                              SessionAction action,
-                                             const std::string& author);
+                                             const std::string& author,
+                                             const std::string& reason = {});
   // Waits until no tile is dirty, `timeout` long. With a revision: of the atlas as it was then,
   // which is fused again meanwhile; kUnsupported when the daemon is too old for that.
   Result<DigestSummary> Digest(std::chrono::milliseconds timeout,

@@ -47,13 +47,15 @@ Result<VerifySummary> CallVerify(RpcChannel& channel,
 Result<SessionChangeSummary> CallChangeSession(RpcChannel& channel,
                                                const SessionKey& key,
                                                SessionAction action,
-                                               const std::string& author) {
+                                               const std::string& author,
+                                               const std::string& reason) {
   wire::Envelope request;
   wire::ChangeSession& change = *request.mutable_change_session();
   change.set_vehicle(key.vehicle);
   change.set_session(key.session);
   change.set_action(ActionToWire(action));
   change.set_author(author);
+  change.set_reason(reason);
   const auto reply = channel.Call(request, Body::kChangeSessionReply);
   if (!reply) return Error(reply.error());
   const wire::ChangeSessionReply& done = reply->change_session_reply();
@@ -79,7 +81,8 @@ Result<WaitSummary> AtlasClient::WaitUntilFused(milliseconds timeout) {
 
 Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
                                                         SessionAction action,
-                                                        const std::string& author) {
+                                                        const std::string& author,
+                                                        const std::string& reason) {
   if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
   if (action == SessionAction::kRelease || action == SessionAction::kPurge) {
     if (Status status = CheckMinor(kMinorWithQuarantine, "to release or purge a session");
@@ -87,12 +90,13 @@ Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
       return Error(std::move(status));
     }
   }
-  return CallChangeSession(*channel_, key, action, author);
+  return CallChangeSession(*channel_, key, action, author, reason);
 }
 
 Result<SessionChangeSummary> AtlasClient::ChangeVehicle(const std::string& vehicle,
                                                         SessionAction action,
-                                                        const std::string& author) {
+                                                        const std::string& author,
+                                                        const std::string& reason) {
   if (Status status = CheckMinor(kMinorWithLog, "a change of all of a vehicle's sessions");
       !status.ok()) {
     return Error(std::move(status));
@@ -100,7 +104,7 @@ Result<SessionChangeSummary> AtlasClient::ChangeVehicle(const std::string& vehic
   if (Status status = ValidateName("vehicle", vehicle); !status.ok()) {
     return Error(std::move(status));
   }
-  return CallChangeSession(*channel_, {vehicle, ""}, action, author);
+  return CallChangeSession(*channel_, {vehicle, ""}, action, author, reason);
 }
 
 Result<DigestSummary> AtlasClient::Digest(milliseconds timeout,

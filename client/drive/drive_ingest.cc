@@ -6,6 +6,7 @@
 #include <span>
 
 #include "client/drive/drive_survey.h"
+#include "client/drive/impossible_steps.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
@@ -17,8 +18,7 @@
 namespace atlas {
 namespace {
 
-constexpr double kScanInterval_s = 0.1;  // where times.txt is missing
-constexpr double kMaxAhead_s = 60.0;     // what the daemon accepts
+constexpr double kMaxAhead_s = 60.0;  // what the daemon accepts
 
 // From one scan to the next, as the sensor moves; still when it has no neighbour before a jump.
 Pose MotionAt(const DriveFolder& drive, std::size_t index) {
@@ -96,6 +96,8 @@ class Ingest {
     selected_ = SelectScans(drive_, options_.selection);
     report_.keyframes = selected_.size();
     report_.metres = SelectedMetres(drive_, selected_);
+    JoinImpossibleParts(drive_, selected_);
+    report_.impossible_steps = FindImpossibleSteps(drive_, selected_);
     std::set<std::uint32_t> parts;
     for (const SelectedScan& scan : selected_) {
       parts.insert(scan.session_part);
@@ -124,7 +126,7 @@ class Ingest {
   }
 
   Result<std::int64_t> TimeOf(const DriveScan& scan) const {
-    const double time_s = options_.start_s + scan.time_s.value_or(kScanInterval_s * scan.number);
+    const double time_s = options_.start_s + ScanTime_s(scan);
     if (!(time_s >= 0.0 && time_s <= options_.now_s + kMaxAhead_s)) {
       return Error(StatusCode::kInvalidData,
                    StrCat("scan ", scan.number, ": time ", time_s,

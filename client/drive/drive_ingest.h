@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/connection/atlas_client.h"
 #include "client/connection/keyframe_uploader.h"
@@ -17,7 +18,7 @@
 namespace atlas {
 
 struct IngestOptions {
-  SessionKey session;  // of the part before the first jump
+  SessionKey session;  // of the part before the first possible jump
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
   double max_range_m = 20.0;
@@ -40,6 +41,7 @@ struct IngestReport {
   double frontend_s = 0.0;  // CPU time from scan to blob
   SensorMount mount;
   std::uint64_t sessions = 0;
+  std::vector<std::string> impossible_steps;  // impossible_steps.h
 };
 
 // `progress` (may be empty) is called with the number of keyframes sent. A scan that is bad is

@@ -35,12 +35,16 @@ Result<ScanParity> ParseScanParity(const std::string& text) {
                StrCat("scans '", text.substr(0, 80), "': expected even, odd or all"));
 }
 
+bool IsJump(const DriveScan& from, const DriveScan& to) {
+  return Distance(from, to) > kSessionJump_m;
+}
+
 std::vector<SelectedScan> SelectScans(const DriveFolder& drive, const SelectionOptions& options) {
   std::vector<SelectedScan> selected;
   std::uint32_t part = 1;
   for (std::size_t i = 0; i < drive.scans.size(); ++i) {
     const DriveScan& scan = drive.scans[i];
-    if (i > 0 && Distance(drive.scans[i - 1], scan) > kSessionJump_m) ++part;
+    if (i > 0 && IsJump(drive.scans[i - 1], scan)) ++part;
     if (!IsWanted(scan.number, options)) continue;
     const bool is_first = selected.empty() || selected.back().session_part != part;
     if (is_first || Distance(drive.scans[selected.back().index], scan) >= options.every_m) {

@@ -27,8 +27,9 @@ struct SelectedScan {
   std::uint32_t session_part = 1;  // 2 and up after a jump
 };
 
-// A step between neighbouring scans of the folder above this starts another session.
+// A step between neighbouring scans of the folder above this starts another part.
 inline constexpr double kSessionJump_m = 10.0;
+bool IsJump(const DriveScan& from, const DriveScan& to);
 
 std::vector<SelectedScan> SelectScans(const DriveFolder& drive, const SelectionOptions& options);
 

@@ -1,6 +1,7 @@
 // Where the vehicle stops, and the cast from there.
 #include "core/simulation/simulated_drive.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -100,12 +101,8 @@ Result<SimulatedDrive> SimulatedDrive::Create(TrajectoryWorld world,
     return Error(std::move(status));
   }
   SimulatedDrive drive(std::move(world.still), options);
-  double time_s = 0.0;
   for (std::size_t i = 0; i < moments.size(); ++i) {
-    const bool is_same_leg = i > 0 && moments[i].leg == moments[i - 1].leg;
-    time_s += is_same_leg ? moments[i].leg_time_s - moments[i - 1].leg_time_s
-                          : (i > 0 ? options.scan_interval_s : 0.0);
-    drive.AddStop(moments[i], time_s);
+    drive.AddStop(moments[i]);
   }
   drive.AddConvoy(world.legs, 0.0);
   std::vector<DrivePath> oncoming_legs;
@@ -118,12 +115,22 @@ Result<SimulatedDrive> SimulatedDrive::Create(TrajectoryWorld world,
   return drive;
 }
 
-void SimulatedDrive::AddStop(const DriveMoment& moment, double time_s) {
-  if (!stops_.empty() && stops_.back().moment.leg == moment.leg) {
-    const Pose& last = stops_.back().moment.T_world_sensor;
-    length_m_ += (moment.T_world_sensor.translation() - last.translation()).norm();
+// From one leg to the next it goes straight, as fast as along them.
+void SimulatedDrive::AddStop(const DriveMoment& moment) {
+  if (stops_.empty()) {
+    stops_.push_back({moment, 0.0});
+    return;
   }
-  stops_.push_back({moment, time_s});
+  const Stop& last = stops_.back();
+  const double way_m =
+      (moment.T_world_sensor.translation() - last.moment.T_world_sensor.translation()).norm();
+  double step_s = moment.leg_time_s - last.moment.leg_time_s;
+  if (last.moment.leg == moment.leg) {
+    length_m_ += way_m;
+  } else {
+    step_s = options_.scan_interval_s * std::max(1.0, way_m / options_.spacing_m);
+  }
+  stops_.push_back({moment, last.time_s + step_s});
 }
 
 Status SimulatedDrive::AddLeg(const DrivePath& path, std::size_t leg, double left_m) {
@@ -136,8 +143,7 @@ Status SimulatedDrive::AddLeg(const DrivePath& path, std::size_t leg, double lef
       return pose.error();
     }
     const double leg_time_s = static_cast<double>(i) * options_.scan_interval_s;
-    AddStop({*pose, leg, leg_time_s, along_m},
-            static_cast<double>(stops_.size()) * options_.scan_interval_s);
+    AddStop({*pose, leg, leg_time_s, along_m});
   }
   return {};
 }

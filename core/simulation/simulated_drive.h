@@ -89,7 +89,7 @@ class SimulatedDrive {
 
   SimulatedDrive(std::shared_ptr<const StaticWorld> still, const DriveOptions& options);
   Status AddLeg(const DrivePath& path, std::size_t leg, double left_m);
-  void AddStop(const DriveMoment& moment, double time_s);
+  void AddStop(const DriveMoment& moment);
   void AddConvoy(const std::vector<DrivePath>& legs, double left_m);
   WorldParts PartsAround(std::size_t i) const;
   double TrafficRadius() const;

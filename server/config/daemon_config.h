@@ -56,7 +56,7 @@ struct DaemonConfig {
   int vehicle_mib = 0;         // keyframes of one vehicle
   int disk_floor_mib = 256;    // that stay free on the disk
   bool is_compacting = false;  // when the store is nearly full
-  // How far keyframes that follow each other may be apart (server/store/plausibility.h).
+  // How far keyframes that follow each other may be apart (core/geometry/plausibility.h).
   int quarantine_speed_mps = 90;  // 0: as far as they like, as with the climb
   int quarantine_jump_m = 50;
   int quarantine_climb_mps = 15;

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/geometry/keyframe_key.h"
+#include "core/geometry/plausibility.h"
 #include "core/geometry/session_action.h"
-#include "server/store/plausibility.h"
 
 namespace atlas {
 
@@ -16,7 +16,7 @@ namespace atlas {
 enum class SessionState : std::uint8_t {
   kStaged = 0,  // does not occur yet
   kLive = 1,
-  kQuarantined = 2,  // two neighbours of its keyframes are implausible (plausibility.h)
+  kQuarantined = 2,  // a way along its keyframes is implausible (plausibility.h)
   kRetracted = 3,
   kReleased = 4,  // live, whatever its keyframes look like: somebody said so
   kPurged = 5,    // nothing is left of it but its name, which takes no keyframes any more

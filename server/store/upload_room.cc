@@ -7,6 +7,9 @@
 namespace atlas {
 namespace {
 
+constexpr const char* kWaysToMakeRoom =
+    "purge sessions (atlas session purge), compact the atlas (preset bounded)";
+
 Status NoRoom(UploadRefusal why, std::string message) {
   const auto i = static_cast<std::size_t>(why);
   return Status(StatusCode::kResourceExhausted, std::move(message))
@@ -19,9 +22,10 @@ Status CheckStore(const UploadLimits& limits, std::uint64_t used_bytes, std::uin
   if (limits.store_bytes == 0 || used_bytes + more_bytes <= limits.store_bytes) {
     return {};
   }
-  return NoRoom(UploadRefusal::kStoreLimit,
-                StrCat("the atlas takes ", used_bytes, " bytes, of ", limits.store_bytes,
-                       " that it may (retention.store_mib): compact it or raise the limit"));
+  return NoRoom(
+      UploadRefusal::kStoreLimit,
+      StrCat("the atlas takes ", used_bytes, " bytes, of ", limits.store_bytes,
+             " that it may (retention.store_mib): ", kWaysToMakeRoom, ", or raise the limit"));
 }
 
 Status CheckVehicle(const UploadLimits& limits, const UploadSize& upload) {
@@ -33,7 +37,7 @@ Status CheckVehicle(const UploadLimits& limits, const UploadSize& upload) {
       UploadRefusal::kQuota,
       StrCat("vehicle ", upload.vehicle, ": ", upload.vehicle_bytes,
              " bytes of its keyframes are stored, of ", limits.vehicle_bytes,
-             " that may be (retention.vehicle_mib): compact the atlas or raise the quota"));
+             " that may be (retention.vehicle_mib): ", kWaysToMakeRoom, ", or raise the quota"));
 }
 
 }  // namespace

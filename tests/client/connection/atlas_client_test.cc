@@ -282,6 +282,30 @@ TEST(AtlasClientTest, AnOldDaemonIsNotAskedForThePast) {
   EXPECT_EQ(client->QueryRegion(query, nullptr).error(), digest.error());
 }
 
+TEST(AtlasClientTest, AChangeSaysWhoAndWhy) {
+  std::vector<std::string> asked;
+  {
+    TestPeer peer([&asked](PeerSocket& socket) {
+      AnswerHello(socket, {});
+      for (int i = 0; i < 2; ++i) {
+        const auto request = socket.ReadRequest();
+        if (!request) return;
+        const wire::ChangeSession& change = request->change_session();
+        asked.push_back(change.vehicle() + "/" + change.session() + " by " + change.author() +
+                        ": " + change.reason());
+        wire::Envelope reply;
+        reply.mutable_change_session_reply()->set_changed(true);
+        socket.Reply(request->request_id(), std::move(reply));
+      }
+    });
+    auto client = AtlasClient::Connect(peer.options());
+    ASSERT_TRUE(client);
+    EXPECT_TRUE(client->ChangeSession({"bus", "day"}, SessionAction::kRetract, "alice", "rain"));
+    EXPECT_TRUE(client->ChangeVehicle("bus", SessionAction::kRestore, "bob", "it was dry"));
+  }
+  EXPECT_EQ(asked, (std::vector<std::string>{"bus/day by alice: rain", "bus/ by bob: it was dry"}));
+}
+
 TEST(AtlasClientTest, ASessionThatIsNoneIsNotAskedFor) {
   TestPeer peer([](PeerSocket& socket) {
     AnswerHello(socket, {});

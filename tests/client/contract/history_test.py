@@ -3,7 +3,10 @@
 Usage: history_test.py BIN_DIR DRIVE; DRIVE is a simulated street."""
 
 import contextlib
+import json
+import os
 import pathlib
+import pwd
 import sqlite3
 import struct
 import sys
@@ -165,6 +168,44 @@ def refused_cases(cases):
     cases.refused("digest --at in no time", ["digest", "--at", revision, "--timeout", "0"], "timeout", "in time")
 
 
+def account_cases(cases):
+    """Who did it, and why."""
+    login = pwd.getpwuid(os.geteuid()).pw_name
+    cases.run("session", "retract", "vehicle/good")
+    cases.run("session", "restore", "vehicle/good", "--author", "alice", "--reason", "it was right")
+    cases.run("vehicle", "retract", "vehicle", "--author", "bob", "--reason", "rain")
+    cases.run("vehicle", "restore", "vehicle")
+    cases.run("session", "release", "vehicle/good", "--reason", "looked at")
+    told = [(event["kind"], event["author"], event["subject"], event["detail"]) for event in cases.run("log")["events"]]
+    cases.report.equal("who and why", told[-7:],
+                       [("retract", login, "vehicle/good", ""), ("restore", "alice", "vehicle/good", "it was right"),
+                        ("retract", "bob", "vehicle/good", "rain"), ("retract", "bob", "vehicle/second", "rain"),
+                        ("restore", login, "vehicle/good", ""), ("restore", login, "vehicle/second", ""),
+                        ("session_released", login, "vehicle/good", "looked at")])
+    for words in (["--author", "a b"], ["--author", "x" * 65], ["--author", ""], ["--reason", "x" * 257],
+                  ["--reason", "two\nlines"]):
+        cases.refused(f"retract {words[0]} {words[1][:10]!r}", ["session", "retract", "vehicle/good", *words],
+                      "invalid_argument")
+
+
+def impossible_cases(cases, drives):
+    """A drive with a pose somewhere else: ingest says so, and the daemon keeps it out."""
+    broken = drives.copy("broken")
+    lines = (broken / "poses.txt").read_text(encoding="ascii").splitlines()
+    numbers = lines[2].split()
+    numbers[3] = str(float(numbers[3]) + 5_000)
+    lines[2] = " ".join(numbers)
+    (broken / "poses.txt").write_text("\n".join(lines) + "\n", encoding="ascii")
+    done = cases.call("ingest", broken, *NEAR, "--json")
+    cases.report.equal("an impossible drive: exit code", done.returncode, 0)
+    report = json.loads(done.stdout)
+    cases.report.equal("an impossible drive: sessions and steps", (report["sessions"], report["impossible_steps"]),
+                       (1, 2))
+    cases.report.check("an impossible drive: note", "2 steps look impossible (keyframe 1 to 2: 500" in done.stderr and
+                       "atlas session release" in done.stderr, done.stderr)
+    cases.report.equal("an impossible drive: state", session_state(cases, "broken"), "quarantined")
+
+
 def forgotten_cases(cases, revision):
     for line in (["digest"], ["point", *PLACE], ["query", *AREA]):
         cases.refused(f"{line[0]} --at before the horizon", [*line, "--at", revision - 1], "not_found",
@@ -194,6 +235,8 @@ def main():
                              (horizon, checksum_of_counter(11, horizon)))
         with Daemon(bin_dir, data) as daemon:
             forgotten_cases(Cases(report, bin_dir, daemon.server), horizon)
+            account_cases(Cases(report, bin_dir, daemon.server))
+            impossible_cases(Cases(report, bin_dir, daemon.server), drives)
         with Daemon(bin_dir, data, "--quarantine-max-speed-mps", "1", "--quarantine-max-jump-m", "0") as daemon:
             wild_cases(Cases(report, bin_dir, daemon.server), drives)
     print(f"{report.checks} checks, {report.failed} failed")

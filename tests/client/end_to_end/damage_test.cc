@@ -63,14 +63,15 @@ TEST_F(DamageEndToEndTest, ASecondIngestHealsAndARepairGivesUp) {
   }
   Spoil(data);
   DaemonProcess daemon(data, {});
-  const CommandRun repair = RunAtlas(daemon.address(), {"verify", "--repair"});
+  const CommandRun repair =
+      RunAtlas(daemon.address(), {"verify", "--repair", "--author", "surveyor"});
   EXPECT_EQ(repair.exit_code, 0) << repair.err;
   EXPECT_EQ(repair.Get<int>("given_up"), 2);
   EXPECT_EQ(repair.Get<int>("damaged"), 0);
   EXPECT_NE(Digest(daemon), intact);
   EXPECT_EQ(RunAtlas(daemon.address(), {"verify", "--rebuild"}).exit_code, 0);
   const CommandRun tail = RunAtlas(daemon.address(), {"log", "--after", "4"});
-  EXPECT_EQ(tail.json().at("events").as_array().at(0).at("author").as_string(), "atlas-verify");
+  EXPECT_EQ(tail.json().at("events").as_array().at(0).at("author").as_string(), "surveyor");
   const CommandRun sent = Ingest(daemon);
   EXPECT_EQ(sent.exit_code, 0) << sent.err;
   EXPECT_EQ(Digest(daemon), intact);

@@ -8,7 +8,7 @@
 #include "client/vehicle/stored_file.h"
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
-#include "server/store/plausibility.h"
+#include "core/geometry/plausibility.h"
 
 namespace atlas::testing {
 
@@ -137,13 +137,11 @@ SessionState LedgerJudge::StateAfter(int vehicle,
 
 // By what of it is there, as it was uploaded.
 bool LedgerJudge::IsImplausible(int vehicle, std::uint32_t session) const {
-  std::optional<UploadedPlace> before;
+  UploadedTrack track({});
   for (FrameId id{session, 0}; id.sequence < kFramesOfASession; ++id.sequence) {
     if (!atlas_.frames.contains(FleetKey(vehicle, id))) continue;
     const QuantizedPose pose = FleetPose(vehicle, id, 0);
-    const UploadedPlace place{id.sequence, FleetTime(id), pose.x_um, pose.y_um, pose.z_um};
-    if (before && FindImplausible(*before, place, {})) return true;
-    before = place;
+    if (track.Add({id.sequence, FleetTime(id), pose.x_um, pose.y_um, pose.z_um})) return true;
   }
   return false;
 }

@@ -49,6 +49,7 @@ TEST(SimulatedDriveTest, ScansKeepToTheSpacingAndTheModestCount) {
       const double step_m =
           (drive.sensor_pose(i).translation() - drive.sensor_pose(i - 1).translation()).norm();
       jumps += step_m > 10.0 ? 1 : 0;
+      EXPECT_LT(step_m, 6.0 * (drive.time_s(i) - drive.time_s(i - 1))) << "18 km/h";
       EXPECT_TRUE(step_m > 10.0 || (step_m > 0.9 && step_m < 1.5)) << i << ": " << step_m;
     }
     EXPECT_EQ(jumps, kind == WorldKind::kOverpass ? 1U : 0U);

@@ -104,6 +104,18 @@ TEST_F(PurgeTest, NobodyUploadsToItAgain) {
   EXPECT_EQ(Change(SessionAction::kRetract, {"bus", ""})->sessions, 1U) << "the others";
 }
 
+TEST_F(PurgeTest, AVehicleOfWhichAllIsPurgedHasNoSession) {
+  Fill();
+  ASSERT_TRUE(Change(SessionAction::kPurge).has_value());
+  ASSERT_TRUE(Change(SessionAction::kPurge, {"bus", "night"}).has_value());
+  for (const auto action : {SessionAction::kRetract, SessionAction::kRestore}) {
+    const auto changed = Change(action, {"bus", ""});
+    ASSERT_FALSE(changed.has_value());
+    EXPECT_EQ(changed.error().code(), StatusCode::kNotFound);
+    EXPECT_NE(changed.error().message().find("vehicle bus has no session"), std::string::npos);
+  }
+}
+
 TEST_F(PurgeTest, TheRevisionsBeforeCannotBeReadAnyMore) {
   Fill();
   const std::uint64_t before = Dirty().revision;

@@ -2,6 +2,8 @@
 // what somebody said about them.
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <map>
 #include <numeric>
 #include <random>
 #include <string>
@@ -142,67 +144,132 @@ TEST_F(QuarantineTest, WithoutLimitsNobodyIsJudged) {
   EXPECT_EQ(State(), SessionState::kLive);
 }
 
-// 400 m in no time is too much; not so with one between them.
+// 400 m in no time are too much; not so when no way of 8 steps has more than 250 of them.
 TEST_F(QuarantineTest, ALateKeyframeMakesASessionPlausibleAgain) {
   Open();
-  ASSERT_TRUE(Put(At(2, {0, 0}, "day")).has_value());
-  EXPECT_TRUE(Put(At(6, {400, 0}, "day"))->judgement.has_value());
+  const auto put = [this](std::uint32_t i) {
+    return *Put(At(2 * i, {25 * i, 0}, "day"));
+  };
+  put(0);
+  EXPECT_TRUE(put(16).judgement.has_value());
   EXPECT_EQ(State(), SessionState::kQuarantined);
-  const auto late = Put(At(4, {200, 0}, "day"));
-  ASSERT_TRUE(late->judgement.has_value());
-  EXPECT_EQ(late->judgement->state, SessionState::kLive);
-  EXPECT_EQ(late->tiles_marked, 1U);
+  for (std::uint32_t i = 1; i < 13; ++i) {
+    EXPECT_FALSE(put(i).judgement.has_value()) << i;
+  }
+  const auto late = put(13);
+  ASSERT_TRUE(late.judgement.has_value());
+  EXPECT_EQ(late.judgement->state, SessionState::kLive);
+  EXPECT_EQ(late.tiles_marked, 1U);
   EXPECT_EQ(State(), SessionState::kLive);
   EXPECT_EQ(Reason(), "");
-  EXPECT_EQ(InTheMap(kA), 3U);
+  EXPECT_EQ(InTheMap(kA), 15U);
   EXPECT_EQ(Events(), (std::vector<std::string>{"session_quarantined by atlasd",
                                                 "session_released by atlasd"}));
-  PutAt(8, kFar_m);
+  PutAt(34, kFar_m);
   EXPECT_EQ(State(), SessionState::kQuarantined) << "the atlas released it, nobody else";
   ExpectSound();
 }
 
-// Small sets, all orders: near and far, early and late. The verdict is that of all neighbours.
-TEST_F(QuarantineTest, TheVerdictIsAMatterOfTheSetAlone) {
-  constexpr std::size_t kCount = 4;
-  const auto is_wild = [](const std::vector<Spot>& spots) {
-    bool is_any = false;
-    for (std::uint32_t i = 0; i + 1 < spots.size(); ++i) {
-      const auto place = [&spots](std::uint32_t at) {
-        return UploadedPlace{at, spots[at].time_ms, spots[at].x_m * 1'000'000, 0, 0};
-      };
-      is_any = is_any || FindImplausible(place(i), place(i + 1), kLimits);
-    }
-    return is_any;
-  };
+TEST_F(QuarantineTest, WhatGoesTooFarInSmallStepsIsFound) {
   Open();
-  std::mt19937 random(7);
-  int number = 0;
-  std::array<int, 2> verdicts{};
-  int released = 0;
-  for (std::uint32_t set = 0; set < 24 * testing::Scaled(1); ++set) {
-    std::vector<Spot> spots(kCount);
-    for (Spot& spot : spots) {
-      spot.x_m = static_cast<std::int64_t>(200 * (random() % 4));
-      spot.time_ms = static_cast<std::int64_t>(1'000 * (random() % 3));
-    }
-    std::vector<std::uint32_t> order(kCount);
-    std::iota(order.begin(), order.end(), 0U);
-    ++verdicts[is_wild(spots) ? 1U : 0U];
-    do {
-      const std::string session = std::to_string(++number);
-      for (const std::uint32_t i : order) {
-        const auto put = Put(At(i, spots[i], session));
-        ASSERT_TRUE(put.has_value()) << put.error().message();
-        released += put->judgement && put->judgement->state == SessionState::kLive ? 1 : 0;
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    ASSERT_TRUE(Put(At(i, {240 * i, 100 * std::int64_t{i}}, "fast")).has_value());
+    ASSERT_TRUE(Put(At(i, {240 * (i % 2), 100 * std::int64_t{i}}, "zigzag")).has_value());
+    ASSERT_TRUE(Put(At(i, {24 * i, 100 * std::int64_t{i}}, "slow")).has_value());
+    EXPECT_EQ(State("fast"), i < 3 ? SessionState::kLive : SessionState::kQuarantined);
+    EXPECT_EQ(State("zigzag"), i < 3 ? SessionState::kLive : SessionState::kQuarantined);
+  }
+  EXPECT_EQ(State("slow"), SessionState::kLive);
+}
+
+// Whether any way of at most kMostJudgedSteps is longer than it may be, by what is documented.
+bool IsWild(const std::vector<Spot>& spots) {
+  for (std::size_t from = 0; from < spots.size(); ++from) {
+    double way_m = 0.0;
+    for (std::size_t to = from + 1; to < spots.size() && to <= from + kMostJudgedSteps; ++to) {
+      way_m += std::abs(static_cast<double>(spots[to].x_m - spots[to - 1].x_m));
+      const auto time_ms = static_cast<double>(spots[to].time_ms - spots[from].time_ms);
+      if (way_m > kLimits.max_jump_m + kLimits.max_speed_mps * 1e-3 * std::abs(time_ms)) {
+        return true;
       }
-      ASSERT_EQ(State(session), is_wild(spots) ? SessionState::kQuarantined : SessionState::kLive)
-          << "set " << set << ", order " << order[0] << order[1] << order[2] << order[3];
+    }
+  }
+  return false;
+}
+
+class QuarantineOrderTest : public QuarantineTest {
+ protected:
+  // After each that arrives the session is what those that are there make of it.
+  void PutInOrder(const std::vector<Spot>& spots, const std::vector<std::uint32_t>& order) {
+    const std::string session = std::to_string(++sessions_);
+    std::map<std::uint32_t, Spot> there;
+    for (const std::uint32_t i : order) {
+      const auto put = Put(At(i, spots[i], session));
+      ASSERT_TRUE(put.has_value()) << put.error().message();
+      released_ += put->judgement && put->judgement->state == SessionState::kLive ? 1 : 0;
+      there[i] = spots[i];
+      std::vector<Spot> in_sequence;
+      for (const auto& [sequence, spot] : there) {
+        in_sequence.push_back(spot);
+      }
+      ASSERT_EQ(State(session),
+                IsWild(in_sequence) ? SessionState::kQuarantined : SessionState::kLive)
+          << "session " << session << ", after keyframe " << i;
+    }
+    ++verdicts_[IsWild(spots) ? 1U : 0U];
+  }
+  std::int64_t Below(std::uint32_t limit) { return static_cast<std::int64_t>(random_() % limit); }
+  void ExpectBothVerdicts() const {
+    EXPECT_GT(verdicts_[0], 3);
+    EXPECT_GT(verdicts_[1], 3);
+  }
+
+  std::mt19937 random_{7};
+  int sessions_ = 0;
+  int released_ = 0;
+  std::array<int, 2> verdicts_{};
+};
+
+// Small sets, all orders: near and far, early and late.
+TEST_F(QuarantineOrderTest, TheVerdictIsAMatterOfTheSetAlone) {
+  Open();
+  for (std::uint32_t set = 0; set < 24 * testing::Scaled(1); ++set) {
+    std::vector<Spot> spots(4);
+    for (Spot& spot : spots) {
+      spot = {200 * Below(3), 1'000 * Below(6)};
+    }
+    std::vector<std::uint32_t> order(spots.size());
+    std::iota(order.begin(), order.end(), 0U);
+    do {
+      ASSERT_NO_FATAL_FAILURE(PutInOrder(spots, order)) << "set " << set;
     } while (std::next_permutation(order.begin(), order.end()));
   }
-  EXPECT_GT(verdicts[0], 3);
-  EXPECT_GT(verdicts[1], 3);
-  EXPECT_GT(released, 3);
+  ExpectBothVerdicts();
+  EXPECT_EQ(released_, 0) << "their ways are shorter than those that are judged";
+}
+
+// More than are looked at on both sides, some orders: drives of which one keyframe may be
+// elsewhere.
+TEST_F(QuarantineOrderTest, AndSoItIsOfLongDrives) {
+  Open();
+  for (std::uint32_t drive = 0; drive < 60 * testing::Scaled(1); ++drive) {
+    std::vector<Spot> spots(24);
+    const std::int64_t step_m = 20 + Below(14);
+    const std::int64_t step_ms = 100 * Below(2);
+    for (std::size_t i = 0; i < spots.size(); ++i) {
+      const auto number = static_cast<std::int64_t>(i);
+      spots[i] = {step_m * number, step_ms * number};
+    }
+    if (Below(4) == 0) {
+      spots[static_cast<std::size_t>(Below(24))].x_m += Below(300);
+    }
+    std::vector<std::uint32_t> order(spots.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::shuffle(order.begin(), order.end(), random_);
+    ASSERT_NO_FATAL_FAILURE(PutInOrder(spots, order)) << "drive " << drive;
+  }
+  ExpectBothVerdicts();
+  EXPECT_GT(released_, 3);
 }
 
 TEST_F(QuarantineTest, ReleasedIsForGood) {
@@ -244,8 +311,8 @@ TEST_F(QuarantineTest, ALiveSessionCanBeReleasedBefore) {
 
 TEST_F(QuarantineTest, RetractedFromQuarantineItIsJudgedAnewWhenItIsRestored) {
   Open();
-  ASSERT_TRUE(Put(At(2, {0, 0}, "day")).has_value());
-  ASSERT_TRUE(Put(At(6, {400, 0}, "day")).has_value());
+  ASSERT_TRUE(Put(At(20, {0, 0}, "day")).has_value());
+  ASSERT_TRUE(Put(At(52, {400, 0}, "day")).has_value());
   const auto retracted = Change(SessionAction::kRetract);
   ASSERT_TRUE(retracted.has_value()) << retracted.error().message();
   EXPECT_TRUE(retracted->is_changed);
@@ -253,14 +320,16 @@ TEST_F(QuarantineTest, RetractedFromQuarantineItIsJudgedAnewWhenItIsRestored) {
   EXPECT_EQ(Change(SessionAction::kRelease).error().code(), StatusCode::kConflict);
   const auto restored = Change(SessionAction::kRestore);
   EXPECT_EQ(restored->state, SessionState::kQuarantined);
-  EXPECT_NE(Reason().find("keyframe 2 to 6: 400 m in 0.00 s"), std::string::npos) << Reason();
+  EXPECT_NE(Reason().find("keyframe 20 to 52: 400 m in 0.00 s"), std::string::npos) << Reason();
   ASSERT_TRUE(Change(SessionAction::kRetract).has_value());
-  EXPECT_FALSE(Put(At(4, {200, 0}, "day"))->judgement.has_value());
+  for (std::uint32_t i = 1; i < 16; ++i) {
+    EXPECT_FALSE(Put(At(20 + 2 * i, {25 * i, 0}, "day"))->judgement.has_value());
+  }
   EXPECT_EQ(State(), SessionState::kRetracted);
   EXPECT_EQ(Change(SessionAction::kRestore)->state, SessionState::kLive);
-  EXPECT_EQ(InTheMap(kA), 3U);
+  EXPECT_EQ(InTheMap(kA), 17U);
   ASSERT_TRUE(Change(SessionAction::kRetract).has_value());
-  PutAt(9, kFar_m);
+  PutAt(99, kFar_m);
   EXPECT_EQ(Change(SessionAction::kRestore)->state, SessionState::kQuarantined);
   ExpectSound();
 }
@@ -278,12 +347,12 @@ TEST_F(QuarantineTest, ARestoreDoesNotReleaseAndAVehicleIsNotReleasedAsAWhole) {
 TEST_F(QuarantineTest, NobodyJudgesOverWhatACompactionDropped) {
   Open();
   ASSERT_TRUE(Put(At(2, {0, 0}, "day")).has_value());
-  ASSERT_TRUE(Put(At(4, {200, 0}, "day")).has_value());
-  ASSERT_TRUE(Put(At(6, {400, 0}, "day")).has_value());
+  ASSERT_TRUE(Put(At(4, {100, 0}, "day")).has_value());
+  ASSERT_TRUE(Put(At(6, {200, 0}, "day")).has_value());
   ASSERT_TRUE(Await<CompactionResult>([&](auto done) {
                 store_->Compact({Dirty().revision, 5'000, {2}, "tester"}, std::move(done));
               }).has_value());
-  ASSERT_TRUE(Put(At(8, {600, 0}, "day")).has_value());
+  ASSERT_TRUE(Put(At(8, {400, 0}, "day")).has_value());
   EXPECT_EQ(State(), SessionState::kLive);
   ASSERT_TRUE(Change(SessionAction::kRetract).has_value());
   EXPECT_EQ(Change(SessionAction::kRestore)->state, SessionState::kLive);

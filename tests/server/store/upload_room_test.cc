@@ -138,6 +138,26 @@ TEST_F(UploadRoomTest, RetractedKeyframesCountAndDroppedOnesDoNot) {
   EXPECT_TRUE(Put(Sized(0, 4))->is_duplicate) << "of one that was dropped";
 }
 
+TEST_F(UploadRoomTest, APurgeMakesRoomOfASessionInQuarantine) {
+  Open();
+  NewKeyframe far = Sized(1, 5);
+  far.pose = PoseAt(5'000'000'000);
+  far.limits = PlausibilityLimits();
+  ASSERT_TRUE(Put(Sized(0, 5)).has_value());
+  ASSERT_TRUE(Put(far)->judgement.has_value());
+  NewKeyframe next = Sized(0, 1);
+  next.key.session.session = "next";
+  for (const UploadLimits& limits :
+       {UploadLimits{.store_bytes = 1}, UploadLimits{.vehicle_bytes = 10}}) {
+    store_->SetUploadLimits(limits);
+    const auto refused = Put(next);
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_NE(refused.error().message().find("atlas session purge"), std::string::npos);
+  }
+  Change(SessionAction::kPurge);
+  EXPECT_EQ(ReasonOf(next), StatusReason::kNone);
+}
+
 TEST_F(UploadRoomTest, WhatIsBehindARefusedOneWaitsForIt) {
   Open();
   store_->SetUploadLimits({.vehicle_bytes = 10});

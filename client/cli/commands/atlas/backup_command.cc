@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/atlas/timeout_flag.h"
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
@@ -19,13 +20,16 @@ class BackupCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("NAME", "NAME", name_, "Of the file, without a path");
+    author_.Declare(arguments);
     DeclareTimeout(arguments, timeout_);
   }
 
   Status Run(CommandContext& context) override {
+    const Result<std::string> author = author_.Author("atlas-backup");
+    if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const auto done = WithProgress(*client, context);
+    const auto done = WithProgress(*client, *author, context);
     if (!done) return done.error();
     if (context.is_json) {
       context.PrintJson({{"name", name_},
@@ -43,11 +47,13 @@ class BackupCommand : public Command {
   }
 
  private:
-  Result<BackupSummary> WithProgress(AtlasClient& client, const CommandContext& context) const {
+  Result<BackupSummary> WithProgress(AtlasClient& client,
+                                     const std::string& author,
+                                     const CommandContext& context) const {
     constexpr std::size_t kWhole = 1'000;  // of each bar
     ProgressBar copying(context.err, context.is_err_terminal, "copying", kWhole);
     ProgressBar reading(context.err, context.is_err_terminal, "reading back", kWhole);
-    return client.Backup(name_, "atlas-backup", timeout_, [&](const BackupStage& stage) {
+    return client.Backup(name_, author, timeout_, [&](const BackupStage& stage) {
       const std::uint64_t total = std::max<std::uint64_t>(stage.total_bytes, 1);
       const double part = static_cast<double>(stage.done_bytes) / static_cast<double>(total);
       (stage.is_copied ? reading : copying).Update(static_cast<std::size_t>(part * kWhole));
@@ -55,6 +61,7 @@ class BackupCommand : public Command {
   }
 
   std::string name_;
+  AuthorFlag author_;
   std::chrono::milliseconds timeout_{3'600'000};
 };
 

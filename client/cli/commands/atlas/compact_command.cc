@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/atlas/timeout_flag.h"
 #include "client/cli/output/text_table.h"
 
@@ -18,6 +19,7 @@ class CompactCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("--before", "T", before_s_,
                        "Only those taken before this time, seconds since 1970");
+    author_.Declare(arguments);
     DeclareTimeout(arguments, timeout_);
   }
 
@@ -25,9 +27,11 @@ class CompactCommand : public Command {
     if (before_s_ < 0.0 || before_s_ > kLatest_s) {
       return {StatusCode::kInvalidArgument, "--before: expected seconds from 0 to 1e12"};
     }
+    const Result<std::string> author = author_.Author("atlas-compact");
+    if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const auto done = client->Compact(std::llround(before_s_ * 1e3), "atlas-compact", timeout_);
+    const auto done = client->Compact(std::llround(before_s_ * 1e3), *author, timeout_);
     if (!done) return done.error();
     Print(*done, context);
     return {};
@@ -51,6 +55,7 @@ class CompactCommand : public Command {
   }
 
   double before_s_ = 0.0;
+  AuthorFlag author_;
   std::chrono::milliseconds timeout_{3'600'000};
 };
 

@@ -1,5 +1,6 @@
 // `atlas poses apply FILE`: a batch of pose corrections, all or nothing.
 #include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/files/pose_file.h"
 #include "client/cli/files/whole_file.h"
 
@@ -16,6 +17,7 @@ class PosesApplyCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("FILE", "FILE", file_,
                        "Lines: vehicle session sequence and 12 numbers (3x4, sensor to world)");
+    author_.Declare(arguments);
   }
 
   Status Run(CommandContext& context) override {
@@ -23,9 +25,11 @@ class PosesApplyCommand : public Command {
     if (!text) return text.error();
     const auto corrections = ParsePoseFile(*text);
     if (!corrections) return corrections.error().WithContext(file_);
+    const Result<std::string> author = author_.Author("atlas-poses-apply");
+    if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const Result<PoseBatchSummary> done = client->UpdatePoses(*corrections, "atlas-poses-apply");
+    const Result<PoseBatchSummary> done = client->UpdatePoses(*corrections, *author);
     if (!done) return done.error();
     Print(*done, context);
     return {};
@@ -50,6 +54,7 @@ class PosesApplyCommand : public Command {
   }
 
   std::string file_;
+  AuthorFlag author_;
 };
 
 }  // namespace

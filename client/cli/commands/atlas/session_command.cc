@@ -2,6 +2,7 @@
 // `release V/S`: out of quarantine for good; `purge V/S`: deleted.
 // `atlas vehicle retract V` and `restore V`: all its drives.
 #include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/author_flag.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -18,6 +19,18 @@ Result<SessionKey> ParseSession(const std::string& text) {
   return key;
 }
 
+// Who does it, and why.
+struct Account {
+  AuthorFlag author;
+  std::string reason;
+
+  void Declare(ArgumentSet& arguments) {
+    author.Declare(arguments);
+    arguments.Optional("--reason", "TEXT", reason,
+                       "Why, for `atlas log`: one line of at most 256 bytes");
+  }
+};
+
 class SessionCommand : public Command {
  public:
   SessionCommand(std::string word, std::string summary, SessionAction action)
@@ -28,6 +41,7 @@ class SessionCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("SESSION", "VEHICLE/SESSION", session_, "As `atlas sessions` lists it");
+    account_.Declare(arguments);
     if (is_purge()) {
       arguments.Flag("--yes", is_sure_, "Needed: what is deleted does not come back");
     }
@@ -40,9 +54,11 @@ class SessionCommand : public Command {
       return {StatusCode::kInvalidArgument,
               StrCat("session ", *key, ": a purge deletes it for good; say --yes")};
     }
+    const Result<std::string> author = account_.author.Author("atlas-session-" + word_);
+    if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const auto done = client->ChangeSession(*key, action_, "atlas-session-" + word_);
+    const auto done = client->ChangeSession(*key, action_, *author, account_.reason);
     if (!done) return done.error();
     Print(*key, *done, context);
     return {};
@@ -76,6 +92,7 @@ class SessionCommand : public Command {
   std::string summary_;
   SessionAction action_;
   std::string session_;
+  Account account_;
   bool is_sure_ = false;
 };
 
@@ -89,12 +106,15 @@ class VehicleCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("VEHICLE", "VEHICLE", vehicle_, "As `atlas sessions` lists it");
+    account_.Declare(arguments);
   }
 
   Status Run(CommandContext& context) override {
+    const Result<std::string> author = account_.author.Author("atlas-vehicle-" + word_);
+    if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const auto done = client->ChangeVehicle(vehicle_, action_, "atlas-vehicle-" + word_);
+    const auto done = client->ChangeVehicle(vehicle_, action_, *author, account_.reason);
     if (!done) return done.error();
     if (context.is_json) {
       context.PrintJson({{"vehicle", vehicle_},
@@ -115,6 +135,7 @@ class VehicleCommand : public Command {
   std::string summary_;
   SessionAction action_;
   std::string vehicle_;
+  Account account_;
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // `atlas verify`: is what is stored whole, and are the tiles what their keyframes make?
 #include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/atlas/timeout_flag.h"
 #include "core/base/str_cat.h"
 
@@ -36,15 +37,17 @@ class VerifyCommand : public Command {
                    "Also fuse every tile again from its keyframes and compare");
     arguments.Flag("--repair", is_repair_,
                    "Restore what is damaged; delete keyframes that nothing can restore");
+    author_.Declare(arguments);
     DeclareTimeout(arguments, timeout_);
   }
 
   Status Run(CommandContext& context) override {
+    const Result<std::string> author = author_.Author("atlas-verify");
+    if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const Result<VerifySummary> found = is_repair_
-                                            ? client->Repair(is_rebuild_, "atlas-verify", timeout_)
-                                            : client->Verify(is_rebuild_, timeout_);
+    const Result<VerifySummary> found = is_repair_ ? client->Repair(is_rebuild_, *author, timeout_)
+                                                   : client->Verify(is_rebuild_, timeout_);
     if (!found) return found.error();
     if (context.is_json) {
       context.PrintJson(VerifyJson(*found));
@@ -59,6 +62,7 @@ class VerifyCommand : public Command {
  private:
   bool is_rebuild_ = false;
   bool is_repair_ = false;
+  AuthorFlag author_;
   std::chrono::milliseconds timeout_{3'600'000};
 };
 

@@ -30,6 +30,7 @@ boost::json::object ReportJson(const IngestReport& report, double wall_s) {
           {"sensor_height_m", Rounded(report.mount.height_m, 3)},
           {"sensor_tilt_deg", Rounded(report.mount.TiltDeg(), 2)},
           {"sessions", report.sessions},
+          {"impossible_steps", report.impossible_steps.size()},
           {"wall_s", Rounded(wall_s, 3)}};
 }
 
@@ -87,6 +88,12 @@ class IngestCommand : public Command {
     if (report->empty_scans > 0) {
       context.err << "note: no return from beyond the vehicle in " << report->empty_scans << " of "
                   << report->keyframes << " scans\n";
+    }
+    if (!report->impossible_steps.empty()) {
+      context.err << "note: " << report->impossible_steps.size() << " steps look impossible ("
+                  << report->impossible_steps.front()
+                  << "): the daemon keeps their session out of the map unless it is released "
+                     "(atlas session release)\n";
     }
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     if (context.is_json) {

@@ -1,5 +1,6 @@
 #include "server/store/sqlite/tables/keyframe_table.h"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -75,6 +76,15 @@ Result<KeyframeRow> ReadRow(Query& query) {
                  StrCat("store: the row of keyframe ", r.id, " is damaged: wrong checksum"));
   }
   return std::move(row.row);
+}
+
+std::vector<std::int64_t> ReadIds(Query& row) {
+  std::vector<std::int64_t> ids;
+  while (row.Step()) {
+    row.Rewind();
+    ids.push_back(row.Int());
+  }
+  return ids;
 }
 
 void BindPrior(Query& query, const std::optional<PositionPrior>& prior) {
@@ -261,31 +271,30 @@ std::int64_t FindKeyframeId(Connection& connection,
 std::vector<std::int64_t> ListSessionKeyframes(Connection& connection, std::int64_t session_id) {
   Query row = connection.Prepare("SELECT id FROM keyframes WHERE session_id = ? ORDER BY sequence");
   row.Bind(session_id);
-  std::vector<std::int64_t> ids;
-  while (row.Step()) {
-    row.Rewind();
-    ids.push_back(row.Int());
-  }
+  return ReadIds(row);
+}
+
+std::vector<std::int64_t> ListKeyframesBefore(Connection& connection,
+                                              std::int64_t session_id,
+                                              std::uint32_t sequence,
+                                              std::size_t count) {
+  Query row = connection.Prepare(
+      "SELECT id FROM keyframes WHERE session_id = ? AND sequence < ? "
+      "ORDER BY sequence DESC LIMIT ?");
+  row.Bind(session_id).Bind(sequence).Bind(count);
+  std::vector<std::int64_t> ids = ReadIds(row);
+  std::reverse(ids.begin(), ids.end());
   return ids;
 }
 
-std::int64_t FindKeyframeBefore(Connection& connection,
-                                std::int64_t session_id,
-                                std::uint32_t sequence) {
+std::vector<std::int64_t> ListKeyframesBehind(Connection& connection,
+                                              std::int64_t session_id,
+                                              std::uint32_t sequence,
+                                              std::size_t count) {
   Query row = connection.Prepare(
-      "SELECT id FROM keyframes WHERE session_id = ? AND sequence < ? "
-      "ORDER BY sequence DESC LIMIT 1");
-  row.Bind(session_id).Bind(sequence);
-  return row.Step() ? row.Int() : 0;
-}
-
-std::int64_t FindKeyframeBehind(Connection& connection,
-                                std::int64_t session_id,
-                                std::uint32_t sequence) {
-  Query row = connection.Prepare(
-      "SELECT id FROM keyframes WHERE session_id = ? AND sequence > ? ORDER BY sequence LIMIT 1");
-  row.Bind(session_id).Bind(sequence);
-  return row.Step() ? row.Int() : 0;
+      "SELECT id FROM keyframes WHERE session_id = ? AND sequence > ? ORDER BY sequence LIMIT ?");
+  row.Bind(session_id).Bind(sequence).Bind(count);
+  return ReadIds(row);
 }
 
 Status CheckKeyframe(Connection& connection, std::int64_t id) {

@@ -42,13 +42,15 @@ std::int64_t FindKeyframeId(Connection& connection,
                             std::uint32_t sequence);
 // By the same index: the ids of a session's keyframes in the order of their sequence numbers.
 std::vector<std::int64_t> ListSessionKeyframes(Connection& connection, std::int64_t session_id);
-// The one before a sequence number, and the one behind it; 0: there is none.
-std::int64_t FindKeyframeBefore(Connection& connection,
-                                std::int64_t session_id,
-                                std::uint32_t sequence);
-std::int64_t FindKeyframeBehind(Connection& connection,
-                                std::int64_t session_id,
-                                std::uint32_t sequence);
+// Those next to a sequence number, `count` at most, in the same order.
+std::vector<std::int64_t> ListKeyframesBefore(Connection& connection,
+                                              std::int64_t session_id,
+                                              std::uint32_t sequence,
+                                              std::size_t count);
+std::vector<std::int64_t> ListKeyframesBehind(Connection& connection,
+                                              std::int64_t session_id,
+                                              std::uint32_t sequence,
+                                              std::size_t count);
 // kInvalidData when the row, its session, its pose, its tiles of now or its blob is damaged: fusion
 // cannot have it.
 Status CheckKeyframe(Connection& connection, std::int64_t id);

@@ -1,5 +1,7 @@
 #include "server/store/sqlite/transactions/session_judgement.h"
 
+#include <vector>
+
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
@@ -7,15 +9,14 @@
 namespace atlas {
 namespace {
 
+// nullopt: nothing tells where it was.
+using Place = std::optional<UploadedPlace>;
+
 UploadedPlace PlaceOf(std::uint32_t sequence, std::int64_t time_ms, const QuantizedPose& pose) {
   return {sequence, time_ms, pose.x_um, pose.y_um, pose.z_um};
 }
 
-// nullopt: nothing tells where it was, or there is no such keyframe.
-std::optional<UploadedPlace> FindPlace(Connection& connection, std::int64_t id) {
-  if (id == 0) {
-    return std::nullopt;
-  }
+Place ReadPlace(Connection& connection, std::int64_t id) {
   const auto row = ReadKeyframeRow(connection, id);
   const auto pose = ReadUploadedPose(connection, id);
   if (!row || !pose || !*pose) {
@@ -24,43 +25,57 @@ std::optional<UploadedPlace> FindPlace(Connection& connection, std::int64_t id) 
   return PlaceOf(row->record.key.sequence, row->record.time_ms, **pose);
 }
 
+std::vector<Place> ReadPlaces(Connection& connection, const std::vector<std::int64_t>& ids) {
+  std::vector<Place> places;
+  places.reserve(ids.size());
+  for (const std::int64_t id : ids) {
+    places.push_back(ReadPlace(connection, id));
+  }
+  return places;
+}
+
+// Of a session's keyframes in their order.
 class Judge {
  public:
   Judge(Connection& connection, const SessionRow& session, const PlausibilityLimits& limits)
-      : connection_(connection), session_(session), limits_(limits) {}
+      : connection_(connection), session_(session), track_(limits) {}
 
-  // Of two with none between them that is still there.
-  std::optional<std::string> Between(const std::optional<UploadedPlace>& before,
-                                     const std::optional<UploadedPlace>& behind) const {
-    if (!before || !behind) {
+  // What cannot be on a way to the next one, with none between that is not there any more.
+  std::optional<std::string> Add(const Place& place) {
+    if (!place) {
+      track_.Break();
       return std::nullopt;
     }
-    auto finding = FindImplausible(*before, *behind, limits_);
-    const bool has_gap =
-        finding && session_.record.compacted > 0 &&
-        HasTombstoneBetween(connection_, session_.id, before->sequence, behind->sequence);
-    return has_gap ? std::nullopt : finding;
+    const auto finding = track_.Add(*place);
+    const bool has_gap = finding && session_.record.compacted > 0 &&
+                         HasTombstoneBetween(connection_, session_.id, finding->from, finding->to);
+    return finding && !has_gap ? std::optional(finding->reason) : std::nullopt;
   }
 
  private:
   Connection& connection_;
   const SessionRow& session_;
-  const PlausibilityLimits& limits_;
+  UploadedTrack track_;
 };
+
+std::optional<std::string> FindIn(const std::vector<Place>& places, Judge judge) {
+  std::optional<std::string> finding;
+  for (auto place = places.begin(); place != places.end() && !finding; ++place) {
+    finding = judge.Add(*place);
+  }
+  return finding;
+}
 
 }  // namespace
 
 SessionJudgement JudgeSession(Connection& connection,
                               const SessionRow& session,
                               const PlausibilityLimits& limits) {
-  const Judge judge(connection, session, limits);
-  std::optional<UploadedPlace> before;
+  Judge judge(connection, session, limits);
   for (const std::int64_t id : ListSessionKeyframes(connection, session.id)) {
-    const std::optional<UploadedPlace> place = FindPlace(connection, id);
-    if (auto finding = judge.Between(before, place)) {
+    if (auto finding = judge.Add(ReadPlace(connection, id))) {
       return {SessionState::kQuarantined, *std::move(finding)};
     }
-    before = place;
   }
   return {SessionState::kLive, ""};
 }
@@ -73,19 +88,22 @@ std::optional<SessionJudgement> JudgeArrival(Connection& connection,
     return std::nullopt;
   }
   const std::uint32_t sequence = keyframe.key.sequence;
-  const auto before = FindPlace(connection, FindKeyframeBefore(connection, session.id, sequence));
-  const auto behind = FindPlace(connection, FindKeyframeBehind(connection, session.id, sequence));
-  const auto arrived = PlaceOf(sequence, keyframe.time_ms, keyframe.pose);
+  const auto before = ReadPlaces(
+      connection, ListKeyframesBefore(connection, session.id, sequence, kMostJudgedSteps));
+  const auto behind = ReadPlaces(
+      connection, ListKeyframesBehind(connection, session.id, sequence, kMostJudgedSteps));
   const Judge judge(connection, session, *keyframe.limits);
-  auto finding = judge.Between(before, arrived);
-  if (!finding) {
-    finding = judge.Between(arrived, behind);
-  }
+  std::vector<Place> places = before;
+  places.emplace_back(PlaceOf(sequence, keyframe.time_ms, keyframe.pose));
+  places.insert(places.end(), behind.begin(), behind.end());
+  auto finding = FindIn(places, judge);
   if (!is_quarantined) {
-    return finding ? std::optional(SessionJudgement{SessionState::kQuarantined, *finding})
-                   : std::nullopt;
+    return finding
+               ? std::optional(SessionJudgement{SessionState::kQuarantined, *std::move(finding)})
+               : std::nullopt;
   }
-  if (finding || !judge.Between(before, behind)) {
+  places.erase(places.begin() + static_cast<std::ptrdiff_t>(before.size()));
+  if (finding || !FindIn(places, judge)) {
     return std::nullopt;  // still, or because of others
   }
   auto now = JudgeSession(connection, session, *keyframe.limits);

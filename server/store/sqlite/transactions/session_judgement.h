@@ -1,7 +1,8 @@
-// Which state a session is in because of what its keyframes look like: quarantined when two of them
-// that are neighbours in sequence are implausible (plausibility.h) at the poses that they were
-// uploaded with. That is a matter of which keyframes are there, not of the order in which they
-// came. Nobody judges over a gap that a compaction left, nor where a row is damaged.
+// Which state a session is in because of what its keyframes look like: quarantined when a way of at
+// most kMostJudgedSteps from one to another, in sequence, is implausible (plausibility.h) at the
+// poses that they were uploaded with. That is a matter of which keyframes are there, not of the
+// order in which they came. Nobody judges over a gap that a compaction left, nor where a row is
+// damaged.
 #pragma once
 
 #include <optional>
@@ -18,7 +19,8 @@ SessionJudgement JudgeSession(Connection& connection,
                               const PlausibilityLimits& limits);
 
 // What a keyframe that was just added makes of its session; nullopt: it stays what it is. Looks at
-// its neighbours alone, as a rule. Only live and quarantined sessions are judged.
+// kMostJudgedSteps neighbours on each side alone, as a rule. Only live and quarantined sessions are
+// judged.
 std::optional<SessionJudgement> JudgeArrival(Connection& connection,
                                              const SessionRow& session,
                                              const NewKeyframe& keyframe);

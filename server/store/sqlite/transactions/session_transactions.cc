@@ -109,6 +109,7 @@ Result<SessionChangeResult> ChangeOne(Connection& connection,
 
 Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionChange& change) {
   SessionChangeResult all;
+  bool is_any_left = false;
   SessionChange one = change;
   one.key.session.clear();
   while (true) {
@@ -124,6 +125,7 @@ Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionC
       if (session.record.state == SessionState::kPurged) {
         continue;
       }
+      is_any_left = true;
       const auto result = ChangeOne(connection, session, one);
       if (!result) {
         return result;
@@ -138,6 +140,10 @@ Result<SessionChangeResult> ChangeVehicle(Connection& connection, const SessionC
   if (one.key.session.empty()) {
     return Error(StatusCode::kNotFound,
                  StrCat("vehicle ", change.key.vehicle, " is not in the atlas"));
+  }
+  if (!is_any_left) {
+    return Error(StatusCode::kNotFound, StrCat("vehicle ", change.key.vehicle,
+                                               " has no session: all that it had were purged"));
   }
   return all;
 }

@@ -8,9 +8,9 @@
 
 #include "core/base/str_cat.h"
 #include "core/fusion/observation/keyframe_placement.h"
+#include "core/geometry/plausibility.h"
 #include "core/tile/tile_codec.h"
 #include "core/tile/tile_pyramid.h"
-#include "server/store/plausibility.h"
 #include "tests/core/fusion/oracle/plain_fusion.h"
 
 namespace atlas::testing {
@@ -73,23 +73,26 @@ Result<PoseBatchResult> ModelAtlas::Move(const std::vector<Placing>& placings) {
   return result;
 }
 
-// By all neighbours in sequence; a keyframe that was dropped is nobody's.
+// By all ways in sequence; none leads over a keyframe that was dropped.
 SessionState ModelAtlas::Judge(const SessionKey& key) const {
-  std::map<std::uint32_t, const Frame*> by_sequence;
-  std::map<std::uint32_t, UploadedPlace> places;
+  std::map<std::uint32_t, std::optional<UploadedPlace>> places;
   for (const auto& [index, frame] : frames_) {
     const ScriptFrame& script = script_.frames[index];
-    if (script.key.session == key) {
-      const QuantizedPose& pose = frame.uploaded_pose;
-      by_sequence[script.key.sequence] = &frame;
-      places[script.key.sequence] = {script.key.sequence, script.contents[frame.content].time_ms,
-                                     pose.x_um, pose.y_um, pose.z_um};
+    if (script.key.session != key) {
+      continue;
+    }
+    const QuantizedPose& pose = frame.uploaded_pose;
+    std::optional<UploadedPlace>& place = places[script.key.sequence];
+    if (!frame.is_dropped) {
+      place = {script.key.sequence, script.contents[frame.content].time_ms, pose.x_um, pose.y_um,
+               pose.z_um};
     }
   }
-  for (auto next = by_sequence.begin(); next != by_sequence.end();) {
-    const auto one = next++;
-    if (next != by_sequence.end() && !one->second->is_dropped && !next->second->is_dropped &&
-        FindImplausible(places[one->first], places[next->first], script_.plausibility)) {
+  UploadedTrack track(script_.plausibility);
+  for (const auto& [sequence, place] : places) {
+    if (!place) {
+      track.Break();
+    } else if (track.Add(*place)) {
       return SessionState::kQuarantined;
     }
   }
