@@ -14,6 +14,7 @@
 #include "client/connection/atlas_client.h"
 #include "client/connection/keyframe_uploader.h"
 #include "client/vehicle/folder_lock.h"
+#include "client/vehicle/sent_atlas.h"
 #include "core/base/status.h"
 
 namespace atlas {
@@ -39,15 +40,18 @@ struct SpoolReport {
   // last kind for two more times.
   std::uint64_t skipped = 0;
   std::uint64_t vanished = 0;  // removed by somebody else: forgotten
-  Status problem;              // the first file's of those skipped or vanished
-  std::uint64_t sent = 0;      // answered or not
+  // The first file's of those skipped or vanished, or else of the one that says which atlas was
+  // sent to last: damaged, it is as if nothing was sent yet.
+  Status problem;
+  std::uint64_t sent = 0;  // answered or not
   std::uint64_t sent_bytes = 0;
   // What is left on the disk, and how many of these are on their way: the next Send on the same
   // connection begins with their answers.
   std::uint64_t waiting = 0;
   std::uint64_t in_flight = 0;
-  // The atlas was restored from a backup since this spool sent to it last: of what was acknowledged
-  // before some may be lost, and is to be put again by who still has it. Told once.
+  // The atlas was restored from a backup since this spool sent to it last, in this run of the
+  // program or an earlier one, or it is another atlas: of what was acknowledged before some may be
+  // lost, and is to be put again by who still has it. Told once.
   bool is_restored = false;
   // Not 0: nothing was sent, the daemon wants to be left alone for so long.
   std::chrono::milliseconds retry_after{0};
@@ -111,7 +115,7 @@ class UploadSpool {
   std::uint64_t waiting_bytes_ = 0;
   std::uint64_t refused_bytes_ = 0;
   Number next_ = 1;
-  std::uint64_t epoch_ = 0;  // of the atlas that it sent to last; 0: it did not
+  SentAtlas sent_to_;
 };
 
 }  // namespace atlas

@@ -214,7 +214,7 @@ class UploadSpool::Sending {
 };
 
 UploadSpool::UploadSpool(SpoolOptions options, FolderLock lock)
-    : options_(std::move(options)), lock_(std::move(lock)) {}
+    : options_(std::move(options)), lock_(std::move(lock)), sent_to_(options_.folder) {}
 UploadSpool::UploadSpool(UploadSpool&&) noexcept = default;
 UploadSpool& UploadSpool::operator=(UploadSpool&&) noexcept = default;
 UploadSpool::~UploadSpool() = default;
@@ -229,13 +229,13 @@ Result<SpoolReport> UploadSpool::Send(AtlasClient& client, const SendLimits& lim
     return held_back;
   }
   if (!is_same) underway_ = std::make_unique<Underway>(client, options_.upload);
-  const std::uint64_t epoch = client.atlas().epoch;
-  const bool is_restored = epoch_ != 0 && epoch != epoch_;
+  const bool is_restored = sent_to_.IsAnother(client.atlas());
   Result<SpoolReport> report = Sending(*this, limits).Run();
-  if (report) {
-    report->is_restored = is_restored;
-    epoch_ = epoch;
-  }
+  if (!report) return report;
+  report->is_restored = is_restored;
+  sent_to_.Note(client.atlas());
+  const Status unknown = sent_to_.TakeProblem();
+  if (report->problem.ok()) report->problem = unknown;
   return report;
 }
 
