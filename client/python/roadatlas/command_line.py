@@ -14,6 +14,9 @@ _SECURITY = (("ca", "FILE", "speak TLS; who vouches for the daemon, PEM"), ("cer
              ("key", "FILE", "of our certificate, PEM"),
              ("name", "NAME", "the daemon's name in its certificate [the host]"))
 
+_TRUE = ("true", "1", "yes", "on")
+_FALSE = ("", "false", "0", "no", "off")
+
 
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="roadatlas", description="Looks at a Road Atlas daemon.")
@@ -39,15 +42,22 @@ def connect(arguments: argparse.Namespace) -> AtlasClient:
     if not port.isdigit():
         raise BadCredentials(f"--server {arguments.server}: expected HOST:PORT")
     token = read_token(arguments.token_file) if arguments.token_file else ""
-    return AtlasClient(host.strip("[]"), int(port), client_name="roadatlas", tls=_tls(arguments), token=token)
+    return AtlasClient(host.strip("[]"), int(port), client_name="roadatlas", tls=_tls(arguments), token=token,
+                       allow_plaintext=_is_plaintext_allowed(arguments.allow_plaintext))
 
 
 def _tls(arguments: argparse.Namespace) -> Tls | None:
     if arguments.tls_ca:
         return Tls(arguments.tls_ca, arguments.tls_certificate or None, arguments.tls_key or None, arguments.tls_name)
-    if arguments.tls_certificate or arguments.tls_key:
-        raise BadCredentials("a certificate is shown over TLS only: expected --tls-ca, too")
+    if arguments.tls_certificate or arguments.tls_key or arguments.tls_name:
+        raise BadCredentials("--tls-certificate, --tls-key and --tls-name are of TLS: expected --tls-ca, too")
     return None
+
+
+def _is_plaintext_allowed(text: str) -> bool:
+    if text.lower() not in _TRUE + _FALSE:
+        raise BadCredentials(f"ATLAS_ALLOW_PLAINTEXT={text}: expected true or false")
+    return text.lower() in _TRUE
 
 
 def _add_command(commands: argparse._SubParsersAction, name: str, summary: str) -> argparse.ArgumentParser:
@@ -66,6 +76,9 @@ def _add_connection(parser: argparse.ArgumentParser, from_environment: bool) -> 
     add("--server", "ATLAS_SERVER", "HOST:PORT", "the daemon", DEFAULT_SERVER)
     for name, value_name, summary in _SECURITY:
         add(f"--tls-{name}", f"ATLAS_TLS_{name.upper()}", value_name, summary)
+    parser.add_argument("--allow-plaintext", action="store_const", const="true",
+                        default=os.environ.get("ATLAS_ALLOW_PLAINTEXT", "") if from_environment else argparse.SUPPRESS,
+                        help="speak without TLS beyond loopback, too [ATLAS_ALLOW_PLAINTEXT]")
     add("--token-file", "ATLAS_TOKEN_FILE", "FILE", "holds our token")
 
 
