@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "client/vehicle/atlas_link.h"
 #include "client/vehicle/numbered_files.h"
 #include "client/vehicle/spooled_keyframe.h"
 #include "client/vehicle/stored_file.h"
@@ -35,6 +36,7 @@ Result<UploadSpool> UploadSpool::Open(const SpoolOptions& options) {
   Result<FolderLock> lock = FolderLock::Take(options.folder);
   if (!lock) return Error(lock.error().WithContext("upload spool"));
   UploadSpool spool(options, *std::move(lock));
+  if (!spool.options_.random) spool.options_.random = LinkEnvironment::Real().random;
   if (Status status = spool.Scan(); !status.ok()) return Error(std::move(status));
   return spool;
 }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
@@ -25,6 +26,10 @@ struct SpoolOptions {
   // Of those that were refused: the oldest go first.
   std::uint64_t max_refused_bytes = std::uint64_t{256} << 20;
   UploadOptions upload = {};  // without its patience: Send has an end
+  // The most, and half of it the least, for which nothing more is sent on a connection whose client
+  // may not upload at all: that takes people to undo.
+  std::chrono::milliseconds denied_delay{60'000};
+  std::function<double()> random = {};  // uniform in [0, 1); empty: the system's
 };
 
 // Of one Send.
@@ -53,7 +58,8 @@ struct SpoolReport {
   // program or an earlier one, or it is another atlas: of what was acknowledged before some may be
   // lost, and is to be put again by who still has it. Told once.
   bool is_restored = false;
-  // Not 0: nothing was sent, the daemon wants to be left alone for so long.
+  // Not 0: nothing was sent, the daemon wants to be left alone for so long, or said that the client
+  // may not upload at all.
   std::chrono::milliseconds retry_after{0};
 };
 
@@ -76,7 +82,8 @@ class UploadSpool {
   // on where it ended. On another connection what was not answered is sent again. Fails when the
   // link does, with the first refusal that may pass (what waits is kept then), or when the client
   // may not upload at all. Sends nothing while the daemon wants to be left alone
-  // (AtlasClient::retry_after). A file that is of no use stops no other.
+  // (AtlasClient::retry_after), nor for a while after the latter. A file that is of no use stops no
+  // other.
   Result<SpoolReport> Send(AtlasClient& client, const SendLimits& limits = {});
 
   // Puts what was refused back into the queue, at the places that it had, as far as there is room:

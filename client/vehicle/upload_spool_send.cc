@@ -1,5 +1,6 @@
 // UploadSpool::Send: one run through the queue.
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,8 @@ bool IsOfTheClient(StatusCode code, const KeyframeKey& key, const AtlasIdentity&
 // What was sent on a connection and is not dealt with: it outlives the Send, and stays where it is
 // when the spool is moved. A round ends when all is answered.
 struct UploadSpool::Underway {
+  using Clock = std::chrono::steady_clock;
+
   Underway(const AtlasClient& client, UploadOptions options)
       : atlas(client.atlas()), uploader(client, WithoutPatience(std::move(options))) {}
 
@@ -47,11 +50,17 @@ struct UploadSpool::Underway {
     return std::any_of(in_flight.begin(), in_flight.end(), is_it) || failed.contains(number);
   }
 
+  std::chrono::milliseconds denied_for() const {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(denied_until - Clock::now());
+    return std::max(left, std::chrono::milliseconds(0));
+  }
+
   const AtlasIdentity atlas;  // as it was when the client connected
   std::map<KeyframeKey, Number> in_flight;
   std::vector<std::pair<KeyframeKey, Status>> answers;  // not looked at yet
   std::map<Number, Status> failed;                      // in this round: at these the daemon did
   std::uint64_t taken = 0;                              // in this round
+  Clock::time_point denied_until{};                     // the client was not allowed to upload
   bool is_round_over = false;  // something was refused that may pass: nothing more in this one
   KeyframeUploader uploader;
 };
@@ -177,11 +186,22 @@ class UploadSpool::Sending {
     } else if (answer.code() == StatusCode::kInternal) {
       underway_.failed.emplace(number, answer);
       if (underway_.failed.size() >= kMaxFailed && underway_.taken == 0) Stop(answer);
-    } else if (IsTemporary(answer.code()) || IsOfTheClient(answer.code(), key, underway_.atlas)) {
+    } else if (IsOfTheClient(answer.code(), key, underway_.atlas)) {
+      if (!underway_.is_round_over) Deny();
+      Stop(answer);
+    } else if (IsTemporary(answer.code())) {
       Stop(answer);
     } else {
       SetAside(number, answer);
     }
+  }
+
+  // As the link does when it is not let in.
+  void Deny() {
+    const double part = 0.5 + 0.5 * spool_.options_.random();
+    const double most_ms = static_cast<double>(spool_.options_.denied_delay.count());
+    underway_.denied_until =
+        Underway::Clock::now() + std::chrono::milliseconds(std::llround(part * most_ms));
   }
 
   void Stop(const Status& why) {
@@ -223,6 +243,7 @@ Result<SpoolReport> UploadSpool::Send(AtlasClient& client, const SendLimits& lim
   const bool is_same = underway_ != nullptr && underway_->uploader.IsOf(client);
   SpoolReport held_back;
   held_back.retry_after = client.retry_after();
+  if (is_same) held_back.retry_after = std::max(held_back.retry_after, underway_->denied_for());
   if (held_back.retry_after.count() > 0) {
     held_back.waiting = waiting();
     held_back.in_flight = is_same ? underway_->in_flight.size() : 0;
