@@ -82,8 +82,8 @@ class UploadSpool {
   // on where it ended. On another connection what was not answered is sent again. Fails when the
   // link does, with the first refusal that may pass (what waits is kept then), or when the client
   // may not upload at all. Sends nothing while the daemon wants to be left alone
-  // (AtlasClient::retry_after), nor for a while after the latter. A file that is of no use stops no
-  // other.
+  // (AtlasClient::retry_after), nor for a while after the latter; then one keyframe, and the others
+  // when it was taken. A file that is of no use stops no other.
   Result<SpoolReport> Send(AtlasClient& client, const SendLimits& limits = {});
 
   // Puts what was refused back into the queue, at the places that it had, as far as there is room:
@@ -123,6 +123,7 @@ class UploadSpool {
   std::uint64_t refused_bytes_ = 0;
   Number next_ = 1;
   SentAtlas sent_to_;
+  bool is_probing_ = false;  // something was refused for a while, and nothing was taken since
 };
 
 }  // namespace atlas

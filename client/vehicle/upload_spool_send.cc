@@ -93,12 +93,25 @@ class UploadSpool::Sending {
     }
     for (const Number number : numbers) {
       if (IsSpent()) break;
+      const Result<bool> may_go_on = AwaitProbe();
+      if (!may_go_on) return may_go_on.error();
+      if (!*may_go_on) break;
       const Result<bool> is_sent = SendOne(number);
       TakeAnswers();
       if (!is_sent) return is_sent.error();
       if (!*is_sent || underway_.is_round_over) break;
     }
     return {};
+  }
+
+  // After a refusal keyframes go one by one, until one is taken: else all would be sent to be
+  // refused once more. False: it was refused, or is not answered yet.
+  Result<bool> AwaitProbe() {
+    if (!spool_.is_probing_ || underway_.in_flight.empty()) return true;
+    const Result<bool> is_answered = underway_.uploader.FinishUntil(latest_);
+    TakeAnswers();
+    if (!is_answered || !*is_answered) return is_answered;
+    return !underway_.is_round_over;
   }
 
   bool IsSpent() const {
@@ -183,6 +196,7 @@ class UploadSpool::Sending {
       spool_.Remove(number);
       ++report_.acknowledged;
       ++underway_.taken;
+      if (!underway_.is_round_over) spool_.is_probing_ = false;
     } else if (answer.code() == StatusCode::kInternal) {
       underway_.failed.emplace(number, answer);
       if (underway_.failed.size() >= kMaxFailed && underway_.taken == 0) Stop(answer);
@@ -206,6 +220,7 @@ class UploadSpool::Sending {
 
   void Stop(const Status& why) {
     underway_.is_round_over = true;
+    spool_.is_probing_ = true;
     if (failure_.ok()) failure_ = why;
   }
 

@@ -110,5 +110,49 @@ TEST_F(SpoolRefusalsTest, AnotherConnectionIsAnotherClient) {
   EXPECT_EQ(report->acknowledged, kKeyframes);
 }
 
+TEST_F(SpoolRefusalsTest, AfterAWaitOneKeyframeGoesAndTheOthersWhenItWasTaken) {
+  for (const StatusCode code :
+       {StatusCode::kPermissionDenied, StatusCode::kResourceExhausted, StatusCode::kUnavailable}) {
+    RefusingPeer peer(Status(code, "not now").WithRetryAfter(5));
+    UploadSpool spool = Open(milliseconds(10));
+    AtlasClient client = peer.Connect();
+    EXPECT_EQ(spool.Send(client).error().code(), code);
+    EXPECT_GT(peer.asked(), 1) << "nothing was known yet";
+    for (int round = 0; round < 3; ++round) {
+      EXPECT_EQ(SendWhenItMay(spool, client).error().code(), code);
+      EXPECT_EQ(peer.asked(), 1);
+    }
+    peer.TakeFrom(0);
+    const auto report = SendWhenItMay(spool, client);
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->acknowledged, kKeyframes);
+    EXPECT_EQ(peer.asked(), static_cast<int>(kKeyframes));
+  }
+}
+
+// A connection that is made again tells the daemon no more than the one before.
+TEST_F(SpoolRefusalsTest, SoItIsOnAnotherConnection) {
+  UploadSpool spool = Open(milliseconds(10));
+  for (int connection = 0; connection < 3; ++connection) {
+    RefusingPeer peer({StatusCode::kResourceExhausted, "a full disk"});
+    AtlasClient client = peer.Connect();
+    EXPECT_FALSE(spool.Send(client));
+    EXPECT_EQ(peer.asked() == 1, connection > 0);
+  }
+}
+
+// What the daemon took of a round that it refused the first of says nothing of the next.
+TEST_F(SpoolRefusalsTest, WhatIsTakenBehindARefusalEndsNoDoubt) {
+  RefusingPeer peer({StatusCode::kUnavailable, "this session may not begin yet"});
+  peer.TakeFrom(5);
+  UploadSpool spool = Open(milliseconds(10));
+  AtlasClient client = peer.Connect();
+  EXPECT_FALSE(spool.Send(client));
+  EXPECT_EQ(peer.asked(), static_cast<int>(kKeyframes));
+  EXPECT_EQ(spool.waiting(), 5U);
+  EXPECT_FALSE(spool.Send(client));
+  EXPECT_EQ(peer.asked(), 1);
+}
+
 }  // namespace
 }  // namespace atlas
