@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -41,8 +42,9 @@ struct SendLimits {
 struct SpoolReport {
   std::uint64_t acknowledged = 0;  // and gone from the disk; duplicates among them
   std::uint64_t set_aside = 0;     // refused for good or damaged; with a .reason beside each
-  // Could not be read or set aside, or the daemon failed at them and not at others: they wait, the
-  // last kind for two more times.
+  // Could not be read, set aside or, once acknowledged, deleted, or the daemon failed at them and
+  // not at others: they wait, the last kind for two more times. What the daemon has is not sent
+  // again, but by another run of the program, and deleted by a later Send.
   std::uint64_t skipped = 0;
   std::uint64_t vanished = 0;  // removed by somebody else: forgotten
   // The first file's of those skipped or vanished, or else of the one that says which atlas was
@@ -103,7 +105,8 @@ class UploadSpool {
 
   UploadSpool(SpoolOptions options, FolderLock lock);
   Status Scan();
-  void Remove(Number number);
+  // The daemon has it. What cannot be deleted stays, is not sent again, and deleted later.
+  Status Remove(Number number);
   // Moves it out of the queue, the reason first. kNotFound: it vanished, and waits no more.
   Status SetAside(Number number, const std::string& reason);
   // The bytes that it had.
@@ -118,6 +121,7 @@ class UploadSpool {
   std::map<Number, std::uint64_t> waiting_;  // with the bytes of each
   std::map<Number, std::uint64_t> refused_;
   std::map<Number, int> failures_;      // of the daemon, at waiting ones
+  std::set<Number> undeleted_;          // waiting ones that the daemon has
   std::unique_ptr<Underway> underway_;  // null: nothing
   std::uint64_t waiting_bytes_ = 0;
   std::uint64_t refused_bytes_ = 0;

@@ -74,6 +74,7 @@ class UploadSpool::Sending {
         latest_(std::chrono::steady_clock::now() + limits.deadline) {}
 
   Result<SpoolReport> Run() {
+    RemoveAgain();
     Status link = underway_.is_round_over ? FinishRound() : Status();
     TakeAnswers();
     if (link.ok() && !underway_.is_round_over) link = SendAll();
@@ -89,7 +90,7 @@ class UploadSpool::Sending {
   Status SendAll() {
     std::vector<Number> numbers;
     for (const auto& [number, bytes] : spool_.waiting_) {
-      if (!underway_.Has(number)) numbers.push_back(number);
+      if (!underway_.Has(number) && !spool_.undeleted_.contains(number)) numbers.push_back(number);
     }
     for (const Number number : numbers) {
       if (IsSpent()) break;
@@ -168,6 +169,22 @@ class UploadSpool::Sending {
     return keyframe;
   }
 
+  void Remove(Number number) {
+    const Status removed = spool_.Remove(number);
+    if (removed.ok()) {
+      ++report_.acknowledged;
+    } else {
+      NoteProblem(removed);
+    }
+  }
+
+  // Whose files could not be deleted when they were acknowledged.
+  void RemoveAgain() {
+    for (const Number number : std::set<Number>(spool_.undeleted_)) {
+      Remove(number);
+    }
+  }
+
   void SetAside(Number number, const Status& reason) {
     const Status status =
         spool_.SetAside(number, StrCat(StatusCodeName(reason.code()), ": ", reason.message()));
@@ -193,8 +210,7 @@ class UploadSpool::Sending {
     const Number number = underway_.in_flight.at(key);
     underway_.in_flight.erase(key);
     if (answer.ok()) {
-      spool_.Remove(number);
-      ++report_.acknowledged;
+      Remove(number);
       ++underway_.taken;
       if (!underway_.is_round_over) spool_.is_probing_ = false;
     } else if (answer.code() == StatusCode::kInternal) {

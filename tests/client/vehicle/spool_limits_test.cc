@@ -65,7 +65,8 @@ class GatedPeer {
       changed_.wait(lock, [&] { return is_open_ || is_refused; });
       wire::Envelope reply;
       if (is_refused) {
-        *reply.mutable_error() = ErrorToWire({StatusCode::kUnavailable, "not now"});
+        *reply.mutable_error() =
+            ErrorToWire(Status(StatusCode::kUnavailable, "not now").WithRetryAfter(1));
       } else if (request->has_status_request()) {
         reply.mutable_status_reply();
       } else {
