@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kMaxCoordinate_m = 1e7;  // as for poses
 constexpr double kMaxLength_m = 1e8;
-constexpr std::size_t kMaxRoutePoints = 256;
 constexpr std::size_t kMaxTiles = 65'536;
 
 Status Refuse(const std::string& why) {
@@ -59,9 +58,10 @@ Status SetArea(const BoxArea& box, wire::Area& out) {
 
 Status SetArea(const CorridorArea& corridor, wire::Area& out) {
   const auto& route = corridor.route_m;
-  if (route.empty() || route.size() > kMaxRoutePoints ||
+  if (route.empty() || route.size() > CorridorArea::kMaxRoutePoints ||
       !std::all_of(route.begin(), route.end(), &IsPlace) || !IsLength(corridor.half_width_m)) {
-    return Refuse(StrCat("a route of ", route.size(), " points, expected 1 to ", kMaxRoutePoints,
+    return Refuse(StrCat("a route of ", route.size(), " points, expected 1 to ",
+                         CorridorArea::kMaxRoutePoints,
                          " within +-10000 km, and half a width of 0 to 100000 km"));
   }
   for (const Eigen::Vector2d& point_m : route) {

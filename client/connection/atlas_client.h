@@ -28,7 +28,10 @@ struct ConnectionOptions {
   std::string client_name = "libatlas_client";  // for the daemon's logs
   std::optional<MapProfile> expected_profile;   // another one: refused by the daemon
   std::optional<ConnectionTls> tls;             // none: in the clear
-  std::string token;                            // of a person; empty: none
+  // In the clear beyond loopback, too (127.0.0.0/8, ::1): whoever is on the way reads the token.
+  // Else a host that has another address is kInvalidArgument before anything is connected to.
+  bool allow_plaintext = false;
+  std::string token;  // of a person; empty: none
   // A session whose upload goes on: the handshake says how far the daemon has it
   // (AtlasIdentity::last_sequence; docs/client.md says for whom that is enough).
   std::optional<SessionKey> resume;

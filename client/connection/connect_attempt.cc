@@ -55,7 +55,9 @@ AtlasIdentity IdentityFromWire(const wire::HelloReply& reply) {
 ConnectAttempt::ConnectAttempt(const ConnectionOptions& options)
     : options_(options),
       deadline_(Clock::now() + options.connect_timeout),
-      connection_(std::in_place, options.endpoint, options.tls, NamesOf(options)) {}
+      connection_(
+          std::in_place, options.endpoint, options.tls, options.allow_plaintext, NamesOf(options)) {
+}
 ConnectAttempt::ConnectAttempt(ConnectAttempt&&) noexcept = default;
 ConnectAttempt& ConnectAttempt::operator=(ConnectAttempt&&) noexcept = default;
 ConnectAttempt::~ConnectAttempt() = default;

@@ -58,9 +58,13 @@ Status UseFiles(const ConnectionTls& tls, asio::ssl::context& context) {
 
 class DaemonConnection::Impl {
  public:
-  Impl(Endpoint endpoint, std::optional<ConnectionTls> tls, std::shared_ptr<NameLookup> names)
+  Impl(Endpoint endpoint,
+       std::optional<ConnectionTls> tls,
+       bool allow_plaintext,
+       std::shared_ptr<NameLookup> names)
       : endpoint_(std::move(endpoint)),
         tls_options_(std::move(tls)),
+        allow_plaintext_(allow_plaintext),
         names_(std::move(names)),
         socket_(io_) {}
   ~Impl() { Close(); }
@@ -91,6 +95,8 @@ class DaemonConnection::Impl {
   // Ends a stage and begins the next; false when it has not ended at `latest`.
   Result<bool> Step(Clock::time_point latest, Clock::time_point deadline);
   Result<bool> Resolve(Clock::time_point latest, Clock::time_point deadline);
+  // Whether all addresses may be connected to.
+  Status CheckAddresses();
   // One address after the other, each with an equal part of the time: of a host with several the
   // first may be one that never answers.
   void Connect(Clock::time_point deadline);
@@ -104,6 +110,7 @@ class DaemonConnection::Impl {
 
   Endpoint endpoint_;
   std::optional<ConnectionTls> tls_options_;
+  bool allow_plaintext_;
   std::shared_ptr<NameLookup> names_;
   Stage stage_ = Stage::kResolving;
   std::vector<asio::ip::tcp::endpoint> addresses_;
@@ -195,9 +202,22 @@ Result<bool> DaemonConnection::Impl::Resolve(Clock::time_point latest, Clock::ti
     const auto address = asio::ip::make_address(text, error);
     if (!error) addresses_.emplace_back(address, endpoint_.port);
   }
+  if (Status status = CheckAddresses(); !status.ok()) return Error(std::move(status));
   stage_ = Stage::kConnecting;
   Connect(deadline);
   return true;
+}
+
+Status DaemonConnection::Impl::CheckAddresses() {
+  if (tls_options_ || allow_plaintext_) return {};
+  const auto beyond = std::find_if(addresses_.begin(), addresses_.end(), [](const auto& endpoint) {
+    return !endpoint.address().is_loopback();
+  });
+  if (beyond == addresses_.end()) return {};
+  return Fail(StatusCode::kInvalidArgument,
+              StrCat(beyond->address().to_string(),
+                     " is not this machine, and nothing is sent there in the clear: expected TLS "
+                     "(--tls-ca), or that it is allowed (--allow-plaintext)"));
 }
 
 void DaemonConnection::Impl::Connect(Clock::time_point deadline) {
@@ -316,8 +336,9 @@ Result<Bytes> DaemonConnection::Impl::Receive(milliseconds timeout) {
 
 DaemonConnection::DaemonConnection(const Endpoint& endpoint,
                                    const std::optional<ConnectionTls>& tls,
+                                   bool allow_plaintext,
                                    std::shared_ptr<NameLookup> names)
-    : impl_(std::make_unique<Impl>(endpoint, tls, std::move(names))) {}
+    : impl_(std::make_unique<Impl>(endpoint, tls, allow_plaintext, std::move(names))) {}
 DaemonConnection::DaemonConnection(DaemonConnection&&) noexcept = default;
 DaemonConnection& DaemonConnection::operator=(DaemonConnection&&) noexcept = default;
 DaemonConnection::~DaemonConnection() = default;

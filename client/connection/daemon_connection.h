@@ -29,9 +29,11 @@ class DaemonConnection {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Not connected yet. `names` is asked for the endpoint's host.
+  // Not connected yet. `names` is asked for the endpoint's host. Without TLS it connects to
+  // loopback only, unless plaintext is allowed.
   DaemonConnection(const Endpoint& endpoint,
                    const std::optional<ConnectionTls>& tls,
+                   bool allow_plaintext,
                    std::shared_ptr<NameLookup> names);
 
   DaemonConnection(const DaemonConnection&) = delete;
@@ -43,7 +45,7 @@ class DaemonConnection {
   // Looks the host up, connects and encrypts: true when all that is done. False when it is not done
   // at `latest`: the next call goes on with it. kUnavailable when nobody listens there or the
   // handshake fails, kTimeout when it is not done at `deadline`. kInvalidArgument names a file that
-  // is of no use.
+  // is of no use, or an address that nothing is sent to in the clear.
   Result<bool> Open(Clock::time_point latest, Clock::time_point deadline);
   // True when all that was taken is sent. What is not sent at `latest` goes on in later calls, also
   // in those that read. kTimeout when it is not sent at `deadline`. After a failure the connection

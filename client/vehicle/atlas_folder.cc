@@ -16,7 +16,6 @@ namespace fs = std::filesystem;
 // Frozen.
 constexpr std::uint32_t kAtlasMagic = 0x41564152;  // "RAVA"
 constexpr std::uint8_t kVersion = 1;
-constexpr std::size_t kAtlasIdBytes = 16;
 
 constexpr std::size_t kMaxAtlasBytes = 4096;
 constexpr std::string_view kHexDigits = "0123456789abcdef";

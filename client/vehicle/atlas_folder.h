@@ -2,6 +2,7 @@
 // when it was opened last.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -14,8 +15,10 @@
 
 namespace atlas {
 
+inline constexpr std::size_t kAtlasIdBytes = 16;
+
 struct AtlasKey {
-  Bytes atlas_id;  // 16 bytes
+  Bytes atlas_id;  // kAtlasIdBytes
   MapProfile profile;
 
   // kInvalidArgument: an id that is none.

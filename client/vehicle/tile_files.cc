@@ -22,7 +22,6 @@ namespace fs = std::filesystem;
 // Frozen.
 constexpr std::uint32_t kTileMagic = 0x54564152;  // "RAVT"
 constexpr std::uint8_t kVersion = 1;
-constexpr std::size_t kAtlasIdBytes = 16;
 constexpr std::string_view kTileSuffix = ".tile";
 
 constexpr std::size_t kDigits = 16;

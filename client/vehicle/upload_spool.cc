@@ -3,9 +3,11 @@
 #include <string>
 #include <utility>
 
+#include "client/vehicle/atlas_link.h"
 #include "client/vehicle/numbered_files.h"
 #include "client/vehicle/spooled_keyframe.h"
 #include "client/vehicle/stored_file.h"
+#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -16,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kSuffix = ".keyframe";
 constexpr std::string_view kReasonSuffix = ".reason";
 void RemoveFile(const fs::path& path) {
-  std::error_code ignored;  // it is sent again, which the daemon takes for the duplicate that it is
+  std::error_code ignored;  // of what was refused: it is met again when the spool is opened
   fs::remove(path, ignored);
 }
 
@@ -35,6 +37,7 @@ Result<UploadSpool> UploadSpool::Open(const SpoolOptions& options) {
   Result<FolderLock> lock = FolderLock::Take(options.folder);
   if (!lock) return Error(lock.error().WithContext("upload spool"));
   UploadSpool spool(options, *std::move(lock));
+  if (!spool.options_.random) spool.options_.random = LinkEnvironment::Real().random;
   if (Status status = spool.Scan(); !status.ok()) return Error(std::move(status));
   return spool;
 }
@@ -88,12 +91,20 @@ std::uint64_t UploadSpool::Forget(Number number) {
   waiting_bytes_ -= bytes;
   waiting_.erase(found);
   failures_.erase(number);
+  undeleted_.erase(number);
   return bytes;
 }
 
-void UploadSpool::Remove(Number number) {
-  RemoveFile(PathOf(number));
+Status UploadSpool::Remove(Number number) {
+  const fs::path path = PathOf(number);
+  std::error_code error;
+  fs::remove(path, error);
+  if (error) {
+    undeleted_.insert(number);
+    return DiskError("cannot delete", path, error.value());
+  }
   Forget(number);
+  return {};
 }
 
 Status UploadSpool::SetAside(Number number, const std::string& reason) {

@@ -1,5 +1,6 @@
 // UploadSpool::Send: one run through the queue.
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,8 @@ bool IsOfTheClient(StatusCode code, const KeyframeKey& key, const AtlasIdentity&
 // What was sent on a connection and is not dealt with: it outlives the Send, and stays where it is
 // when the spool is moved. A round ends when all is answered.
 struct UploadSpool::Underway {
+  using Clock = std::chrono::steady_clock;
+
   Underway(const AtlasClient& client, UploadOptions options)
       : atlas(client.atlas()), uploader(client, WithoutPatience(std::move(options))) {}
 
@@ -47,11 +50,17 @@ struct UploadSpool::Underway {
     return std::any_of(in_flight.begin(), in_flight.end(), is_it) || failed.contains(number);
   }
 
+  std::chrono::milliseconds denied_for() const {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(denied_until - Clock::now());
+    return std::max(left, std::chrono::milliseconds(0));
+  }
+
   const AtlasIdentity atlas;  // as it was when the client connected
   std::map<KeyframeKey, Number> in_flight;
   std::vector<std::pair<KeyframeKey, Status>> answers;  // not looked at yet
   std::map<Number, Status> failed;                      // in this round: at these the daemon did
   std::uint64_t taken = 0;                              // in this round
+  Clock::time_point denied_until{};                     // the client was not allowed to upload
   bool is_round_over = false;  // something was refused that may pass: nothing more in this one
   KeyframeUploader uploader;
 };
@@ -65,6 +74,7 @@ class UploadSpool::Sending {
         latest_(std::chrono::steady_clock::now() + limits.deadline) {}
 
   Result<SpoolReport> Run() {
+    RemoveAgain();
     Status link = underway_.is_round_over ? FinishRound() : Status();
     TakeAnswers();
     if (link.ok() && !underway_.is_round_over) link = SendAll();
@@ -80,16 +90,29 @@ class UploadSpool::Sending {
   Status SendAll() {
     std::vector<Number> numbers;
     for (const auto& [number, bytes] : spool_.waiting_) {
-      if (!underway_.Has(number)) numbers.push_back(number);
+      if (!underway_.Has(number) && !spool_.undeleted_.contains(number)) numbers.push_back(number);
     }
     for (const Number number : numbers) {
       if (IsSpent()) break;
+      const Result<bool> may_go_on = AwaitProbe();
+      if (!may_go_on) return may_go_on.error();
+      if (!*may_go_on) break;
       const Result<bool> is_sent = SendOne(number);
       TakeAnswers();
       if (!is_sent) return is_sent.error();
       if (!*is_sent || underway_.is_round_over) break;
     }
     return {};
+  }
+
+  // After a refusal keyframes go one by one, until one is taken: else all would be sent to be
+  // refused once more. False: it was refused, or is not answered yet.
+  Result<bool> AwaitProbe() {
+    if (!spool_.is_probing_ || underway_.in_flight.empty()) return true;
+    const Result<bool> is_answered = underway_.uploader.FinishUntil(latest_);
+    TakeAnswers();
+    if (!is_answered || !*is_answered) return is_answered;
+    return !underway_.is_round_over;
   }
 
   bool IsSpent() const {
@@ -146,6 +169,22 @@ class UploadSpool::Sending {
     return keyframe;
   }
 
+  void Remove(Number number) {
+    const Status removed = spool_.Remove(number);
+    if (removed.ok()) {
+      ++report_.acknowledged;
+    } else {
+      NoteProblem(removed);
+    }
+  }
+
+  // Whose files could not be deleted when they were acknowledged.
+  void RemoveAgain() {
+    for (const Number number : std::set<Number>(spool_.undeleted_)) {
+      Remove(number);
+    }
+  }
+
   void SetAside(Number number, const Status& reason) {
     const Status status =
         spool_.SetAside(number, StrCat(StatusCodeName(reason.code()), ": ", reason.message()));
@@ -171,21 +210,33 @@ class UploadSpool::Sending {
     const Number number = underway_.in_flight.at(key);
     underway_.in_flight.erase(key);
     if (answer.ok()) {
-      spool_.Remove(number);
-      ++report_.acknowledged;
+      Remove(number);
       ++underway_.taken;
+      if (!underway_.is_round_over) spool_.is_probing_ = false;
     } else if (answer.code() == StatusCode::kInternal) {
       underway_.failed.emplace(number, answer);
       if (underway_.failed.size() >= kMaxFailed && underway_.taken == 0) Stop(answer);
-    } else if (IsTemporary(answer.code()) || IsOfTheClient(answer.code(), key, underway_.atlas)) {
+    } else if (IsOfTheClient(answer.code(), key, underway_.atlas)) {
+      if (!underway_.is_round_over) Deny();
+      Stop(answer);
+    } else if (IsTemporary(answer.code())) {
       Stop(answer);
     } else {
       SetAside(number, answer);
     }
   }
 
+  // As the link does when it is not let in.
+  void Deny() {
+    const double part = 0.5 + 0.5 * spool_.options_.random();
+    const double most_ms = static_cast<double>(spool_.options_.denied_delay.count());
+    underway_.denied_until =
+        Underway::Clock::now() + std::chrono::milliseconds(std::llround(part * most_ms));
+  }
+
   void Stop(const Status& why) {
     underway_.is_round_over = true;
+    spool_.is_probing_ = true;
     if (failure_.ok()) failure_ = why;
   }
 
@@ -214,7 +265,7 @@ class UploadSpool::Sending {
 };
 
 UploadSpool::UploadSpool(SpoolOptions options, FolderLock lock)
-    : options_(std::move(options)), lock_(std::move(lock)) {}
+    : options_(std::move(options)), lock_(std::move(lock)), sent_to_(options_.folder) {}
 UploadSpool::UploadSpool(UploadSpool&&) noexcept = default;
 UploadSpool& UploadSpool::operator=(UploadSpool&&) noexcept = default;
 UploadSpool::~UploadSpool() = default;
@@ -223,19 +274,20 @@ Result<SpoolReport> UploadSpool::Send(AtlasClient& client, const SendLimits& lim
   const bool is_same = underway_ != nullptr && underway_->uploader.IsOf(client);
   SpoolReport held_back;
   held_back.retry_after = client.retry_after();
+  if (is_same) held_back.retry_after = std::max(held_back.retry_after, underway_->denied_for());
   if (held_back.retry_after.count() > 0) {
     held_back.waiting = waiting();
     held_back.in_flight = is_same ? underway_->in_flight.size() : 0;
     return held_back;
   }
   if (!is_same) underway_ = std::make_unique<Underway>(client, options_.upload);
-  const std::uint64_t epoch = client.atlas().epoch;
-  const bool is_restored = epoch_ != 0 && epoch != epoch_;
+  const bool is_restored = sent_to_.IsAnother(client.atlas());
   Result<SpoolReport> report = Sending(*this, limits).Run();
-  if (report) {
-    report->is_restored = is_restored;
-    epoch_ = epoch;
-  }
+  if (!report) return report;
+  report->is_restored = is_restored;
+  sent_to_.Note(client.atlas());
+  const Status unknown = sent_to_.TakeProblem();
+  if (report->problem.ok()) report->problem = unknown;
   return report;
 }
 

@@ -1,6 +1,7 @@
 // A part of the map that somebody asks for. Metres in the world frame.
 #pragma once
 
+#include <cstddef>
 #include <variant>
 #include <vector>
 
@@ -18,8 +19,10 @@ struct BoxArea {
   Eigen::Vector2d min_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d max_m = Eigen::Vector2d::Zero();
 };
-// Within half a width of a route that begins where the vehicle is, of 1 to 256 points.
+// Within half a width of a route that begins where the vehicle is, of 1 to kMaxRoutePoints points.
 struct CorridorArea {
+  static constexpr std::size_t kMaxRoutePoints = 256;
+
   std::vector<Eigen::Vector2d> route_m;
   double half_width_m = 0.0;
 };

@@ -24,13 +24,15 @@ struct CommonFlags {
   bool is_json = false;
   std::string server;
   ConnectionTls tls;
+  bool allow_plaintext = false;
   std::string token_file;
   std::optional<std::string> atlas_file;
 };
 
 // What says where a daemon is and who asks it.
-constexpr std::array kDaemonFlags = {"--server",  "--tls-ca",   "--tls-certificate",
-                                     "--tls-key", "--tls-name", "--token-file"};
+constexpr std::array kDaemonFlags = {"--server",    "--tls-ca",   "--tls-certificate",
+                                     "--tls-key",   "--tls-name", "--allow-plaintext",
+                                     "--token-file"};
 
 // CLI11 takes "-3" for a number but "-.5" for an option "-.".
 std::string WithLeadingZero(const std::string& argument) {
@@ -65,6 +67,11 @@ void AddCommonFlags(CLI::App& app, CommonFlags& common) {
                  "The daemon's name in its certificate [ATLAS_TLS_NAME, else the host]")
       ->envname("ATLAS_TLS_NAME")
       ->type_name("NAME")
+      ->group("Security");
+  app.add_flag("--allow-plaintext", common.allow_plaintext,
+               "Speak without TLS beyond loopback, too [ATLAS_ALLOW_PLAINTEXT]")
+      ->disable_flag_override()
+      ->envname("ATLAS_ALLOW_PLAINTEXT")
       ->group("Security");
   add_file("--token-file", "ATLAS_TOKEN_FILE", common.token_file, "Holds our token");
 }
@@ -162,10 +169,12 @@ Result<ConnectionOptions> ConnectionFrom(const CommonFlags& common, const Comman
   options.client_name = "atlas";
   if (!common.tls.ca.empty()) {
     options.tls = common.tls;
-  } else if (!common.tls.certificate.empty() || !common.tls.key.empty()) {
+  } else if (!common.tls.certificate.empty() || !common.tls.key.empty() ||
+             !common.tls.daemon_name.empty()) {
     return Error(StatusCode::kInvalidArgument,
-                 "a certificate is shown over TLS only: expected --tls-ca, too");
+                 "--tls-certificate, --tls-key and --tls-name are of TLS: expected --tls-ca, too");
   }
+  options.allow_plaintext = common.allow_plaintext;
   if (common.tls.certificate.empty() != common.tls.key.empty()) {
     return Error(StatusCode::kInvalidArgument,
                  "--tls-certificate and --tls-key: one without the other is of no use");

@@ -9,7 +9,7 @@ import atlas_pb2
 from roadatlas.changes import Changes
 from roadatlas.client import AtlasClient
 from roadatlas.command_line import connect, parse_arguments
-from roadatlas.errors import BadCredentials, RoadAtlasError
+from roadatlas.errors import BadCredentials, PlaintextRefused, RoadAtlasError
 from roadatlas.geometry import disc, tile_place
 from roadatlas.profile import parse_profile
 from roadatlas.sync_reply import SyncReply
@@ -81,7 +81,7 @@ def main() -> int:
     try:
         with connect(arguments) as client:
             {"status": print_status, "sync": sync_area, "watch": watch_area}[arguments.command](client, arguments)
-    except BadCredentials as error:
+    except (BadCredentials, PlaintextRefused) as error:
         print(f"roadatlas: {error}", file=sys.stderr)
         return 2
     except (RoadAtlasError, OSError) as error:

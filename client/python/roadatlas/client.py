@@ -42,14 +42,15 @@ class AtlasClient:
     """A connection after its handshake. `hello` is what the daemon said of itself."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 7447, *, client_name: str = "python",
-                 profile: bytes = b"", tls: Tls | None = None, token: str = "",
+                 profile: bytes = b"", tls: Tls | None = None, allow_plaintext: bool = False, token: str = "",
                  resume: tuple[str, str] | None = None, connect_timeout_s: float = 5.0, timeout_s: float = 30.0,
                  protocol_major: int = PROTOCOL_MAJOR) -> None:
         """`timeout_s` bounds each request, on top of the time that the request itself allows the daemon. `resume`: the
-        vehicle and session that are going to be uploaded, or gone on with."""
+        vehicle and session that are going to be uploaded, or gone on with. Without `tls` only this machine is connected
+        to (else PlaintextRefused), unless `allow_plaintext`: whoever is on the way reads the token."""
         self._timeout_s = timeout_s
         self._awaited: dict[int, str] = {}  # what answers each request that was submitted
-        self._connection = Connection(host, port, connect_timeout_s, tls)
+        self._connection = Connection(host, port, connect_timeout_s, tls, allow_plaintext)
         try:
             self.hello: atlas_pb2.HelloReply = self._call(atlas_pb2.Hello(
                 protocol_major=protocol_major, protocol_minor=PROTOCOL_MINOR, client_name=client_name,

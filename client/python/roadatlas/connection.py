@@ -25,8 +25,8 @@ _LAST_STAGES = (atlas_pb2.BackupReply.UNKNOWN, atlas_pb2.BackupReply.DONE)  # th
 class Connection:
     """Closed by `close`, or by leaving a `with` block."""
 
-    def __init__(self, host: str, port: int, timeout_s: float, tls: Tls | None = None) -> None:
-        self._transport = Transport(host, port, timeout_s, tls)
+    def __init__(self, host: str, port: int, timeout_s: float, tls: Tls | None, allow_plaintext: bool) -> None:
+        self._transport = Transport(host, port, timeout_s, tls, allow_plaintext)
         self._was_heard = tls is not None
         self._reader = FrameReader()
         self._to_send = bytearray()

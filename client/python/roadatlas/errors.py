@@ -49,6 +49,10 @@ class BadCredentials(RoadAtlasError):
     """A certificate, key or token file that is of no use, or half of what it takes: a setting of ours."""
 
 
+class PlaintextRefused(RoadAtlasError):
+    """The host is another machine, and nothing is sent there in the clear unless that is allowed: a setting of ours."""
+
+
 class TlsFailed(RoadAtlasError):
     """TLS could not begin, or was ended by the daemon: it fails again until a setting changes, here or there."""
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 import atlas_pb2
 
 from roadatlas.client import AtlasClient
-from roadatlas.errors import ConnectionLost, DeadlinePassed, FrameCut, RequestRefused, RoadAtlasError
+from roadatlas.errors import Code, ConnectionLost, DeadlinePassed, FrameCut, RequestRefused, RoadAtlasError
 
 ON_THEIR_WAY = 32  # keyframes sent and not answered
 _LONGEST_PAUSE_S = 30.0
@@ -41,7 +41,9 @@ class SessionUploader:
         self._first_pause_s = first_pause_s
 
     def upload(self, uploads: Iterable[atlas_pb2.UploadKeyframe]) -> UploadReport:
-        """All of them, by sequence number. Raises why it gave up; what is on disk is not sent by the next call."""
+        """All of them, by sequence number. Raises why it gave up, RequestRefused at once for a client that may not
+        upload at all: nothing is wrong with its keyframes, and whoever has them keeps them. What is on disk is not
+        sent by the next call."""
         work = _Work(uploads, self._vehicle, self._session, self._rising)
         failures = 0
         while work.waiting:
@@ -68,6 +70,8 @@ class SessionUploader:
             return error
         except (ConnectionLost, DeadlinePassed, FrameCut) as error:
             return error
+        if work.denied is not None:
+            raise work.denied
         return next(iter(work.postponed.values()), None)
 
     def _pause_s(self, failures: int, failure: RoadAtlasError) -> float:
@@ -85,6 +89,7 @@ class _Work:
         self._rising = rising
         self.waiting: dict[int, atlas_pb2.UploadKeyframe] = {}
         self.postponed: dict[int, RequestRefused] = {}
+        self.denied: RequestRefused | None = None  # not the keyframe, but whoever sends it
         self.report = UploadReport()
         for upload in sorted(uploads, key=lambda upload: upload.key.sequence):
             if (upload.key.vehicle, upload.key.session) != (vehicle, session) or upload.key.sequence in self.waiting:
@@ -118,6 +123,8 @@ class _Work:
                 on_their_way.append((sequence, client.submit(upload)))
                 if len(on_their_way) >= ON_THEIR_WAY:
                     self._take_reply(client, *on_their_way.popleft())
+                if self.denied is not None:
+                    break
         finally:  # what was answered before the connection broke counts
             while on_their_way:
                 self._take_reply(client, *on_their_way.popleft())
@@ -131,8 +138,15 @@ class _Work:
             if refusal.retry:
                 self.postponed[sequence] = refusal
                 return
+            if refusal.code == Code.PERMISSION_DENIED and not self._is_of_another(client, sequence):
+                self.denied = refusal
+                return
             self.report.refused[sequence] = refusal
         else:
             (self.report.there_already if reply.duplicate else self.report.acknowledged).append(sequence)
         del self.waiting[sequence]
         self.postponed.pop(sequence, None)
+
+    def _is_of_another(self, client: AtlasClient, sequence: int) -> bool:
+        """A vehicle uploads under its own name: the keyframe of another comes under the wrong one whenever it comes."""
+        return client.role == "vehicle" and client.name not in ("", self.waiting[sequence].key.vehicle)

@@ -1,11 +1,12 @@
 """Bytes to a daemon and back, in the clear or within TLS, as far as they go without waiting. For one thread."""
 
+import ipaddress
 import selectors
 import socket
 import ssl
 import time
 
-from roadatlas.errors import ConnectionLost
+from roadatlas.errors import ConnectionLost, PlaintextRefused
 from roadatlas.tls import Tls, start_tls, tls_failure
 
 _PROBE_AFTER_S, _PROBE_EVERY_S, _PROBES = 30, 15, 6  # a peer that is gone is noticed after 2 min
@@ -15,10 +16,14 @@ _CHUNK_BYTES = 1 << 16
 class Transport:
     """Closed by `close`. ConnectionLost, TlsFailed."""
 
-    def __init__(self, host: str, port: int, timeout_s: float, tls: Tls | None) -> None:
-        """`timeout_s` bounds the connection and the handshake, each."""
+    def __init__(self, host: str, port: int, timeout_s: float, tls: Tls | None, allow_plaintext: bool) -> None:
+        """`timeout_s` bounds the connection to each address of the host, and the handshake. PlaintextRefused: without
+        TLS, for a host that has an address beyond loopback (127.0.0.0/8, ::1), unless that is allowed."""
         try:
-            self._socket = socket.create_connection((host, port), timeout=timeout_s)
+            addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+            if tls is None and not allow_plaintext:
+                _refuse_beyond_loopback(addresses)
+            self._socket = _connect_to_any(addresses, timeout_s)
         except OSError as error:
             raise ConnectionLost(f"{host}:{port}: {error}") from error
         try:
@@ -75,6 +80,28 @@ class Transport:
             except (OSError, ValueError):
                 pass  # it would have to wait for the daemon, or that is gone already
         self._socket.close()
+
+
+def _refuse_beyond_loopback(addresses: list[tuple]) -> None:
+    for *_, (address, *_) in addresses:
+        if not ipaddress.ip_address(address).is_loopback:
+            raise PlaintextRefused(f"{address} is not this machine, and nothing is sent there in the clear: expected "
+                                   "TLS (--tls-ca), or that it is allowed (--allow-plaintext)")
+
+
+def _connect_to_any(addresses: list[tuple], timeout_s: float) -> socket.socket:
+    """To the first that takes us. OSError of the last one."""
+    for number, (family, kind, protocol, _, address) in enumerate(addresses, 1):
+        connecting = socket.socket(family, kind, protocol)
+        try:
+            connecting.settimeout(timeout_s)
+            connecting.connect(address)
+            return connecting
+        except BaseException as error:
+            connecting.close()
+            if number == len(addresses) or not isinstance(error, OSError):
+                raise
+    raise OSError("no address")
 
 
 def _probe_when_silent(connected: socket.socket) -> None:

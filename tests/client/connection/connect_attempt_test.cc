@@ -158,6 +158,68 @@ TEST(ConnectAttemptTest, AHostWithAnAddressThatIsDeadIsReachedAtTheNextOne) {
   EXPECT_EQ(ToTheEnd(options).failure.code(), StatusCode::kUnavailable);
 }
 
+// Addresses that are not loopback's, and that nothing leaves the machine for.
+TEST(ConnectAttemptTest, NothingGoesBeyondLoopbackInTheClear) {
+  GatedResolver resolver;
+  ConnectionOptions options;
+  options.endpoint.host = "daemon";
+  options.token = "secret";
+  options.names = std::make_shared<NameLookup>(resolver.resolver());
+  for (const NameLookup::Addresses& addresses :
+       {NameLookup::Addresses{"0.0.0.0"}, NameLookup::Addresses{"127.0.0.1", "0.0.0.0"},
+        NameLookup::Addresses{"::"}, NameLookup::Addresses{"224.0.0.1"},
+        NameLookup::Addresses{"255.255.255.255"}}) {
+    resolver.Answer(addresses);
+    const ConnectProgress progress = ConnectAttempt(options).Continue(kLong);
+    EXPECT_EQ(progress.failure.code(), StatusCode::kInvalidArgument) << addresses.back();
+    EXPECT_TRUE(progress.is_final);
+    for (const std::string& says :
+         {addresses.back(), std::string("--tls-ca"), std::string("--allow-plaintext")}) {
+      EXPECT_NE(progress.failure.message().find(says), std::string::npos)
+          << progress.failure.message();
+    }
+  }
+}
+
+// The system takes 0.0.0.0 for this machine.
+TEST(ConnectAttemptTest, BeyondLoopbackWithTlsOrWhereItIsAllowedItConnects) {
+  const TestPeer peer([](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    socket.Drain();
+  });
+  ConnectionOptions options = peer.options();
+  options.endpoint.host = "0.0.0.0";
+  options.allow_plaintext = true;
+  const ConnectProgress progress = ToTheEnd(options);
+  EXPECT_TRUE(progress.client) << progress.failure.message();
+
+  const TestPeer other([](PeerSocket& socket) { socket.Drain(); });
+  ConnectionOptions encrypted = other.options();
+  encrypted.endpoint.host = "0.0.0.0";
+  encrypted.tls = ConnectionTls{"nowhere.pem", {}, {}, {}};
+  const Status failure = ToTheEnd(encrypted).failure;
+  EXPECT_NE(failure.message().find("nowhere.pem"), std::string::npos) << failure.message();
+}
+
+TEST(ConnectAttemptTest, AllThatIsLoopbackIsReachedInTheClear) {
+  for (const std::string host : {"127.0.0.1", "localhost"}) {
+    const TestPeer peer([](PeerSocket& socket) {
+      AnswerHello(socket, {});
+      socket.Drain();
+    });
+    ConnectionOptions options = peer.options();
+    options.endpoint.host = host;
+    const ConnectProgress progress = ToTheEnd(options);
+    EXPECT_TRUE(progress.client) << progress.failure.message();
+  }
+  // Nobody listens there.
+  for (const std::string host : {"127.3.2.1", "::1"}) {
+    ConnectionOptions options;
+    options.endpoint = {host, 1};
+    EXPECT_EQ(ToTheEnd(options).failure.code(), StatusCode::kUnavailable) << host;
+  }
+}
+
 // Somebody listens and takes nobody in: the system drops who comes, without a word.
 TEST(ConnectAttemptTest, AHostWithAnAddressThatNeverAnswersIsReachedAtTheNextOne) {
   GatedResolver resolver;

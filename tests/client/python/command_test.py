@@ -52,6 +52,25 @@ class CommandTest(AtlasCase):
         done = self.run_command("watch", "--disc", 0, 0, 50, "--seconds", 0.2)
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "from revision 0 on\n", ""))
 
+    def test_wrong_numbers_are_wrong_usage(self):
+        out = self.enterContext(tempfile.TemporaryDirectory())
+        disc = ("--disc", 0, 0, 5)
+        for words in (("--disc", 0, 0, -5), ("--disc", 2e7, 0, 5), ("--disc", "nan", 0, 5), ("--disc", 0, "inf", 5),
+                      ("--disc", 0, 0, "1e300"), ("--disc", "1e300", 0, 5), ("--disc", 0, "-1e300", 5),
+                      ("--disc", 0, 0, "x"), ("--disc", 0, 0), (*disc, "--sections", -3), (*disc, "--sections", 1.5),
+                      (*disc, "--budget", -1), (*disc, "--budget", 1 << 64), (*disc, "--finest", -1)):
+            self.wrong("sync", "--out", out, *words)
+        for words in (("--interval", "nan"), ("--interval", -1), ("--interval", "1e300"), ("--seconds", "nan"),
+                      ("--seconds", "inf"), ("--seconds", -1)):
+            self.wrong("watch", *disc, *words)
+        for server in ("127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:\u00b2"):
+            self.wrong("status", server=server)
+
+    def wrong(self, *words, server=None):
+        done = self.run_command(*words, server=server)
+        self.assertEqual((done.returncode, done.stdout), (2, ""), (words, done.stderr))
+        self.assertRegex(done.stderr, r"\Aroadatlas: .+\n\Z")
+
     def test_failures_say_why(self):
         out = self.enterContext(tempfile.TemporaryDirectory())
         refused = self.run_command("sync", "--disc", 0, 0, 5, "--out", out, "--finest", 99)

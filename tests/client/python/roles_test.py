@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """Who may ask for what, as docs/protocol.md has it. A refusal leaves the connection as it was."""
 
+import functools
 import signal
 import unittest
 
 import atlas_pb2
 from fleet import FleetCase, keyframe_of
-from roadatlas import Code, RequestRefused, geometry
+from roadatlas import AtlasClient, Code, RequestRefused, SessionUploader, geometry
 from roadatlas.errors import ConnectionLost
 from support import pose_at
 
@@ -35,6 +36,23 @@ class RolesTest(FleetCase):
         self.car.upload_keyframe(keyframe_of("car.7", self.car))
         self.admin.upload_keyframe(keyframe_of("car.8", self.admin))
         self.assertEqual(self.reader.status().keyframes, 2)
+
+    def connecting(self, who):
+        host, port = self.daemon.server.rsplit(":", 1)
+        return functools.partial(AtlasClient, host, int(port), tls=self.tls(who))
+
+    def test_an_uploader_refuses_nothing_where_the_client_may_not_upload(self):
+        keyframes = [keyframe_of("car.7", self.car)]
+        for who in ("aligner", "reader"):
+            uploader = SessionUploader(self.connecting(who), "car.7", "s", first_pause_s=0.01)
+            with self.assertRaises(RequestRefused) as caught:
+                uploader.upload(keyframes)
+            self.assertEqual(caught.exception.code, Code.PERMISSION_DENIED)
+        # The keyframe of another name is refused itself.
+        uploader = SessionUploader(self.connecting("car.7"), "car.8", "s")
+        self.assertEqual(list(uploader.upload([keyframe_of("car.8", self.car)]).refused), [0])
+        uploader = SessionUploader(self.connecting("car.7"), "car.7", "s")
+        self.assertEqual(uploader.upload(keyframes).acknowledged, [0])
 
     def test_poses(self):
         for vehicle in ("car.7", "car.8"):

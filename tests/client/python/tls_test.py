@@ -11,8 +11,10 @@ import time
 import unittest
 
 from fleet import NAME, FleetCase
-from roadatlas import AtlasClient, Code, RequestRefused
-from roadatlas.errors import BadCredentials, CertificateRefused, ConnectionLost, TlsFailed, UntrustedDaemon
+from roadatlas import AtlasClient, Code, RequestRefused, Tls
+from roadatlas.errors import (BadCredentials, CertificateRefused, ConnectionLost, PlaintextRefused, TlsFailed,
+                              UntrustedDaemon)
+from support import AtlasCase
 
 
 class DaemonTest(FleetCase):
@@ -120,6 +122,38 @@ class CredentialsTest(FleetCase):
                 self.connect(tls)
 
 
+class PlaintextTest(AtlasCase):
+    """0.0.0.0 and :: are no loopback addresses, and the system takes them for this machine."""
+
+    def test_nothing_goes_beyond_loopback(self):
+        for host in ("0.0.0.0", "::", "224.0.0.1", "255.255.255.255"):
+            with self.assertRaisesRegex(PlaintextRefused, f"^{host} is not this machine.*--tls-ca.*--allow-plaintext"):
+                AtlasClient(host, self.port, token="secret")
+
+    def test_unless_it_is_allowed_or_within_tls(self):
+        with AtlasClient("0.0.0.0", self.port, allow_plaintext=True) as client:
+            self.assertEqual(client.status().keyframes, 0)
+        with self.assertRaisesRegex(BadCredentials, "none.pem"):
+            AtlasClient("0.0.0.0", self.port, tls=Tls(self.work / "none.pem"))
+
+    def test_loopback_is_reached(self):
+        for host in ("127.0.0.1", "localhost"):
+            with AtlasClient(host, self.port) as client:
+                self.assertEqual(client.status().keyframes, 0)
+
+    def test_command(self):
+        server = ("status", "--server", f"0.0.0.0:{self.port}")
+        for arguments, environment, code in (((), {}, 2), (("--allow-plaintext",), {}, 0),
+                                             ((), {"ATLAS_ALLOW_PLAINTEXT": "true"}, 0),
+                                             ((), {"ATLAS_ALLOW_PLAINTEXT": "false"}, 2),
+                                             ((), {"ATLAS_ALLOW_PLAINTEXT": "perhaps"}, 2)):
+            for words in ((*server, *arguments), (*arguments, *server)):
+                done = subprocess.run([sys.executable, "-B", "-m", "roadatlas", *words], capture_output=True, text=True,
+                                      env={**os.environ, **environment}, check=False, timeout=60)
+                self.assertEqual(done.returncode, code, done.stderr)
+                self.assertRegex(done.stderr, r"\Aroadatlas: .*\n\Z" if code else r"\A\Z")
+
+
 class CommandTest(FleetCase):
     """Flags and environment are those of `atlas`."""
 
@@ -148,6 +182,7 @@ class CommandTest(FleetCase):
         server = ("status", "--server", self.daemon.server)
         for arguments, code, says in (
                 (("--tls-certificate", "car.7.pem"), 2, "expected --tls-ca"),
+                (("--tls-name", NAME), 2, "expected --tls-ca"),
                 (("--tls-ca", "ca.pem", "--tls-key", "car.7.key"), 2, "without the other"),
                 (("--tls-ca", "none.pem"), 2, "none.pem"),
                 (("--tls-ca", "ca.pem", "--token-file", "none.token"), 2, "there is no token in"),

@@ -79,15 +79,18 @@ ConnectionOptions TestPeer::options() const {
   return options;
 }
 
-void AnswerHello(PeerSocket& socket, const MapProfile& profile, const PeerIdentity& client) {
+void AnswerHello(PeerSocket& socket,
+                 const MapProfile& profile,
+                 const PeerIdentity& client,
+                 const PeerAtlas& atlas) {
   const auto request = socket.ReadRequest();
   if (!request) return;
   wire::Envelope reply;
   wire::HelloReply& hello = *reply.mutable_hello_reply();
   hello.set_protocol_major(kProtocolMajor);
   hello.set_profile(ProfileToWire(profile));
-  hello.set_atlas_id(std::string(16, 'a'));
-  hello.set_epoch(1);
+  hello.set_atlas_id(atlas.id);
+  hello.set_epoch(atlas.epoch);
   hello.set_revision(7);
   hello.set_name(client.name);
   hello.set_role(client.role);

@@ -56,7 +56,16 @@ struct PeerIdentity {
   std::string role;
 };
 
+// Which atlas it has.
+struct PeerAtlas {
+  std::string id = std::string(16, 'a');
+  std::uint64_t epoch = 1;
+};
+
 // Reads the Hello and answers as a daemon with this profile.
-void AnswerHello(PeerSocket& socket, const MapProfile& profile, const PeerIdentity& client = {});
+void AnswerHello(PeerSocket& socket,
+                 const MapProfile& profile,
+                 const PeerIdentity& client = {},
+                 const PeerAtlas& atlas = {});
 
 }  // namespace atlas

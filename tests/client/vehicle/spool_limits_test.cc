@@ -37,7 +37,7 @@ class GatedPeer {
     is_asleep_ = is_asleep;
     changed_.notify_all();
   }
-  // Once, and at once: the next upload is not for this client.
+  // Once, and at once: the next upload.
   void RefuseNext() {
     const std::lock_guard lock(mutex_);
     refuses_ = true;
@@ -65,7 +65,8 @@ class GatedPeer {
       changed_.wait(lock, [&] { return is_open_ || is_refused; });
       wire::Envelope reply;
       if (is_refused) {
-        *reply.mutable_error() = ErrorToWire({StatusCode::kPermissionDenied, "not you"});
+        *reply.mutable_error() =
+            ErrorToWire(Status(StatusCode::kUnavailable, "not now").WithRetryAfter(1));
       } else if (request->has_status_request()) {
         reply.mutable_status_reply();
       } else {
@@ -190,7 +191,7 @@ TEST_F(SpoolLimitsTest, ARoundThatARefusalEndedEndsInTheNextCallWhichBeginsAnoth
   peer_.Set(false, false);
   const auto refused = spool_.Send(client, {.deadline = kDeadline});
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code(), StatusCode::kPermissionDenied);
+  EXPECT_EQ(refused.error().code(), StatusCode::kUnavailable);
   peer_.Set(true, false);
   const SpoolReport report = Send(client, {});
   EXPECT_EQ(report.acknowledged, 3U);

@@ -24,10 +24,12 @@ class UploadPeer {
  public:
   explicit UploadPeer(std::map<std::uint32_t, Status> refusals = {},
                       int answers = 1 << 30,
-                      PeerIdentity client = {})
+                      PeerIdentity client = {},
+                      PeerAtlas atlas = {})
       : refusals_(std::move(refusals)),
         answers_(answers),
         client_(std::move(client)),
+        atlas_(std::move(atlas)),
         peer_([this](PeerSocket& socket) { Serve(socket); }) {}
 
   Result<SpoolReport> Take(UploadSpool& spool) {
@@ -42,7 +44,7 @@ class UploadPeer {
 
  private:
   void Serve(PeerSocket& socket) {
-    AnswerHello(socket, {}, client_);
+    AnswerHello(socket, {}, client_, atlas_);
     while (const auto request = socket.ReadRequest()) {
       if (answers_-- <= 0) return;
       const std::uint32_t sequence = request->upload_keyframe().key().sequence();
@@ -62,6 +64,7 @@ class UploadPeer {
   std::map<std::uint32_t, Status> refusals_;
   int answers_;
   PeerIdentity client_;
+  PeerAtlas atlas_;
   std::mutex mutex_;
   std::vector<std::uint32_t> came_;
   TestPeer peer_;
@@ -102,11 +105,13 @@ inline std::vector<std::uint32_t> UpTo(std::uint32_t count) {
   return numbers;
 }
 
+// But for those that are no keyframes.
 inline std::vector<fs::path> FilesOf(const fs::path& folder) {
   std::vector<fs::path> paths;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    const bool is_lock = entry.path().filename() == "lock";
-    if (entry.is_regular_file() && !is_lock) paths.push_back(entry.path());
+    const fs::path name = entry.path().filename();
+    if (entry.is_regular_file() && name != "lock" && name != kSentAtlasFileName)
+      paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
   return paths;

@@ -177,6 +177,52 @@ TEST(UploadSpoolTest, WhatCannotBeSetAsideWaitsAndTheOthersAreSent) {
   EXPECT_EQ(spool.waiting(), 2U);
 }
 
+// While it is on its way a folder that is not empty takes the place of its file.
+TEST(UploadSpoolTest, WhatCannotBeDeletedIsToldNotSentAgainAndDeletedLater) {
+  const TestFolder folder;
+  UploadSpool spool = OpenSpool(folder);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    ASSERT_TRUE(PutOne(spool, i).ok());
+  }
+  const fs::path path = FilesOf(folder.path()).at(1);
+  std::vector<std::uint32_t> came;
+  {
+    TestPeer peer([&came, &path](PeerSocket& socket) {
+      AnswerHello(socket, {});
+      while (const auto request = socket.ReadRequest()) {
+        came.push_back(request->upload_keyframe().key().sequence());
+        if (came.back() == 1) {
+          fs::remove(path);
+          fs::create_directories(path / "in the way");
+        }
+        wire::Envelope reply;
+        reply.mutable_upload_reply()->set_revision(1);
+        socket.Reply(request->request_id(), std::move(reply));
+      }
+    });
+    auto client = AtlasClient::Connect(peer.options());
+    ASSERT_TRUE(client) << client.error().message();
+    for (const std::uint64_t acknowledged : {2U, 0U}) {
+      const auto report = spool.Send(*client);
+      ASSERT_TRUE(report) << report.error().message();
+      EXPECT_EQ(report->acknowledged, acknowledged);
+      EXPECT_EQ(report->skipped, 1U);
+      EXPECT_NE(report->problem.message().find(path.string()), std::string::npos);
+      EXPECT_EQ(report->waiting, 1U);
+      EXPECT_GT(spool.waiting_bytes(), 0U);
+    }
+    fs::remove(path / "in the way");
+    const auto report = spool.Send(*client);
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->acknowledged, 1U);
+    EXPECT_TRUE(report->problem.ok());
+    EXPECT_EQ(report->waiting, 0U);
+  }
+  EXPECT_EQ(came, UpTo(3));
+  EXPECT_FALSE(fs::exists(path));
+  EXPECT_EQ(spool.waiting_bytes(), 0U);
+}
+
 // A file at every length that a write can stop at.
 TEST(UploadSpoolTest, AFileCutAnywhereIsNeverSent) {
   const TestFolder folder;

@@ -1,6 +1,7 @@
 // Arguments to commands to exit codes, with commands that only record what they were given.
 #include "client/cli/command_line/command_line.h"
 
+#include <cstdlib>
 #include <sstream>
 
 #include <boost/json/parse.hpp>
@@ -21,6 +22,8 @@ struct Recorded {
   bool is_rebuild = false;
   bool is_json = false;
   Endpoint server;
+  bool allows_plaintext = false;
+  bool has_tls = false;
   std::optional<std::filesystem::path> atlas_file;
   int runs = 0;
 };
@@ -48,6 +51,8 @@ class RecordingCommand : public Command {
     ++recorded_.runs;
     recorded_.is_json = context.is_json;
     recorded_.server = context.connection.endpoint;
+    recorded_.allows_plaintext = context.connection.allow_plaintext;
+    recorded_.has_tls = context.connection.tls.has_value();
     recorded_.atlas_file = context.atlas_file;
     return status_;
   }
@@ -208,6 +213,32 @@ TEST(CommandLineTest, ServerComesFromFlagThenEnvironmentThenDefault) {
   EXPECT_EQ(RunWith({"point", "1", "2"}, {}, "junk").code, ExitCode::kUsage);
 }
 
+TEST(CommandLineTest, PlaintextBeyondLoopbackIsAllowedByFlagOrEnvironment) {
+  EXPECT_FALSE(RunWith({"point", "1", "2"}).recorded.allows_plaintext);
+  EXPECT_TRUE(RunWith({"point", "1", "2", "--allow-plaintext"}).recorded.allows_plaintext);
+  for (const auto& [value, is_allowed] :
+       {std::pair("true", true), std::pair("1", true), std::pair("false", false),
+        std::pair("0", false), std::pair("", false)}) {
+    ASSERT_EQ(setenv("ATLAS_ALLOW_PLAINTEXT", value, 1), 0);
+    const Outcome outcome = RunWith({"point", "1", "2"});
+    EXPECT_EQ(outcome.code, ExitCode::kSuccess) << value << ": " << outcome.err;
+    EXPECT_EQ(outcome.recorded.allows_plaintext, is_allowed) << value;
+  }
+  ASSERT_EQ(setenv("ATLAS_ALLOW_PLAINTEXT", "perhaps", 1), 0);
+  EXPECT_EQ(RunWith({"point", "1", "2"}).code, ExitCode::kUsage);
+  ASSERT_EQ(unsetenv("ATLAS_ALLOW_PLAINTEXT"), 0);
+}
+
+TEST(CommandLineTest, WhatIsOfTlsIsOfNoUseWithoutIt) {
+  for (const std::string flag : {"--tls-name", "--tls-certificate", "--tls-key"}) {
+    const Outcome outcome = RunWith({"point", "1", "2", flag, "x"});
+    EXPECT_EQ(outcome.code, ExitCode::kUsage) << flag;
+    EXPECT_EQ(outcome.recorded.runs, 0) << flag;
+    EXPECT_NE(outcome.err.find("--tls-ca"), std::string::npos) << outcome.err;
+  }
+  EXPECT_TRUE(RunWith({"point", "1", "2", "--tls-ca", "x", "--tls-name", "y"}).recorded.has_tls);
+}
+
 TEST(CommandLineTest, AnAtlasFileStandsForTheDaemon) {
   EXPECT_EQ(RunWith({"point", "1", "2"}).recorded.atlas_file, std::nullopt);
   const Outcome outcome = RunWith({"point", "1", "2", "--atlas", "a/b.db"}, {}, "junk");
@@ -220,8 +251,8 @@ TEST(CommandLineTest, AnAtlasFileStandsForTheDaemon) {
 
 TEST(CommandLineTest, AnAtlasFileAndADaemonExcludeEachOther) {
   const std::vector<std::vector<std::string>> daemons = {
-      {"--server", "a:1"},     {"--server=a:1"},   {"--tls-ca", "x"},    {"--tls-name", "x"},
-      {"--tls-certificate=x"}, {"--tls-key", "x"}, {"--token-file", "x"}};
+      {"--server", "a:1"},     {"--server=a:1"},   {"--tls-ca", "x"},     {"--tls-name", "x"},
+      {"--tls-certificate=x"}, {"--tls-key", "x"}, {"--token-file", "x"}, {"--allow-plaintext"}};
   for (const auto& daemon : daemons) {
     std::vector<std::string> arguments = {"point", "1", "2", "--atlas", "a.db"};
     arguments.insert(arguments.end(), daemon.begin(), daemon.end());
