@@ -286,7 +286,11 @@ TEST(AtlasClientTest, AChangeSaysWhoAndWhy) {
   std::vector<std::string> asked;
   {
     TestPeer peer([&asked](PeerSocket& socket) {
-      AnswerHello(socket, {});
+      wire::Envelope hello;
+      hello.mutable_hello_reply()->set_protocol_major(kProtocolMajor);
+      hello.mutable_hello_reply()->set_protocol_minor(8);
+      hello.mutable_hello_reply()->set_profile(ProfileToWire({}));
+      socket.Reply(socket.ReadRequest()->request_id(), std::move(hello));
       for (int i = 0; i < 2; ++i) {
         const auto request = socket.ReadRequest();
         if (!request) return;
