@@ -126,7 +126,7 @@ TEST_F(SyncReplyTest, GoesOnWhereMemoryEnds) {
 // As when many others read slowly.
 TEST_F(SyncReplyTest, WithLittleRoomItPlansAFewTilesAtATime) {
   for (std::uint32_t i = 0; i < 48; ++i) {
-    UploadRequest upload = DriveUpload(i, "far");
+    UploadRequest upload = DriveUpload(i, "far-" + std::to_string(i));
     upload.pose = PoseOf({100.0 + 20.0 * i, 0.0, 1.8, 0.0});
     ASSERT_TRUE(Upload(std::move(upload)));
   }
