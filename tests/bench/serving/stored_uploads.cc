@@ -10,7 +10,7 @@ namespace atlas::testing {
 namespace {
 
 constexpr const char* kSelect =
-    "SELECT time_ms, x_um, y_um, z_um, qw, qx, qy, qz, blob FROM keyframes "
+    "SELECT time_ms, x_um, y_um, z_um, qw, qx, qy, qz, blob, session_id FROM keyframes "
     "JOIN poses ON keyframe_id = id ORDER BY id";
 
 StoredUpload UploadOf(SQLite::Statement& row) {
@@ -25,6 +25,7 @@ StoredUpload UploadOf(SQLite::Statement& row) {
   const SQLite::Column blob = row.getColumn(8);
   const auto* const data = static_cast<const std::uint8_t*>(blob.getBlob());
   upload.blob.assign(data, data + blob.getBytes());
+  upload.session = row.getColumn(9).getInt64();
   return upload;
 }
 

@@ -16,6 +16,7 @@ struct StoredUpload {
   std::int64_t time_ms = 0;
   QuantizedPose T_world_sensor;
   Bytes blob;
+  std::int64_t session = 0;  // which of them it was in
 };
 
 // In the order in which they came. Reads the database by its tables (docs/formats/store.md):

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -65,7 +66,10 @@ class Fleet {
       const std::size_t first = vehicle * uploads_.size() / options_.vehicles;
       const StoredUpload& stored = uploads_[(first + i) % uploads_.size()];
       KeyframeUpload upload;
-      upload.key = {{StrCat("car.", vehicle), options_.session}, static_cast<std::uint32_t>(i)};
+      // Of each drive, and each time that they begin anew: no vehicle leaps from one to the next.
+      const std::string session =
+          StrCat(options_.session, "-", stored.session, "-", (first + i) / uploads_.size());
+      upload.key = {{StrCat("car.", vehicle), session}, static_cast<std::uint32_t>(i)};
       upload.time_ms = stored.time_ms;
       upload.T_world_sensor = stored.T_world_sensor;
       upload.blob = stored.blob;
