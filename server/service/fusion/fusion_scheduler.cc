@@ -16,6 +16,8 @@ namespace {
 
 // How often a worker without work looks again: for leases and back-offs that ran out.
 constexpr std::chrono::seconds kLookAgain{1};
+// Of a tile that fails of damage and has no damaged keyframe: one was deleted under the worker.
+constexpr std::uint32_t kQuietTries = 3;
 
 struct Unfinished {
   TileClaim claim;
@@ -269,8 +271,13 @@ bool FusionScheduler::GiveBack(Worker& worker) {
 void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why) {
   const std::int64_t backoff =
       std::min(options_.max_backoff_ms, options_.min_backoff_ms << std::min(claim.attempts, 20u));
-  const bool is_damage = why.code() == StatusCode::kInvalidData &&
-                         !(claim.id.level > 0 && MarkDamagedChildren(claim.id));
+  const bool is_invalid = why.code() == StatusCode::kInvalidData;
+  if (is_invalid && claim.id.level == 0 && !HasDamage(claim.id) && claim.attempts < kQuietTries) {
+    log_(LogLevel::kDebug, StrCat("fusion: tile ", claim.id, " is tried again: ", why.message()));
+    worker.returns.push_back({claim, clock_() + 1});
+    return;
+  }
+  const bool is_damage = is_invalid && !(claim.id.level > 0 && MarkDamagedChildren(claim.id));
   bool is_news = true;
   if (is_damage) {
     is_news = damage_.Add(claim.id, why);
@@ -281,13 +288,11 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
        StrCat("fusion: tile ", claim.id, " keeps its content and stays dirty, next attempt in ",
               backoff, " ms: ", why.message()));
   worker.returns.push_back({claim, clock_() + backoff});
-  if (is_damage && is_news && claim.id.level == 0) {
-    NoteDamage(claim.id);
-  }
 }
 
-// Which of the tile's keyframes are damaged is looked up, and noted for good.
-void FusionScheduler::NoteDamage(const TileId& tile) {
+// Which of the tile's keyframes are damaged is looked up, and noted for good. None is where one was
+// purged or healed while the tile was built.
+bool FusionScheduler::HasDamage(const TileId& tile) {
   const auto keyframes = store_.ListKeyframesOfTile(tile);
   const auto noted =
       keyframes
@@ -296,7 +301,12 @@ void FusionScheduler::NoteDamage(const TileId& tile) {
   if (!noted) {
     log_(LogLevel::kError, StrCat("fusion: cannot note what is damaged of tile ", tile, ": ",
                                   noted.error().message()));
+    return true;
   }
+  const auto damaged = store_.ListDamagedKeyframes();
+  return !damaged || std::any_of(damaged->begin(), damaged->end(), [&](const DamagedKeyframe& d) {
+    return std::find(keyframes->begin(), keyframes->end(), d.id) != keyframes->end();
+  });
 }
 
 // True when there are some that can be built again, and the parent then.

@@ -87,7 +87,7 @@ class FusionScheduler {
   void Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built);
   bool GiveBack(Worker& worker);
   void PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why);
-  void NoteDamage(const TileId& tile);
+  bool HasDamage(const TileId& tile);
   bool MarkDamagedChildren(const TileId& parent);
 
   AtlasStore& store_;

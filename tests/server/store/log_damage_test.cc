@@ -126,6 +126,26 @@ TEST_F(LogDamageTest, AWholeLogIsNoLoss) {
   EXPECT_FALSE(IsToldOfLoss());
 }
 
+// Its header was written and its page not, or in part, when the daemon was killed: nobody was told
+// of that commit.
+TEST_F(LogDamageTest, AFrameThatAKillToreIsNoLoss) {
+  Live();
+  for (const std::size_t unwritten : {8'192u, 4'096u, 100u, 2u}) {
+    SCOPED_TRACE(unwritten);
+    Revive(0, 0);
+    Bytes log = killed_["atlas.db-wal"];
+    std::fill(log.end() - static_cast<std::ptrdiff_t>(unwritten), log.end(), std::uint8_t{0x5A});
+    WriteFile(Log(), log);
+    const auto found = FindLogDamage(Log(), true);
+    EXPECT_EQ(found->lost_commits, 0u);
+    EXPECT_TRUE(found->has_rest);
+    Open();
+    EXPECT_EQ(store_->identity().epoch, 1u);
+    EXPECT_EQ(Keyframes(), std::size_t{kCommits - 1});
+    EXPECT_FALSE(IsToldOfLoss());
+  }
+}
+
 // Of what was being written when the power failed nobody knows more than its last commit.
 TEST_F(LogDamageTest, ATornEndAfterAPowerCutIsNoLoss) {
   Live();

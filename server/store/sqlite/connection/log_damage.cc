@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "core/base/bytes.h"
 #include "core/base/str_cat.h"
@@ -43,6 +44,35 @@ class LogSum {
   }
   bool Is(ByteSpan bytes, std::size_t at) const {
     return BigEndian(bytes, at) == first_ && BigEndian(bytes, at + 4) == second_;
+  }
+  // Of `words` before this sum was taken; or of the sum at `at` of `bytes`. Whether one bit that is
+  // turned makes them fit.
+  bool IsOneBitOff(ByteSpan words, ByteSpan bytes, std::size_t at) const {
+    const std::uint32_t first = BigEndian(bytes, at) - first_;
+    const std::uint32_t second = BigEndian(bytes, at + 4) - second_;
+    if (std::popcount(BigEndian(bytes, at) ^ first_) +
+            std::popcount(BigEndian(bytes, at + 4) ^ second_) ==
+        1) {
+      return true;
+    }
+    // What one more in a word makes of both numbers at the end, from the last word back.
+    std::array<std::uint32_t, 2> of_first{1, 1};
+    std::array<std::uint32_t, 2> of_second{0, 1};
+    for (std::size_t pair = words.size() / 8; pair-- > 0;) {
+      for (const auto& [effect, offset] :
+           {std::pair(of_first, 8 * pair), std::pair(of_second, 8 * pair + 4)}) {
+        const std::uint32_t word = Word(words, offset);
+        for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
+          const std::uint32_t change = (word & bit) == 0 ? bit : 0u - bit;
+          if (effect[0] * change == first && effect[1] * change == second) {
+            return true;
+          }
+        }
+      }
+      of_first = {of_first[0] + of_first[1], of_first[0] + 2 * of_first[1]};
+      of_second = {of_second[0] + of_second[1], of_second[0] + 2 * of_second[1]};
+    }
+    return false;
   }
 
  private:
@@ -126,6 +156,16 @@ std::size_t GuessPageBytes(LogReading& log, std::array<std::uint32_t, 2>& salts)
   return 0;
 }
 
+// Of the frame at which `sum` is.
+bool IsFlipped(const LogSum& sum, ByteSpan frame, const std::array<std::uint32_t, 2>& salts) {
+  if (SaltsOf(frame) != salts) {
+    return sum.Is(frame, 16);  // but for the bit of a salt
+  }
+  Bytes words(frame.begin(), frame.begin() + 8);
+  words.insert(words.end(), frame.begin() + kFrameHeaderBytes, frame.end());
+  return sum.IsOneBitOff(words, frame, 16);
+}
+
 LogDamage Scan(LogReading& log, LogHeader header) {
   LogDamage damage;
   bool is_over = !header.sum;
@@ -137,6 +177,7 @@ LogDamage Scan(LogReading& log, LogHeader header) {
   }
   log.Seek(kHeaderBytes);
   Bytes frame(kFrameHeaderBytes + header.page_bytes);
+  bool is_torn = false;  // the first one, and nothing of this log is behind it
   for (std::uint64_t number = 0; log.Read(frame); ++number) {
     const bool is_of_log = AreSame(SaltsOf(frame), header.salts);  // else of one before
     if (!is_over) {
@@ -147,12 +188,16 @@ LogDamage Scan(LogReading& log, LogHeader header) {
       }
       is_over = true;
       damage.frame = number;
+      is_torn = is_of_log && !IsFlipped(*header.sum, frame, header.salts);
+    } else if (is_of_log) {
+      is_torn = false;
     }
     damage.has_rest = damage.has_rest || is_of_log;
     if (is_of_log && BigEndian(frame, 4) != 0) {
       ++damage.lost_commits;
     }
   }
+  damage.lost_commits = is_torn ? 0 : damage.lost_commits;
   return damage;
 }
 

@@ -21,8 +21,9 @@ struct LogDamage {
 
 // Of the log at `path`, none if there is none. Commits are written one after the other and synced
 // each, so of two of them behind damage the first was on disk. Of one alone that is sure only where
-// the system has run on since it was written (`ran_since`): a power cut leaves such a rest
-// (docs/decisions/0506-a-damaged-log.md).
+// the system has run on since it was written (`ran_since`): a power cut leaves such a rest. A kill
+// leaves a frame that is not whole, as the last one: that is damage where a single bit makes it
+// whole (docs/decisions/0506-a-damaged-log.md).
 // kUnavailable when the log cannot be read.
 Result<LogDamage> FindLogDamage(const std::filesystem::path& path, bool ran_since);
 
