@@ -156,7 +156,7 @@ class AtlasService {
   bool is_ending() const { return changes_.is_closed(); }
   // Returns when every upload and pose batch handed over before was reported to its `done`.
   void Flush() { store_.Flush(); }
-  // EndWaits(), and the workers finish the tiles at hand and end.
+  // EndWaits(), and the workers finish the tiles at hand, or leave what takes long, and end.
   void Stop();
 
  private:

@@ -192,9 +192,13 @@ void FusionScheduler::BuildClaims(Worker& worker,
   const auto note_time = [&] {
     building_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begin).count();
   };
-  Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
+  Build(ids, stop, [&](const TileId& id, Result<BuiltTile> built) {
     const TileClaim& claim =
         *std::find_if(claims.begin(), claims.end(), [&](const TileClaim& c) { return c.id == id; });
+    if (!built && stop.stop_requested()) {
+      worker.returns.push_back({claim, 0});
+      return;
+    }
     if (!built) {
       PostponeFailed(worker, claim, built.error());
       return;
@@ -227,10 +231,12 @@ void FusionScheduler::BuildClaims(Worker& worker,
 
 // What it throws (no memory, say) is a failure of these tiles, not the end of the process: they are
 // tried one by one then.
-void FusionScheduler::Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built) {
+void FusionScheduler::Build(std::span<const TileId> ids,
+                            const std::stop_token& stop,
+                            const TileRefresher::OnBuilt& on_built) {
   std::vector<TileId> rest(ids.begin(), ids.end());
   try {
-    refresher_.Build(ids, [&](const TileId& id, Result<BuiltTile> built) {
+    refresher_.Build(ids, stop, [&](const TileId& id, Result<BuiltTile> built) {
       std::erase(rest, id);
       on_built(id, std::move(built));
     });
@@ -240,7 +246,7 @@ void FusionScheduler::Build(std::span<const TileId> ids, const TileRefresher::On
       return;
     }
     for (const TileId& id : rest) {
-      Build(std::span(&id, 1), on_built);
+      Build(std::span(&id, 1), stop, on_built);
     }
   }
 }

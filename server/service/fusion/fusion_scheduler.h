@@ -84,7 +84,9 @@ class FusionScheduler {
   void BuildClaims(Worker& worker,
                    const std::vector<TileClaim>& claims,
                    const std::stop_token& stop);
-  void Build(std::span<const TileId> ids, const TileRefresher::OnBuilt& on_built);
+  void Build(std::span<const TileId> ids,
+             const std::stop_token& stop,
+             const TileRefresher::OnBuilt& on_built);
   bool GiveBack(Worker& worker);
   void PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why);
   bool HasDamage(const TileId& tile);

@@ -1,12 +1,42 @@
 #include "server/service/fusion/tile_refresher.h"
 
 #include <algorithm>
+#include <chrono>
 #include <tuple>
 #include <utility>
 
 #include "server/service/fusion/stored_keyframes.h"
 
 namespace atlas {
+namespace {
+
+Status Stopping() {
+  return {StatusCode::kUnavailable, "the daemon stops"};
+}
+
+// What is begun is done, unless it takes longer than this: what was known of a tile is lost then.
+class StopGrace {
+ public:
+  explicit StopGrace(const std::stop_token& stop) : stop_(stop) {}
+
+  bool IsOver() {
+    if (!stop_.stop_requested()) {
+      return false;
+    }
+    const auto now = Clock::now();
+    until_ = std::min(until_, now + kLength);
+    return now >= until_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kLength{5};
+
+  const std::stop_token& stop_;
+  Clock::time_point until_ = Clock::time_point::max();
+};
+
+}  // namespace
 
 TileRefresher::TileRefresher(AtlasStore& store,
                              const TileRefresherOptions& options,
@@ -32,10 +62,16 @@ std::size_t TileRefresher::MoveToDisk() {
   return survey_files_.is_on() ? surveys_.MoveToDisk() : 0;
 }
 
-void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) {
+void TileRefresher::Build(std::span<const TileId> ids,
+                          const std::stop_token& stop,
+                          const OnBuilt& on_built) {
   std::vector<Job> jobs;
   std::size_t bytes = 0;
   for (const TileId& id : ids) {
+    if (stop.stop_requested()) {
+      on_built(id, Error(Stopping()));
+      continue;
+    }
     if (id.level > 0 || profile_.preset == FusionPreset::kPaper) {
       on_built(id, builder_.Build(id));
       continue;
@@ -52,14 +88,14 @@ void TileRefresher::Build(std::span<const TileId> ids, const OnBuilt& on_built) 
       continue;
     }
     if (bytes + job_bytes > group_bytes_) {
-      Run(jobs, on_built);
+      Run(jobs, stop, on_built);
       jobs.clear();
       bytes = 0;
     }
     jobs.push_back(*std::move(job));
     bytes += job_bytes;
   }
-  Run(jobs, on_built);
+  Run(jobs, stop, on_built);
 }
 
 // With the surveys of the last time, where they are still there. They are taken out meanwhile: what
@@ -87,8 +123,10 @@ Result<TileRefresher::Job> TileRefresher::Prepare(const TileId& id) {
   return job;
 }
 
-void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
-  AddKeyframes(jobs);
+void TileRefresher::Run(std::vector<Job>& jobs,
+                        const std::stop_token& stop,
+                        const OnBuilt& on_built) {
+  AddKeyframes(jobs, stop);
   for (Job& job : jobs) {
     const TileId id = job.surveys.id();
     if (!job.status.ok()) {
@@ -107,7 +145,7 @@ void TileRefresher::Run(std::vector<Job>& jobs, const OnBuilt& on_built) {
 }
 
 // In canonical order, which is that of each job.
-void TileRefresher::AddKeyframes(std::vector<Job>& jobs) {
+void TileRefresher::AddKeyframes(std::vector<Job>& jobs, const std::stop_token& stop) {
   struct Use {
     const FrameOnMap* frame = nullptr;
     Job* job = nullptr;
@@ -122,8 +160,13 @@ void TileRefresher::AddKeyframes(std::vector<Job>& jobs) {
                    [](const Use& a, const Use& b) { return a.frame->key < b.frame->key; });
   std::uint64_t content = 0;
   Result<KeyframeCache::Handle> keyframe = KeyframeCache::Handle();
+  StopGrace grace(stop);
   for (const Use& use : uses) {
     if (!use.job->status.ok()) {
+      continue;
+    }
+    if (grace.IsOver()) {
+      use.job->status = Stopping();
       continue;
     }
     if (*keyframe == nullptr || use.frame->content != content) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "core/base/status.h"
@@ -33,8 +34,9 @@ class TileRefresher {
 
   TileRefresher(AtlasStore& store, const TileRefresherOptions& options, const LogSink& log);
 
-  // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's.
-  void Build(std::span<const TileId> ids, const OnBuilt& on_built);
+  // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's; kUnavailable:
+  // `stop` was requested, and the tile would take longer than a moment.
+  void Build(std::span<const TileId> ids, const std::stop_token& stop, const OnBuilt& on_built);
 
   // A tile at hand is made of its keyframes alone, all of them.
   void Forget(const TileId& id) { surveys_.Take(id); }
@@ -58,8 +60,8 @@ class TileRefresher {
   };
 
   Result<Job> Prepare(const TileId& id);
-  void Run(std::vector<Job>& jobs, const OnBuilt& on_built);
-  void AddKeyframes(std::vector<Job>& jobs);
+  void Run(std::vector<Job>& jobs, const std::stop_token& stop, const OnBuilt& on_built);
+  void AddKeyframes(std::vector<Job>& jobs, const std::stop_token& stop);
   FusionContext context() const { return {profile_, sigmas_}; }
 
   AtlasStore& store_;
