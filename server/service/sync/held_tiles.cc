@@ -1,6 +1,7 @@
 #include "server/service/sync/held_tiles.h"
 
 #include <algorithm>
+#include <bit>
 #include <string>
 #include <utility>
 
@@ -101,6 +102,18 @@ const HeldTile* HeldTiles::Find(std::uint64_t key) const {
 
 const HeldBlock* HeldTiles::FindBlock(std::uint64_t block) const {
   return FindIn(blocks_, block, &HeldBlock::block);
+}
+
+bool IsSame(const HeldBlock& held, std::span<const TileSummary> tiles) {
+  HeldDigest digest;
+  int count = 0;
+  for (const TileSummary& tile : tiles) {
+    if ((held.tiles >> (tile.id.Key() - FirstKeyOf(held.block)) & 1u) != 0) {
+      digest.Add(tile.id.Key(), tile.payload_hash);
+      ++count;
+    }
+  }
+  return count == std::popcount(held.tiles) && digest.value() == held.digest;
 }
 
 }  // namespace atlas

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/base/status.h"
@@ -26,6 +27,9 @@ struct HeldBlock {
   SectionMask sections = kAllSections;
   std::size_t number = 0;
 };
+
+// Whether these tiles, all that there are of its block, are what is held of it.
+bool IsSame(const HeldBlock& held, std::span<const TileSummary> tiles);
 
 // Hash64 over key and payload hash of each, in key order, little-endian.
 class HeldDigest {

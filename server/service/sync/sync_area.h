@@ -28,7 +28,7 @@ class SyncArea {
     double along_m = 0.0;  // from the beginning of the way to `from_m`
   };
 
-  static constexpr std::size_t kMaxRoutePoints = 256;
+  static constexpr std::size_t kMaxRoutePoints = CorridorArea::kMaxRoutePoints;
   static constexpr std::size_t kMaxTiles = 65'536;
   // So much more to drive counts as this much farther off.
   static constexpr double kAlongWeight = 0.25;

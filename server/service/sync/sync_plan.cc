@@ -1,8 +1,6 @@
 #include "server/service/sync/sync_plan.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
@@ -14,17 +12,6 @@
 
 namespace atlas {
 namespace {
-
-// At this distance from the vehicle and its way a tile counts for an eighth: as much as one of the
-// next coarser level does beside it.
-constexpr double kNear_m = 20.0;
-constexpr double kOfTheCover = 1e30;  // before everything else
-constexpr double kLater = 1e-60;      // after everything else
-// What a tile counts as, in bytes, at least and at most. From a level to the next finer one error
-// times area falls to an eighth: bounds that are eight times apart keep a parent before its
-// children, whatever all of them weigh. Of those of street scenes, most are within (22 KB a tile).
-constexpr double kLeastBytes = 8'192.0;
-constexpr double kMostBytes = 8.0 * kLeastBytes;
 
 // How far a tile is off, kept for those above the next one: tiles come in key order, siblings
 // together.
@@ -235,20 +222,8 @@ class Planner {
 
   void LookAt(std::uint64_t block) {
     local_.emplace(request_.area, TileId::FromKey(FirstKeyOf(block)).value(), kTileBlockSideBits);
-    most_worth_ = WorthAt(level_, local_->least_m());
-    least_worth_ = WorthAt(level_, local_->most_m());
-  }
-
-  static bool IsSame(const HeldBlock& held, std::span<const TileSummary> tiles) {
-    HeldDigest digest;
-    int count = 0;
-    for (const TileSummary& tile : tiles) {
-      if ((held.tiles >> (tile.id.Key() - FirstKeyOf(held.block)) & 1u) != 0) {
-        digest.Add(tile.id.Key(), tile.payload_hash);
-        ++count;
-      }
-    }
-    return count == std::popcount(held.tiles) && digest.value() == held.digest;
+    most_worth_ = TileWorth(profile_, level_, local_->least_m());
+    least_worth_ = TileWorth(profile_, level_, local_->most_m());
   }
 
   void AddOfBlock(const TileSummary& tile, const HeldBlock& held, bool is_same) {
@@ -277,7 +252,7 @@ class Planner {
       item.held_hash = held->payload_hash;
       item.held_sections = held->sections;
     }
-    const double worth = WorthAt(tile.id.level, DistanceOf(tile.id));
+    const double worth = TileWorth(profile_, tile.id.level, DistanceOf(tile.id));
     if (has_moved) {
       // Where it stood before is not known any more, but not behind the last place that it can
       // have, which is before its children. If that is over it was sent, as it was.
@@ -321,14 +296,6 @@ class Planner {
 
   double Banded(double priority) const {
     return level_ == coarsest_ ? priority * kOfTheCover : priority;
-  }
-
-  // The error that a tile removes, over its area; a parent's is at least eight times its
-  // children's.
-  double WorthAt(std::uint8_t level, double distance_m) const {
-    const double side_m = AtLevel(profile_.tile_size_m(), level);
-    const double near = 1.0 + distance_m / kNear_m;
-    return GeometricError(level, profile_) * (side_m * side_m / (near * near * near));
   }
 
   // Never less than its parent's: that may be nearest to the way where more is to be driven.
@@ -416,10 +383,6 @@ class Planner {
 };
 
 }  // namespace
-
-double GeometricError(std::uint8_t level, const MapProfile& profile) {
-  return AtLevel(profile.cell_size_m(), level);
-}
 
 Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request,
                                          TileIndex& index,

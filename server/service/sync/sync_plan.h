@@ -16,6 +16,7 @@
 #include "core/base/status.h"
 #include "server/service/sync/held_tiles.h"
 #include "server/service/sync/sync_area.h"
+#include "server/service/sync/tile_worth.h"
 #include "server/store/tile_block.h"
 #include "server/store/tile_index.h"
 
@@ -90,8 +91,5 @@ Result<std::optional<SyncPlan>> PlanSync(const SyncRequest& request,
                                          const MapProfile& profile,
                                          bool may_block,
                                          const SyncLimits& limits = {});
-
-// By how much the map is off where it is of a level: the side of its cells, metres.
-double GeometricError(std::uint8_t level, const MapProfile& profile);
 
 }  // namespace atlas
