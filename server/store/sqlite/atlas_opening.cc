@@ -123,7 +123,7 @@ Result<DamagedLog> KeepDamagedLog(const std::filesystem::path& log) {
 
 // Vehicles are told by the epoch, as after a restore from a backup.
 std::string NoteLoss(Connection& writer, StoreIdentity& identity, const DamagedLog& log) {
-  writer.Execute("BEGIN IMMEDIATE");
+  writer.Begin();
   const std::uint64_t before = ReadCounter(writer, Counter::kRevision);
   const NewLine line = BeginLine(writer, identity);
   identity.epoch = line.epoch;
@@ -132,14 +132,14 @@ std::string NoteLoss(Connection& writer, StoreIdentity& identity, const DamagedL
              " commits are lost, the atlas goes on from revision ", before, " in epoch ",
              line.epoch, "; a copy of the log is ", log.kept.filename().string());
   AddEvent(writer, {EventKind::kLogDamaged, kAtlasItself, log.kept.filename().string(), what});
-  writer.Execute("COMMIT");
+  writer.Commit();
   return what;
 }
 
 // What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
 // marked again.
 void Mend(Connection& writer, std::uint8_t levels) {
-  writer.Execute("BEGIN IMMEDIATE");
+  writer.Begin();
   RestoreCounters(writer);
   FinishMigration(writer);
   for (const std::int64_t session : ListDamagedSessions(writer)) {
@@ -152,7 +152,7 @@ void Mend(Connection& writer, std::uint8_t levels) {
   if (const Status status = CheckMarks(writer); !status.ok()) {
     MarkAllInStore(writer, status.message(), levels);
   }
-  writer.Execute("COMMIT");
+  writer.Commit();
 }
 
 }  // namespace
@@ -185,6 +185,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     }
     writer->Execute("PRAGMA journal_mode = WAL");
     KeepTableSums(*writer);
+    MarkAtTheEnd(*writer);
     if (log->damage.has_rest) {  // else what is written from now on would stand before it
       WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
     }

@@ -77,9 +77,10 @@ Status CheckIdle(const fs::path& folder) {
 // The copy becomes an atlas that goes on by itself.
 Status GoOn(const fs::path& copy, const std::string& backup, RestoredAtlas& restored) {
   Connection connection({copy, DatabaseOptions::Mode::kReadWrite, kCache_kib, 0});
-  connection.Execute("PRAGMA journal_mode = MEMORY; BEGIN IMMEDIATE;");
+  connection.Execute("PRAGMA journal_mode = MEMORY;");
   AddRowHash(connection);
   KeepTableSums(connection);
+  connection.Begin();
   const Result<StoreIdentity> identity = ReadIdentity(connection);
   if (!identity) {
     return identity.error();
@@ -90,7 +91,7 @@ Status GoOn(const fs::path& copy, const std::string& backup, RestoredAtlas& rest
   AddEvent(connection, {EventKind::kBackupRestored, kAuthor, backup,
                         StrCat("revision ", restored.backup.revision, " of epoch ",
                                restored.backup.epoch, ", now epoch ", restored.epoch)});
-  connection.Execute("COMMIT");
+  connection.Commit();
   return {};
 }
 

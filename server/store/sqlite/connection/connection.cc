@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <exception>
 #include <random>
 
 #include <sqlite3.h>
@@ -35,8 +36,19 @@ void CallIntegerFunction(sqlite3_context* context, int count, sqlite3_value** va
   }
   std::array<std::int64_t, kMaxIntegers> integers{};
   std::transform(values, values + count, integers.begin(), sqlite3_value_int64);
-  const auto function = reinterpret_cast<Connection::IntegerFunction>(sqlite3_user_data(context));
-  sqlite3_result_int64(context, function({integers.data(), static_cast<std::size_t>(count)}));
+  const auto& function =
+      *static_cast<const Connection::IntegerFunction*>(sqlite3_user_data(context));
+  try {
+    sqlite3_result_int64(context, function({integers.data(), static_cast<std::size_t>(count)}));
+  } catch (const std::exception& error) {
+    sqlite3_result_error(context, error.what(), -1);
+  }
+}
+
+// SQLite counts what it holds under a lock that all connections share; nobody asks for it. Once,
+// before anything is opened.
+void CountNoMemory() {
+  [[maybe_unused]] static const int kDone = sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0);
 }
 
 // The file as a URI that says that nobody changes it.
@@ -52,6 +64,7 @@ std::string UntouchedUri(const std::string& file) {
 }
 
 std::string NameToOpen(const DatabaseOptions& options) {
+  CountNoMemory();
   const std::string file = options.file.string();
   return options.mode == DatabaseOptions::Mode::kUntouched ? UntouchedUri(file) : file;
 }
@@ -131,9 +144,55 @@ bool Connection::is_in_transaction() const {
   return sqlite3_get_autocommit(database_.getHandle()) == 0;
 }
 
+void Connection::Begin() {
+  RollBack();
+  for (const auto& deferred : deferred_) {
+    deferred->Forget();  // of one that SQLite gave up
+  }
+  Execute("BEGIN IMMEDIATE");
+}
+
+void Connection::Commit() {
+  WriteDeferred();
+  Execute("COMMIT");
+  for (const auto& deferred : deferred_) {
+    deferred->Forget();
+  }
+}
+
+void Connection::RollBack() {
+  if (is_in_transaction()) {
+    Execute("ROLLBACK");
+  }
+}
+
+void Connection::Save() {
+  Prepare("SAVEPOINT saved").Run();
+  for (const auto& deferred : deferred_) {
+    deferred->Save();
+  }
+}
+
+void Connection::RestoreSaved() {
+  Execute("ROLLBACK TO saved");
+  for (const auto& deferred : deferred_) {
+    deferred->Restore();
+  }
+}
+
+void Connection::ReleaseSaved() {
+  Prepare("RELEASE saved").Run();
+}
+
+void Connection::WriteDeferred() {
+  std::for_each(deferred_.rbegin(), deferred_.rend(),
+                [this](const auto& deferred) { deferred->Write(*this); });
+}
+
 void Connection::AddFunction(const char* name, IntegerFunction function) {
-  database_.createFunction(name, -1, true, reinterpret_cast<void*>(function), CallIntegerFunction,
-                           nullptr, nullptr, nullptr);
+  functions_.push_back(std::make_unique<IntegerFunction>(std::move(function)));
+  database_.createFunction(name, -1, false, functions_.back().get(), CallIntegerFunction, nullptr,
+                           nullptr, nullptr);
 }
 
 void Connection::LeaveLogTo(std::function<void(int)> on_commit) {

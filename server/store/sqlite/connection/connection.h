@@ -13,11 +13,14 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
 
 #include "core/base/bytes.h"
+#include "server/store/sqlite/connection/deferred.h"
 
 namespace atlas {
 
@@ -90,8 +93,35 @@ class Connection {
   // False after SQLite rolled the transaction back by itself (full disk, I/O error).
   bool is_in_transaction() const;
 
-  // A function of integers that its statements may call by that name, with any number of them.
-  using IntegerFunction = std::int64_t (*)(std::span<const std::int64_t>);
+  // A write transaction, and one savepoint in it. One that could not be given up before is now.
+  void Begin();
+  void Commit();
+  void RollBack();  // nothing where SQLite did
+  void Save();
+  void RestoreSaved();
+  void ReleaseSaved();
+  // From now on `deferred` is written before each commit: the last one added first.
+  template <typename T>
+  T& Defer(std::unique_ptr<T> deferred) {
+    T& added = *deferred;
+    deferred_.push_back(std::move(deferred));
+    return added;
+  }
+  // Null where none of that kind was added.
+  template <typename T>
+  T* FindDeferred() const {
+    T* found = nullptr;
+    for (const auto& deferred : deferred_) {
+      found = found == nullptr ? dynamic_cast<T*>(deferred.get()) : found;
+    }
+    return found;
+  }
+  // For whoever is about to read what was left for later.
+  void WriteDeferred();
+
+  // A function of integers that its statements may call by that name, with any number of them. What
+  // it throws fails the statement.
+  using IntegerFunction = std::function<std::int64_t(std::span<const std::int64_t>)>;
   void AddFunction(const char* name, IntegerFunction function);
 
   // From now on this connection does not copy the log into the database by itself; `on_commit` is
@@ -113,6 +143,8 @@ class Connection {
   std::array<std::uint8_t, 16> id_{};
   std::function<void(int)> on_commit_;
   std::function<bool()> is_over_;
+  std::vector<std::unique_ptr<Deferred>> deferred_;
+  std::vector<std::unique_ptr<IntegerFunction>> functions_;
   SQLite::Database database_;
   std::unordered_map<const char*, std::unique_ptr<SQLite::Statement>> statements_;
 };

@@ -142,10 +142,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
   try {
     const auto begin = std::chrono::steady_clock::now();
     const int changes_before = connection_->total_changes();
-    if (connection_->is_in_transaction()) {
-      connection_->Execute("ROLLBACK");  // the one before could not
-    }
-    connection_->Execute("BEGIN IMMEDIATE");
+    connection_->Begin();
     for (std::size_t i = 0; i < group.size(); ++i) {
       results[i] = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
       if (!connection_->is_in_transaction()) {
@@ -160,7 +157,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     }
     const std::uint64_t revision = options_.read_revision(*connection_);
     options_.look(*connection_);
-    connection_->Execute("COMMIT");
+    connection_->Commit();
     if (connection_->total_changes() != changes_before) {
       commits_.Add(std::chrono::steady_clock::now() - begin);
     }
@@ -175,9 +172,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
 
 Status WriteQueue::RollBack(Status failure) {
   try {
-    if (connection_->is_in_transaction()) {
-      connection_->Execute("ROLLBACK");
-    }
+    connection_->RollBack();
     return failure;
   } catch (const std::exception& error) {
     return {failure.code(), StrCat(failure.message(), "; rolling back failed too: ",
@@ -188,7 +183,7 @@ Status WriteQueue::RollBack(Status failure) {
 Status WriteQueue::RunOne(Operation& operation) {
   Status status;
   try {
-    connection_->Prepare("SAVEPOINT operation").Run();
+    connection_->Save();
     status = operation.run(*connection_);
   } catch (const std::exception& error) {
     status = StatusFromException(error);
@@ -196,10 +191,10 @@ Status WriteQueue::RunOne(Operation& operation) {
     NoteRefusal(status);
   }
   if (!status.ok() && connection_->is_in_transaction()) {
-    connection_->Execute("ROLLBACK TO operation");
+    connection_->RestoreSaved();
   }
   if (connection_->is_in_transaction()) {
-    connection_->Prepare("RELEASE operation").Run();
+    connection_->ReleaseSaved();
   }
   return status;
 }

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
+#include <map>
+#include <memory>
 #include <optional>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -44,6 +48,48 @@ struct TableSum {
   bool operator==(const TableSum&) const = default;
 };
 
+// What the statements of a transaction change: by a statement a row it was a third of an upload.
+class SumChanges final : public Deferred {
+ public:
+  void Note(RowKind table, std::int64_t rows, std::int64_t checksums) {
+    TableSum& change = changes_[table];
+    change.rows += rows;
+    change.checksums ^= checksums;
+  }
+  const TableSum& of(RowKind table) { return changes_[table]; }
+  void Set(RowKind table, const TableSum& change) { changes_[table] = change; }
+
+  void Write(Connection& connection) override {
+    for (auto& [table, change] : changes_) {
+      if (change == TableSum()) {
+        continue;
+      }
+      connection
+          .Prepare(
+              "UPDATE main.table_sums SET row_count = row_count + ?1, "
+              "checksums = (checksums | ?2) - (checksums & ?2) WHERE id = ?3")
+          .Bind(change.rows)
+          .Bind(change.checksums)
+          .Bind(static_cast<std::int64_t>(table))
+          .Run();
+      change = {};
+    }
+  }
+  void Save() override { saved_ = changes_; }
+  void Restore() override { changes_ = saved_; }
+  void Forget() override { changes_.clear(); }
+
+ private:
+  std::map<RowKind, TableSum> changes_;
+  std::map<RowKind, TableSum> saved_;
+};
+
+void WriteChanges(Connection& connection) {
+  if (SumChanges* changes = connection.FindDeferred<SumChanges>()) {
+    changes->Write(connection);
+  }
+}
+
 TableSum AddUp(Connection& connection, const SummedTable& table) {
   Query row = connection.Prepare(table.checksums);
   TableSum sum;
@@ -63,6 +109,7 @@ std::optional<TableSum> ReadKept(Connection& connection, RowKind kind) {
 }
 
 Status Check(Connection& connection, const SummedTable& table) {
+  WriteChanges(connection);
   const auto kept = ReadKept(connection, table.kind);
   if (!kept) {
     return Status(StatusCode::kInvalidData,
@@ -93,17 +140,13 @@ void WriteKept(Connection& connection, const SummedTable& table, const TableSum&
 }
 
 void Write(Connection& connection, const SummedTable& table) {
+  WriteChanges(connection);
   WriteKept(connection, table, AddUp(connection, table));
 }
 
 const SummedTable& Find(RowKind kind) {
   return *std::find_if(std::begin(kTables), std::end(kTables),
                        [kind](const SummedTable& table) { return table.kind == kind; });
-}
-
-// SQLite has no XOR; as the bits that both have are taken away, nothing overflows.
-std::string Xored(const std::string& a, const std::string& b) {
-  return StrCat("(", a, " | ", b, ") - (", a, " & ", b, ")");
 }
 
 }  // namespace
@@ -118,28 +161,39 @@ void WriteTableSum(Connection& connection, RowKind table) {
 }
 
 void WithoutCounting(Connection& connection, RowKind table, const std::function<void()>& restore) {
-  const auto kept = ReadKept(connection, table);
-  restore();
-  if (kept) {
-    WriteKept(connection, Find(table), *kept);
+  SumChanges* const changes = connection.FindDeferred<SumChanges>();
+  if (changes == nullptr) {
+    restore();
+    return;
   }
+  const TableSum before = changes->of(table);
+  restore();
+  changes->Set(table, before);
 }
 
-// Triggers of the connection alone: what others delete is missed.
+// Triggers of the connection alone: what others delete is missed. SQLite has no XOR: a row that
+// changes tells both checksums.
 void KeepTableSums(Connection& connection) {
+  SumChanges& changes = connection.Defer(std::make_unique<SumChanges>());
+  connection.AddFunction(
+      "note_row", [&connection, &changes](std::span<const std::int64_t> row) -> std::int64_t {
+        if (!connection.is_in_transaction()) {
+          throw std::logic_error("rows are written in transactions, which count them");
+        }
+        changes.Note(static_cast<RowKind>(row[0]), row[1], row[2] ^ row[3]);
+        return 0;
+      });
   for (const SummedTable& table : kTables) {
-    const auto trigger = [&](const char* event, const char* change, const std::string& sum) {
+    const auto trigger = [&](const char* event, const char* rows, const char* checksums) {
       connection.Execute(StrCat("CREATE TEMP TRIGGER ", table.name, "_", std::string_view(event, 6),
                                 " AFTER ", event, " ON main.", table.name,
-                                " BEGIN UPDATE table_sums SET row_count = row_count", change,
-                                ", checksums = ", sum, " WHERE id = ", static_cast<int>(table.kind),
-                                "; END")
+                                " BEGIN SELECT note_row(", static_cast<int>(table.kind), ", ", rows,
+                                ", ", checksums, "); END")
                              .c_str());
     };
-    trigger("INSERT", " + 1", Xored("checksums", "new.checksum"));
-    trigger("DELETE", " - 1", Xored("checksums", "old.checksum"));
-    const std::string turned = StrCat("(", Xored("old.checksum", "new.checksum"), ")");
-    trigger("UPDATE OF checksum", "", Xored("checksums", turned));
+    trigger("INSERT", "1", "0, new.checksum");
+    trigger("DELETE", "-1", "old.checksum, 0");
+    trigger("UPDATE OF checksum", "0", "old.checksum, new.checksum");
   }
 }
 

@@ -15,7 +15,7 @@ namespace atlas {
 // Says of every table what it holds now.
 void WriteTableSums(Connection& connection);
 void WriteTableSum(Connection& connection, RowKind table);
-// From now on the statements of this connection keep them.
+// From now on the transactions of this connection keep them, and it writes in no other way.
 void KeepTableSums(Connection& connection);
 
 // Runs `restore`, which makes rows what they were written as: their table holds what it should

@@ -1,7 +1,10 @@
 #include "server/store/sqlite/tables/dirty_table.h"
 
+#include <algorithm>
+#include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
@@ -20,6 +23,77 @@ std::int64_t HashOf(const TileClaim& claim) {
       .Unsigned(claim.generation)
       .Unsigned(claim.since)
       .value();
+}
+
+struct Mark {
+  std::uint64_t key = 0;
+  std::uint64_t generation = 0;
+  std::uint64_t since = 0;
+};
+
+void WriteMark(Connection& connection, const Mark& mark) {
+  connection
+      .Prepare(
+          "INSERT INTO dirty_tiles (key, shard, level, generation, since, checksum) "
+          "VALUES (?1,?2,?3,?4,?5, row_hash(14, ?1, ?4, ?5)) "
+          "ON CONFLICT (key) DO UPDATE SET generation = excluded.generation, "
+          "since = min(since, excluded.since), attempts = 0, retry_at_ms = 0, "
+          "checksum = row_hash(14, key, excluded.generation, min(since, excluded.since))")
+      .Bind(mark.key)
+      .Bind(ShardOf(*TileId::FromKey(mark.key)))
+      .Bind(std::int64_t{TileId::FromKey(mark.key)->level})
+      .Bind(mark.generation)
+      .Bind(mark.since)
+      .Run();
+}
+
+// Marks of a transaction, in the order in which they came; those before `written_` are in the
+// table.
+class LateMarks final : public Deferred {
+ public:
+  void Add(const Mark& mark, Connection& connection) {
+    marks_.push_back(mark);
+    if (marks_.size() - written_ >= kMost) {
+      Write(connection);
+    }
+  }
+
+  // Of those on one tile the last one tells the generation, as revisions rise.
+  void Write(Connection& connection) override {
+    std::vector<Mark> marks(marks_.begin() + static_cast<std::ptrdiff_t>(written_), marks_.end());
+    std::stable_sort(marks.begin(), marks.end(),
+                     [](const Mark& a, const Mark& b) { return a.key < b.key; });
+    for (auto mark = marks.begin(); mark != marks.end();) {
+      Mark merged = *mark;
+      for (; mark != marks.end() && mark->key == merged.key; ++mark) {
+        merged = {mark->key, mark->generation, std::min(merged.since, mark->since)};
+      }
+      WriteMark(connection, merged);
+    }
+    written_ = marks_.size();
+  }
+  void Save() override { saved_ = {marks_.size(), written_}; }
+  void Restore() override {
+    marks_.resize(saved_.first);
+    written_ = saved_.second;
+  }
+  void Forget() override {
+    marks_.clear();
+    written_ = 0;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 1u << 16;
+
+  std::vector<Mark> marks_;
+  std::size_t written_ = 0;
+  std::pair<std::size_t, std::size_t> saved_;  // marks, and how many of them are written
+};
+
+void WriteLateMarks(Connection& connection) {
+  if (LateMarks* marks = connection.FindDeferred<LateMarks>()) {
+    marks->Write(connection);
+  }
 }
 
 // The lowest level with a mark of the wave, leased or not: keys begin with the level.
@@ -64,26 +138,24 @@ Result<std::vector<TileClaim>> FreeMarks(Connection& connection,
 
 }  // namespace
 
+void MarkAtTheEnd(Connection& connection) {
+  connection.Defer(std::make_unique<LateMarks>());
+}
+
 void MarkTile(Connection& connection,
               const TileId& id,
               std::uint64_t generation,
               std::uint64_t since) {
-  connection
-      .Prepare(
-          "INSERT INTO dirty_tiles (key, shard, level, generation, since, checksum) "
-          "VALUES (?1,?2,?3,?4,?5, row_hash(14, ?1, ?4, ?5)) "
-          "ON CONFLICT (key) DO UPDATE SET generation = excluded.generation, "
-          "since = min(since, excluded.since), attempts = 0, retry_at_ms = 0, "
-          "checksum = row_hash(14, key, excluded.generation, min(since, excluded.since))")
-      .Bind(id.Key())
-      .Bind(ShardOf(id))
-      .Bind(std::int64_t{id.level})
-      .Bind(generation)
-      .Bind(since)
-      .Run();
+  const Mark mark{id.Key(), generation, since};
+  if (LateMarks* marks = connection.FindDeferred<LateMarks>()) {
+    marks->Add(mark, connection);
+  } else {
+    WriteMark(connection, mark);
+  }
 }
 
 Result<ClaimResult> ClaimTiles(Connection& connection, const ClaimRequest& request) {
+  WriteLateMarks(connection);
   const auto level = LowestLevel(connection, request);
   if (!level) {
     return ClaimResult{{}, true};
@@ -104,6 +176,7 @@ Result<ClaimResult> ClaimTiles(Connection& connection, const ClaimRequest& reque
 }
 
 Status CheckClaim(Connection& connection, const TileClaim& claim) {
+  WriteLateMarks(connection);
   Query row = connection.Prepare("SELECT coalesce(lease_owner, '') FROM dirty_tiles WHERE key = ?");
   row.Bind(claim.id.Key());
   if (row.Step() && row.Text() == claim.owner) {
@@ -114,6 +187,7 @@ Status CheckClaim(Connection& connection, const TileClaim& claim) {
 }
 
 void SettleClaim(Connection& connection, const TileClaim& claim) {
+  WriteLateMarks(connection);
   const int cleared = connection.Prepare("DELETE FROM dirty_tiles WHERE key = ? AND generation = ?")
                           .Bind(claim.id.Key())
                           .Bind(claim.generation)
@@ -131,6 +205,7 @@ void SettleClaim(Connection& connection, const TileClaim& claim) {
 }
 
 void PostponeClaim(Connection& connection, const TileClaim& claim, std::int64_t retry_at_ms) {
+  WriteLateMarks(connection);
   connection
       .Prepare(
           "UPDATE dirty_tiles SET lease_owner = NULL, lease_until_ms = 0, "
@@ -151,6 +226,7 @@ void DropAllLeases(Connection& connection) {
 }
 
 Status CheckMarks(Connection& connection) {
+  WriteLateMarks(connection);
   ATLAS_RETURN_IF_ERROR(CheckTableSum(connection, RowKind::kDirtyTile));
   Query row = connection.Prepare(
       "SELECT count(*) FROM dirty_tiles WHERE checksum <> row_hash(14, key, generation, since)");
@@ -161,11 +237,13 @@ Status CheckMarks(Connection& connection) {
 }
 
 void ForgetMarks(Connection& connection) {
+  WriteLateMarks(connection);
   connection.Execute("DELETE FROM dirty_tiles");
   WriteTableSum(connection, RowKind::kDirtyTile);
 }
 
 DirtyState ReadDirty(Connection& connection) {
+  WriteLateMarks(connection);
   DirtyState state;
   state.revision = ReadCounter(connection, Counter::kRevision);
   Query row = connection.Prepare(

@@ -7,6 +7,10 @@
 
 namespace atlas {
 
+// From now on this connection marks tiles before it commits, each once: uploads mark the same ones
+// again and again. Everything below knows of them before that.
+void MarkAtTheEnd(Connection& connection);
+
 // `generation`: the revision of the change that marks; `since`: the first revision that the tile
 // will not reflect until it is built.
 void MarkTile(Connection& connection,

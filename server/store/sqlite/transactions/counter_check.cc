@@ -112,6 +112,7 @@ int RecountCounters(Connection& connection) {
 }
 
 int RestoreCounters(Connection& connection) {
+  connection.WriteDeferred();
   std::string names;
   int restored = 0;
   for (const Recount& recount : kRecounts) {
