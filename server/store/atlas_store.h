@@ -151,7 +151,8 @@ class AtlasStore : public TileIndex {
 
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
-  // Behind `after` by vehicle and session, whether there is one of that name or not, up to `limit`.
+  // Behind `after` by vehicle and session, whether there is one of that name or not, up to `limit`:
+  // damaged ones, too, which say so.
   virtual Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
                                                           std::uint32_t limit) = 0;
   // nullopt: unknown.
