@@ -3,9 +3,8 @@
 // thread, and must not block. Reads may be called from any thread, see one snapshot each, and hold
 // nothing when they return. Rows whose checksum is wrong are kInvalidData and name the row.
 //
-// Writes fail with kResourceExhausted on a full disk, kPermissionDenied on a read-only one,
-// kUnavailable when the queue is full, the disk fails or the store is closing; they then left no
-// trace.
+// Writes fail with kResourceExhausted on a full disk, kUnavailable when the queue is full, the disk
+// fails or became read-only, or the store is closing; they then left no trace.
 #pragma once
 
 #include <filesystem>
