@@ -102,6 +102,7 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   session.last_sequence = info.last_sequence();
   session.compacted = info.compacted();
   session.reason = info.reason();
+  session.is_damaged = info.damaged();
   return session;
 }
 

@@ -122,6 +122,7 @@ struct SessionSummary {
   std::uint32_t last_sequence = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
   std::string reason;           // of a state that is not "live"; empty: of a daemon before 1.9, too
+  bool is_damaged = false;      // `reason` says what; of a "damaged" one only the name is known
 };
 
 struct SessionChangeSummary {

@@ -3,9 +3,8 @@
 // thread, and must not block. Reads may be called from any thread, see one snapshot each, and hold
 // nothing when they return. Rows whose checksum is wrong are kInvalidData and name the row.
 //
-// Writes fail with kResourceExhausted on a full disk, kPermissionDenied on a read-only one,
-// kUnavailable when the queue is full, the disk fails or the store is closing; they then left no
-// trace.
+// Writes fail with kResourceExhausted on a full disk, kUnavailable when the queue is full, the disk
+// fails or became read-only, or the store is closing; they then left no trace.
 #pragma once
 
 #include <filesystem>
@@ -151,7 +150,8 @@ class AtlasStore : public TileIndex {
 
   virtual Result<DirtyState> ReadDirtyState() = 0;
   virtual Result<StoreCounts> ReadCounts() = 0;
-  // Behind `after` by vehicle and session, whether there is one of that name or not, up to `limit`.
+  // Behind `after` by vehicle and session, whether there is one of that name or not, up to `limit`:
+  // damaged ones, too, which say so.
   virtual Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
                                                           std::uint32_t limit) = 0;
   // nullopt: unknown.

@@ -27,6 +27,13 @@ inline bool IsInMap(SessionState state) {
   return state == SessionState::kLive || state == SessionState::kReleased;
 }
 
+// What a list of sessions found wrong with one of them.
+enum class SessionDamage : std::uint8_t {
+  kNone,
+  kHistory,  // of its states: why it is in this one is not known
+  kRow,      // nothing of it is known but its name
+};
+
 // The times and the last sequence are those of all keyframes that were ever uploaded.
 struct SessionRecord {
   SessionKey key;
@@ -37,7 +44,8 @@ struct SessionRecord {
   std::int64_t last_time_ms = 0;
   std::uint32_t last_sequence = 0;
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
-  std::string reason = {};      // of its state, unless it is live; may be empty
+  std::string reason = {};      // of its state, unless it is live; may be empty. Or of its damage
+  SessionDamage damage = SessionDamage::kNone;  // of one that is listed; others are an error
 };
 
 // No keyframe was uploaded yet.

@@ -129,7 +129,7 @@ class AtlasClient:
         return self._call(atlas_pb2.StatusRequest())
 
     def sessions(self) -> list[atlas_pb2.SessionInfo]:
-        """All, by vehicle and session, however many pages they take."""
+        """All, by vehicle and session, however many pages they take. `damaged` ones say what is in `reason`."""
         sessions: list[atlas_pb2.SessionInfo] = []
         request = atlas_pb2.SessionsRequest()
         while True:

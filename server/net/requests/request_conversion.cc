@@ -185,7 +185,8 @@ void WaitToWire(const WaitOutcome& outcome, wire::WaitReply& out) {
 void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
   out.set_vehicle(record.key.vehicle);
   out.set_session(record.key.session);
-  out.set_state(StateName(record.state));
+  out.set_state(record.damage == SessionDamage::kRow ? "damaged" : StateName(record.state));
+  out.set_damaged(record.damage != SessionDamage::kNone);
   out.set_keyframes(record.keyframes);
   out.set_bytes(record.bytes);
   out.set_first_time_ms(record.first_time_ms);

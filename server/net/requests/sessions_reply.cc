@@ -13,9 +13,12 @@ namespace {
 
 namespace asio = boost::asio;
 
-// More than one takes in a reply: two names of 64 bytes, a state of 11, six numbers, their tags.
-constexpr std::size_t kSessionBytes = 216;
-constexpr std::size_t kReasonBytes = 260;  // that some have besides: pages with many are shorter
+// More than one takes in a reply: two names of 64 bytes, a state of 11, six numbers, whether it is
+// damaged, their tags.
+constexpr std::size_t kSessionBytes = 218;
+// That some have besides: pages with many are shorter. An operator's reason is 256 bytes at most,
+// and two numbers of keyframes and what is between them some 120.
+constexpr std::size_t kReasonBytes = 520;
 static_assert(kMaxSessionsOfPage * kSessionBytes + kReasonBytes <= kReplyBatchBytes);
 
 // Behind which one; nothing: from the first one on.
@@ -37,7 +40,7 @@ void PageToWire(const std::vector<SessionRecord>& found,
                 wire::SessionsReply& out) {
   std::size_t count = 0;
   for (std::size_t bytes = 0; count < std::min(found.size(), limit); ++count) {
-    bytes += kSessionBytes + (found[count].reason.empty() ? 0 : kReasonBytes);
+    bytes += kSessionBytes + found[count].reason.size();
     if (count > 0 && bytes > room_bytes) {
       break;
     }

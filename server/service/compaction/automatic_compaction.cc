@@ -98,6 +98,9 @@ Result<std::vector<SessionRecord>> AutomaticCompaction::ListSessionsInMap() cons
       return in_map;
     }
     for (const SessionRecord& session : *page) {
+      if (session.damage != SessionDamage::kNone) {
+        return Error(StatusCode::kInvalidData, session.reason);
+      }
       if (IsInMap(session.state) && session.keyframes > 0) {
         in_map.push_back(session);
       }

@@ -148,8 +148,13 @@ std::vector<TileClaim> FusionScheduler::NextClaims(const std::string& owner) {
     auto result =
         Await<ClaimResult>([&](auto done) { store_.ClaimDirty(request, std::move(done)); });
     if (!result) {
-      log_(LogLevel::kError, "fusion: cannot claim tiles: " + result.error().message());
+      const std::string& why = result.error().message();
+      log_(claiming_.Fails(why) ? LogLevel::kError : LogLevel::kDebug,
+           "fusion: cannot claim tiles: " + why);
       return {};
+    }
+    if (!result->claims.empty()) {  // else nothing had to be written
+      NoteSuccess(claiming_, "claimed");
     }
     if (!result->claims.empty() || !result->is_wave_done || !StartNextWave(wave)) {
       return std::move(result->claims);
@@ -260,11 +265,14 @@ bool FusionScheduler::GiveBack(Worker& worker) {
     const auto released = Await<bool>(
         [&](auto done) { store_.ReleaseClaim(back.claim, back.retry_at_ms, std::move(done)); });
     if (!released) {
-      log_(LogLevel::kWarning,
-           StrCat("fusion: cannot release tile ", back.claim.id, ": ", released.error().message()));
+      const std::string& why = released.error().message();
+      log_(releasing_.Fails(why) ? LogLevel::kWarning : LogLevel::kDebug,
+           StrCat("fusion: cannot release tile ", back.claim.id, ": ", why));
       if (released.error().code() != StatusCode::kInvalidData) {
         return false;
       }
+    } else {
+      NoteSuccess(releasing_, "released");
     }
     worker.returns.pop_back();
   }
@@ -272,6 +280,13 @@ bool FusionScheduler::GiveBack(Worker& worker) {
     changes_.Notify();
   }
   return true;
+}
+
+void FusionScheduler::NoteSuccess(RepeatedLine& line, const char* what) {
+  if (const std::uint64_t failures = line.Succeeds(); failures > 0) {
+    log_(LogLevel::kInfo,
+         StrCat("fusion: tiles can be ", what, " again, after ", failures, " failures"));
+  }
 }
 
 void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why) {

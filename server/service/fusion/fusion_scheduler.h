@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/base/repeated_line.h"
 #include "server/service/change_signal.h"
 #include "server/service/fusion/damage_list.h"
 #include "server/service/fusion/tile_refresher.h"
@@ -88,6 +89,7 @@ class FusionScheduler {
              const std::stop_token& stop,
              const TileRefresher::OnBuilt& on_built);
   bool GiveBack(Worker& worker);
+  void NoteSuccess(RepeatedLine& line, const char* what);
   void PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why);
   bool HasDamage(const TileId& tile);
   bool MarkDamagedChildren(const TileId& parent);
@@ -100,6 +102,8 @@ class FusionScheduler {
   FusionOptions options_;
   TileRefresher refresher_;
   DamageList damage_;
+  RepeatedLine claiming_;  // tried every second while the disk is full, as is the next
+  RepeatedLine releasing_;
   mutable std::mutex start_mutex_;
   Status start_problem_;                 // with it
   std::atomic<bool> has_rules_ = false;  // the store knows by which rules is fused

@@ -226,7 +226,7 @@ Status AtlasVerifier::VerifyTiles() {
   while (true) {
     const auto page = store_.ListTiles(after, kPage);
     if (!page) {
-      return page.error();
+      return Note(page.error());  // they cannot be listed
     }
     if (page->empty()) {
       return {};

@@ -13,15 +13,16 @@ namespace {
 class DamageEndToEndTest : public EndToEndTest {
  protected:
   static void Spoil(const fs::path& data) {
+    Spoil(data,
+          "UPDATE keyframes SET blob = zeroblob(blob_bytes) WHERE id IN "
+          "(SELECT id FROM keyframes ORDER BY id LIMIT 2)");
+  }
+  static void Spoil(const fs::path& data, const char* sql) {
     sqlite3* db = nullptr;
     ASSERT_EQ(sqlite3_open((data / "atlas.db").c_str(), &db), SQLITE_OK);
+    sqlite3_busy_timeout(db, 10'000);
     char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(db,
-                           "UPDATE keyframes SET blob = zeroblob(blob_bytes) WHERE id IN "
-                           "(SELECT id FROM keyframes ORDER BY id LIMIT 2)",
-                           nullptr, nullptr, &message),
-              SQLITE_OK)
-        << message;
+    EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, &message), SQLITE_OK) << message;
     sqlite3_close(db);
   }
   static std::vector<std::string> Kinds(const DaemonProcess& daemon) {
@@ -75,6 +76,26 @@ TEST_F(DamageEndToEndTest, ASecondIngestHealsAndARepairGivesUp) {
   const CommandRun sent = Ingest(daemon);
   EXPECT_EQ(sent.exit_code, 0) << sent.err;
   EXPECT_EQ(Digest(daemon), intact);
+}
+
+TEST_F(DamageEndToEndTest, ADamagedSessionIsOneOfTheListAndHowTheCommandEnds) {
+  const fs::path data = NewData();
+  {
+    DaemonProcess daemon(data, kSmall);
+    ASSERT_EQ(Ingest(daemon, {"--session", "first"}).exit_code, 0);
+    Spoil(data, "UPDATE sessions SET keyframes = 1 WHERE session = 'first'");
+    const CommandRun list = RunAtlas(daemon.address(), {"sessions"});
+    EXPECT_EQ(list.exit_code, 6) << list.out;
+    EXPECT_NE(list.err.find("1 of 2 damaged"), std::string::npos) << list.err;
+    const auto& sessions = list.json().at("sessions").as_array();
+    ASSERT_EQ(sessions.size(), 2U);
+    EXPECT_EQ(sessions[0].at("state").as_string(), "damaged");
+    EXPECT_TRUE(sessions[0].at("damaged").as_bool());
+    EXPECT_FALSE(sessions[1].at("damaged").as_bool());
+    EXPECT_GT(sessions[1].at("keyframes").to_number<int>(), 1);
+  }
+  DaemonProcess daemon(data, {});
+  EXPECT_EQ(RunAtlas(daemon.address(), {"sessions"}).exit_code, 0);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // stops.
 #include <csignal>
 #include <fstream>
+#include <future>
 
 #include <boost/json/parse.hpp>
 
@@ -114,6 +115,40 @@ TEST_F(OperationsEndToEndTest, AFailedSyncEndsTheDaemonAndNothingAcknowledgedIsL
   const CommandRun verified = RunAtlas(again.address(), {"verify", "--rebuild"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
   EXPECT_EQ(Ingest(again, {"--session", "second"}).exit_code, 0);
+}
+
+TEST_F(OperationsEndToEndTest, ADiskThatBecomesReadOnlyStopsUploadsUntilItIsNot) {
+  const fs::path switched_on = NewFile();
+  setenv("LD_PRELOAD", READ_ONLY_DISK_PATH, 1);
+  setenv("READ_ONLY_DISK", switched_on.c_str(), 1);
+  DaemonProcess daemon(NewData(), {"--cell-size", "0.2", "--http", "127.0.0.1:0"},
+                       DaemonProcess::Log::kKept);
+  unsetenv("LD_PRELOAD");
+  unsetenv("READ_ONLY_DISK");
+  ASSERT_EQ(Ingest(daemon, {"--session", "first"}).exit_code, 0);
+  const std::string first = Digest(daemon);
+  const int keyframes = RunAtlas(daemon.address(), {"status"}).Get<int>("keyframes");
+  Write(switched_on, "");
+  auto second = std::async(std::launch::async, [&daemon] {
+    return Ingest(daemon, {"--session", "second"});
+  });
+  EXPECT_NE(daemon.ReadLogUntil("(upload_keyframe) failed"), "");
+  const CommandRun changed = RunAtlas(daemon.address(), {"vehicle", "retract", "vehicle"});
+  EXPECT_EQ(changed.exit_code, 5) << changed.out << changed.err;
+  EXPECT_NE(changed.err.find("disk I/O error"), std::string::npos) << changed.err;
+  const HttpAnswer ready = Ask(daemon.http_port(), "/readyz");
+  EXPECT_EQ(ready.status, 503);
+  EXPECT_NE(ready.body.find("disk I/O error"), std::string::npos) << ready.body;
+  EXPECT_EQ(Digest(daemon), first) << "reads go on";
+  EXPECT_EQ(RunAtlas(daemon.address(), {"status"}).Get<int>("keyframes"), keyframes);
+
+  fs::remove(switched_on);
+  const CommandRun ingested = second.get();
+  EXPECT_EQ(ingested.exit_code, 0) << "it went on by itself: " << ingested.err;
+  EXPECT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
+  const CommandRun verified = RunAtlas(daemon.address(), {"verify", "--rebuild"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  EXPECT_EQ(daemon.Stop(SIGTERM), 0);
 }
 #endif
 

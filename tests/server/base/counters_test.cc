@@ -5,6 +5,7 @@
 
 #include "server/base/duration_histogram.h"
 #include "server/base/line_budget.h"
+#include "server/base/repeated_line.h"
 
 namespace atlas {
 namespace {
@@ -50,6 +51,18 @@ TEST(LineBudgetTest, LeavesOutWhatIsTooMuchAndSaysHowMuchThatWas) {
   EXPECT_EQ(budget.Take(begin + std::chrono::milliseconds(999)), std::nullopt);
   EXPECT_EQ(budget.Take(begin + seconds(1)), 2u);
   EXPECT_EQ(budget.Take(begin + seconds(1)), 0u);
+}
+
+TEST(RepeatedLineTest, IsSaidOnceForEachReasonAndCountedUntilItIsOver) {
+  RepeatedLine line;
+  EXPECT_EQ(line.Succeeds(), 0u);
+  EXPECT_TRUE(line.Fails("full"));
+  EXPECT_FALSE(line.Fails("full"));
+  EXPECT_TRUE(line.Fails("read-only"));
+  EXPECT_FALSE(line.Fails("read-only"));
+  EXPECT_EQ(line.Succeeds(), 4u);
+  EXPECT_EQ(line.Succeeds(), 0u);
+  EXPECT_TRUE(line.Fails("read-only")) << "it is news again";
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <utility>
 #include <vector>
 
+#include <sqlite3.h>
+
 #include "server/net/requests/sessions_reply.h"
 #include "tests/server/net/net_fixture.h"
 
@@ -89,6 +91,31 @@ TEST_F(SessionsTest, WhatBeginsOrVanishesBetweenPagesTakesNoOtherWithIt) {
   Begin("bus", {"a", "c", "e"});
   EXPECT_EQ(Ask(*peer, {"bus", "d"}, 2), (Page{{"e", "f"}, false}));
   EXPECT_EQ(Ask(*peer, {"bus", "d5"}, 2), (Page{{"e", "f"}, false})) << "as when it is gone";
+}
+
+TEST_F(SessionsTest, DamagedOnesAreMarkedAndTheOthersTold) {
+  Serve(0);
+  Begin("bus", {"a", "b", "c"});
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open((directory_ / "data" / "atlas.db").c_str(), &db), SQLITE_OK);
+  sqlite3_busy_timeout(db, 10'000);
+  EXPECT_EQ(sqlite3_exec(db, "UPDATE sessions SET keyframes = 9 WHERE session IN ('b', 'c')",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(db);
+  const auto peer = Connect();
+  EXPECT_EQ(Ask(*peer, {}, 2), (Page{{"a", "b"}, true}));
+  EXPECT_EQ(Ask(*peer, {"bus", "b"}, 2), (Page{{"c"}, false}));
+  peer->Send(SessionsOf(6));
+  const auto reply = peer->Receive();
+  ASSERT_TRUE(reply && reply->sessions_reply().sessions_size() == 3);
+  EXPECT_FALSE(reply->sessions_reply().sessions(0).damaged());
+  EXPECT_EQ(reply->sessions_reply().sessions(0).state(), "live");
+  const wire::SessionInfo& damaged = reply->sessions_reply().sessions(1);
+  EXPECT_TRUE(damaged.damaged());
+  EXPECT_EQ(damaged.state(), "damaged");
+  EXPECT_EQ(damaged.keyframes(), 0u);
+  EXPECT_NE(damaged.reason().find("wrong checksum"), std::string::npos) << damaged.reason();
 }
 
 TEST_F(SessionsTest, NamesThatAreNoneAreRefused) {

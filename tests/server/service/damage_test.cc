@@ -271,6 +271,31 @@ TEST_F(DamageTest, TilesThatAreListedAndNotFoundAreRepaired) {
   EXPECT_EQ(report->damaged, 0U) << report->findings.at(0);
 }
 
+TEST_F(DamageTest, AnIndexThatIsGoneIsNamedAndMadeAnew) {
+  for (const std::string index : {"tile_summaries", "changes_of_tile", "tiles_of_keyframe",
+                                  "quarantined_sessions", "tombstones_of_compaction"}) {
+    SCOPED_TRACE(index);
+    Fill();
+    Tamper("DROP INDEX " + index);
+    const auto damaged = service_->Verify({}, Long());
+    ASSERT_TRUE(damaged) << damaged.error().message();
+    EXPECT_GT(damaged->damaged, 0U);
+    EXPECT_THAT(damaged->findings,
+                ::testing::Contains(::testing::HasSubstr("the index " + index + " is missing; ")));
+    if (index == "tile_summaries") {
+      EXPECT_EQ(service_->Digest(Long()).error().code(), StatusCode::kInvalidData);
+    }
+    const auto repaired = Repair();
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    EXPECT_EQ(repaired->restored, 1U);
+    const auto report = service_->Verify({.rebuild = true}, Long());
+    EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
+    EXPECT_EQ(Digest().sha256, intact_.sha256);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
+}
+
 TEST_F(DamageTest, APoseComesBackFromItsHistoryByItself) {
   Fill();
   Tamper("UPDATE poses SET x_um = x_um + 4096 WHERE keyframe_id = 4");

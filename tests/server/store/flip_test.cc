@@ -158,6 +158,9 @@ class FlipTest : public StoreTest {
         Answer(store_->ListSessions({}, 1'000), [](const std::vector<SessionRecord>& sessions) {
           std::string text;
           for (const SessionRecord& session : sessions) {
+            if (session.damage != SessionDamage::kNone) {
+              return std::string(kDamaged);
+            }
             text += StrCat(session.key, " ", static_cast<int>(session.state), " ",
                            session.keyframes, " ", session.last_sequence, ",");
           }

@@ -334,6 +334,35 @@ TEST_F(QuarantineTest, RetractedFromQuarantineItIsJudgedAnewWhenItIsRestored) {
   ExpectSound();
 }
 
+TEST_F(QuarantineTest, RetractedFromQuarantineItStillSaysWhyItWasThere) {
+  const auto retract = [this](const std::string& why) {
+    ASSERT_TRUE(Await<SessionChangeResult>([&](auto done) {
+      store_->ChangeSession({kDay, SessionAction::kRetract, "tester", why, kLimits},
+                            std::move(done));
+    }));
+  };
+  Open();
+  ASSERT_TRUE(Put(At(20, {0, 0}, "day")).has_value());
+  retract("not yet");
+  EXPECT_EQ(Reason(), "not yet");
+  ASSERT_TRUE(Change(SessionAction::kRestore).has_value());
+  ASSERT_TRUE(Put(At(52, {400, 0}, "day")).has_value());
+  const std::string quarantined = Reason();
+  ASSERT_EQ(quarantined.rfind("keyframe 20 to 52: ", 0), 0U) << quarantined;
+  retract("");
+  EXPECT_EQ(Reason(), "was quarantined: " + quarantined);
+  ASSERT_TRUE(Change(SessionAction::kRestore).has_value());
+  EXPECT_EQ(Reason(), quarantined);
+  retract("broken odometer");
+  EXPECT_EQ(Reason(), "broken odometer; was quarantined: " + quarantined);
+  for (std::uint32_t i = 1; i < 16; ++i) {
+    ASSERT_TRUE(Put(At(20 + 2 * i, {25 * i, 0}, "day")).has_value());
+  }
+  ASSERT_EQ(Change(SessionAction::kRestore)->state, SessionState::kLive);
+  retract("once more");
+  EXPECT_EQ(Reason(), "once more") << "it was in the map";
+}
+
 TEST_F(QuarantineTest, ARestoreDoesNotReleaseAndAVehicleIsNotReleasedAsAWhole) {
   Open();
   PutAt(2, 2);

@@ -1,6 +1,9 @@
 // `atlas sessions`: which vehicles' drives the atlas is made of.
+#include <algorithm>
+
 #include "client/cli/commands/atlas/atlas_commands.h"
 #include "client/cli/output/text_table.h"
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -15,7 +18,8 @@ boost::json::object SessionJson(const SessionSummary& session) {
           {"last_time_ms", session.last_time_ms},
           {"last_sequence", session.last_sequence},
           {"compacted", session.compacted},
-          {"reason", session.reason}};
+          {"reason", session.reason},
+          {"damaged", session.is_damaged}};
 }
 
 std::string StateText(const SessionSummary& session) {
@@ -33,6 +37,17 @@ void PrintSessions(const std::vector<SessionSummary>& sessions, std::ostream& ou
   table.Print(out);
 }
 
+// The list is all there is to tell; that it has damage in it is how the command ends.
+Status DamageOf(const std::vector<SessionSummary>& sessions) {
+  const auto damaged = std::count_if(sessions.begin(), sessions.end(),
+                                     [](const SessionSummary& s) { return s.is_damaged; });
+  if (damaged == 0) return {};
+  return {StatusCode::kInvalidData,
+          StrCat("sessions: ", damaged, " of ", sessions.size(),
+                 " damaged: a session's row is written anew when the daemon starts, its history by "
+                 "atlas verify --repair")};
+}
+
 class SessionsCommand : public Command {
  public:
   std::string Name() const override { return "sessions"; }
@@ -46,14 +61,14 @@ class SessionsCommand : public Command {
     if (!sessions) return sessions.error();
     if (!context.is_json) {
       PrintSessions(*sessions, context.out);
-      return {};
+      return DamageOf(*sessions);
     }
     boost::json::array array;
     for (const SessionSummary& session : *sessions) {
       array.push_back(SessionJson(session));
     }
     context.PrintJson({{"sessions", std::move(array)}});
-    return {};
+    return DamageOf(*sessions);
   }
 };
 

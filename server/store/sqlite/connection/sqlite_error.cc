@@ -1,6 +1,7 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 
 #include <new>
+#include <string_view>
 
 #include <SQLiteCpp/Exception.h>
 #include <sqlite3.h>
@@ -33,9 +34,19 @@ StatusCode CodeOf(int primary) {
   }
 }
 
+// What a statement is told whose index somebody dropped.
+bool IsWithoutIndex(const SQLite::Exception& error) {
+  return error.getErrorCode() == SQLITE_ERROR &&
+         std::string_view(error.what()).starts_with("no such index: ");
+}
+
 }  // namespace
 
 Status StatusFromSqlite(const SQLite::Exception& error) {
+  if (IsWithoutIndex(error)) {
+    return Status(StatusCode::kInvalidData, StrCat("store: the database is damaged: ", error.what(),
+                                                   "; atlas verify --repair makes it anew"));
+  }
   const int primary = error.getErrorCode() & 0xFF;
   return Status(CodeOf(primary),
                 StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")"));

@@ -1,6 +1,9 @@
 #include "server/store/sqlite/schema/schema.h"
 
 #include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
@@ -150,6 +153,31 @@ INSERT INTO counters (id, name, value, checksum)
   SELECT id, name, 0, row_hash(12, id, 0) FROM names;
 )sql";
 
+struct Index {
+  std::string name;
+  std::string sql;  // without the semicolon, as SQLite keeps it
+};
+
+// As the tables have them; those of keys are SQLite's own, and cannot be dropped.
+std::vector<Index> ListIndexes() {
+  constexpr std::string_view kCreate = "CREATE INDEX ";
+  const std::string_view tables = kTables;
+  std::vector<Index> indexes;
+  for (std::size_t at = tables.find(kCreate); at != std::string_view::npos;
+       at = tables.find(kCreate, at + 1)) {
+    const std::string_view sql = tables.substr(at, tables.find(';', at) - at);
+    const std::string_view name = sql.substr(kCreate.size());
+    indexes.push_back({std::string(name.substr(0, name.find(' '))), std::string(sql)});
+  }
+  return indexes;
+}
+
+bool IsThere(Connection& connection, const Index& index) {
+  Query row = connection.Prepare("SELECT 1 FROM sqlite_master WHERE type = 'index' AND name = ?");
+  row.Bind(std::string_view(index.name));
+  return row.Step();
+}
+
 std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) {
   return RowHash(RowKind::kMeta).Raw(profile).Raw(atlas_id).Unsigned(epoch).value();
 }
@@ -232,6 +260,31 @@ Result<StoreIdentity> ReadIdentity(Connection& connection) {
                " to ", kStoreSchemaVersion, "; open it once with atlasd, which upgrades it"));
   }
   return ReadMeta(connection);
+}
+
+Status CheckIndexes(Connection& connection) {
+  if (connection.Ask("PRAGMA user_version") != kStoreSchemaVersion) {
+    return {};  // a backup of an earlier one, which had others
+  }
+  for (const Index& index : ListIndexes()) {
+    if (!IsThere(connection, index)) {
+      return Status(StatusCode::kInvalidData, StrCat("store: the index ", index.name,
+                                                     " is missing; atlas verify --repair makes it "
+                                                     "anew"));
+    }
+  }
+  return {};
+}
+
+int RestoreIndexes(Connection& connection) {
+  int restored = 0;
+  for (const Index& index : ListIndexes()) {
+    if (!IsThere(connection, index)) {
+      connection.Execute(index.sql.c_str());
+      ++restored;
+    }
+  }
+  return restored;
 }
 
 }  // namespace atlas

@@ -25,4 +25,9 @@ void WriteEpoch(Connection& connection, const StoreIdentity& identity, std::uint
 // The same as ReadMeta, but kUnsupported on a version before kFirstReadableVersion, too.
 Result<StoreIdentity> ReadIdentity(Connection& connection);
 
+// kInvalidData naming an index that is gone from an atlas of today's version.
+Status CheckIndexes(Connection& connection);
+// Makes those that are gone anew, inside a transaction. How many.
+int RestoreIndexes(Connection& connection);
+
 }  // namespace atlas

@@ -50,6 +50,15 @@ Result<SessionStateRow> ReadOnly(Query& row, std::int64_t session_id) {
   return ReadRow(row);
 }
 
+// The line of what a retracted session was before.
+Result<SessionStateRow> ReadBeforeRetraction(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
+      "WHERE session_id = ? AND state <> ? ORDER BY revision DESC LIMIT 1");
+  row.Bind(session_id).Bind(static_cast<std::int64_t>(SessionState::kRetracted));
+  return ReadOnly(row, session_id);
+}
+
 Result<SessionState> ReadState(Query& row, std::int64_t session_id) {
   const auto stored = ReadOnly(row, session_id);
   return stored ? Result<SessionState>(stored->state) : Error(stored.error());
@@ -87,15 +96,20 @@ Result<std::string> ReadStateReason(Connection& connection, std::int64_t session
       "WHERE session_id = ? ORDER BY revision DESC LIMIT 1");
   row.Bind(session_id);
   auto stored = ReadOnly(row, session_id);
-  return stored ? Result<std::string>(std::move(stored->reason)) : Error(stored.error());
+  if (!stored || stored->state != SessionState::kRetracted) {
+    return stored ? Result<std::string>(std::move(stored->reason)) : Error(stored.error());
+  }
+  const auto before = ReadBeforeRetraction(connection, session_id);
+  if (!before || before->state != SessionState::kQuarantined) {
+    return before ? Result<std::string>(std::move(stored->reason)) : Error(before.error());
+  }
+  return StrCat(stored->reason, stored->reason.empty() ? "" : "; ",
+                "was quarantined: ", before->reason);
 }
 
 Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id) {
-  Query row = connection.Prepare(
-      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
-      "WHERE session_id = ? AND state <> ? ORDER BY revision DESC LIMIT 1");
-  row.Bind(session_id).Bind(static_cast<std::int64_t>(SessionState::kRetracted));
-  return ReadState(row, session_id);
+  const auto before = ReadBeforeRetraction(connection, session_id);
+  return before ? Result<SessionState>(before->state) : Error(before.error());
 }
 
 Status CheckSessionStates(Connection& connection, std::int64_t session_id, SessionState current) {

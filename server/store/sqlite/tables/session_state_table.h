@@ -24,7 +24,8 @@ void WriteSessionState(Connection& connection, const SessionStateRow& row);
 Result<SessionState> ReadSessionStateAt(Connection& connection,
                                         std::int64_t session_id,
                                         std::uint64_t revision);
-// Why it is in the state it is in, if somebody said.
+// Why it is in the state it is in, if somebody said; of one that was retracted from quarantine, why
+// it had been there, too.
 Result<std::string> ReadStateReason(Connection& connection, std::int64_t session_id);
 // What a retracted session was before.
 Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "core/geometry/keyframe_key.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/table_sums.h"
@@ -59,12 +60,35 @@ Result<SessionRow> ReadRow(Query& row) {
   return result;
 }
 
+// Of a row of SESSION_COLUMNS that is damaged: its name, which the index says, and what is wrong.
+SessionRow DamagedRow(Query& row, const Status& why) {
+  row.Rewind();
+  SessionRow result;
+  result.id = row.Int();
+  result.record.key.vehicle = row.Text();
+  result.record.key.session = row.Text();
+  result.record.reason = why.message();
+  result.record.damage = SessionDamage::kRow;
+  return result;
+}
+
+bool IsNamed(const SessionKey& key) {
+  return ValidateName("vehicle", key.vehicle).ok() && ValidateName("session", key.session).ok();
+}
+
+enum class OnDamage { kFail, kTell };
+
 // Of a damaged index they may come in another order, in which who goes on behind the last one goes
 // round in circles.
-Result<std::vector<SessionRow>> ReadPage(Query& row, const SessionKey& after) {
+Result<std::vector<SessionRow>> ReadPage(Query& row, const SessionKey& after, OnDamage on_damage) {
   std::vector<SessionRow> sessions;
   while (row.Step()) {
     auto session = ReadRow(row);
+    if (!session && on_damage == OnDamage::kTell) {
+      if (SessionRow damaged = DamagedRow(row, session.error()); IsNamed(damaged.record.key)) {
+        session = std::move(damaged);
+      }
+    }
     if (!session) {
       return Error(session.error());
     }
@@ -133,7 +157,7 @@ Result<std::vector<SessionRow>> ReadVehicleSessions(Connection& connection,
                                  " FROM sessions WHERE vehicle = ? AND session > ? "
                                  "ORDER BY session LIMIT ?");
   row.Bind(std::string_view(after.vehicle)).Bind(std::string_view(after.session)).Bind(limit);
-  return ReadPage(row, after);
+  return ReadPage(row, after, OnDamage::kFail);
 }
 
 Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
@@ -143,19 +167,18 @@ Result<std::vector<SessionRecord>> ReadSessions(Connection& connection,
                                  " FROM sessions WHERE (vehicle, session) > (?, ?) "
                                  "ORDER BY vehicle, session LIMIT ?");
   row.Bind(std::string_view(after.vehicle)).Bind(std::string_view(after.session)).Bind(limit);
-  auto page = ReadPage(row, after);
+  auto page = ReadPage(row, after, OnDamage::kTell);
   if (!page) {
     return Error(page.error());
   }
   std::vector<SessionRecord> sessions;
   sessions.reserve(page->size());
   for (SessionRow& session : *page) {
-    if (session.record.state != SessionState::kLive) {
+    SessionRecord& r = session.record;
+    if (r.damage == SessionDamage::kNone && r.state != SessionState::kLive) {
       auto reason = ReadStateReason(connection, session.id);
-      if (!reason) {
-        return Error(reason.error());
-      }
-      session.record.reason = std::move(*reason);
+      r.damage = reason ? SessionDamage::kNone : SessionDamage::kHistory;
+      r.reason = reason ? std::move(*reason) : reason.error().message();
     }
     sessions.push_back(std::move(session.record));
   }

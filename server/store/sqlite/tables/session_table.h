@@ -18,7 +18,7 @@ struct SessionRow {
 // nullopt: unknown. kInvalidData: its row is damaged.
 Result<std::optional<SessionRow>> FindSession(Connection& connection, const SessionKey& key);
 // Up to `limit` of those behind `after`, by vehicle and session; the first one of its vehicle
-// alone. kInvalidData: a row is damaged, or their index.
+// alone. kInvalidData: a row is damaged, or their index. Who lists them all is told which rows are.
 Result<std::vector<SessionRow>> ReadVehicleSessions(Connection& connection,
                                                     const SessionKey& after,
                                                     std::uint32_t limit);

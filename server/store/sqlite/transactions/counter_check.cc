@@ -4,6 +4,7 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
 
@@ -89,7 +90,7 @@ Status CheckCounters(Connection& connection) {
       add(StrCat("store: counter ", recount.name, " is ", counted, ", and the rows say ", found));
     }
   }
-  for (const auto check : {&CheckTableSums, &CheckStructure}) {
+  for (const auto check : {&CheckTableSums, &CheckIndexes, &CheckStructure}) {
     if (const Status status = check(connection); status.code() == StatusCode::kInvalidData) {
       add(status.message());
     } else if (!status.ok()) {

@@ -10,6 +10,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
@@ -223,6 +224,7 @@ Result<std::uint32_t> RepairRowsInStore(Connection& connection,
                                         std::uint8_t levels,
                                         const std::string& author) {
   auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
+  repaired += static_cast<std::uint32_t>(RestoreIndexes(connection));
   repaired += PutBackLostTiles(connection);
   connection.Execute("REINDEX");
   const auto sessions = RepairSessions(connection, author);
