@@ -248,29 +248,32 @@ Result<AtlasStatus> AtlasClient::ReadStatus() {
   return StatusFromWire(reply->status_reply());
 }
 
-Result<std::vector<SessionSummary>> AtlasClient::ListSessions() {
+Result<std::vector<SessionSummary>> AtlasClient::ListSessions(const std::string& vehicle) {
   std::vector<SessionSummary> sessions;
+  SessionKey last{vehicle, {}};
   while (true) {
     wire::Envelope request;
     wire::SessionsRequest& page = *request.mutable_sessions_request();
-    if (!sessions.empty()) {
-      page.set_after_vehicle(sessions.back().key.vehicle);
-      page.set_after_session(sessions.back().key.session);
-    }
+    page.set_after_vehicle(last.vehicle);
+    page.set_after_session(last.session);
     const auto reply = channel_->Call(request, Body::kSessionsReply);
     if (!reply) return Error(reply.error());
-    const std::size_t before = sessions.size();
+    const SessionKey before = last;
     for (const wire::SessionInfo& info : reply->sessions_reply().sessions()) {
       SessionSummary session = SessionFromWire(info);
-      if (!sessions.empty() && session.key <= sessions.back().key) {
+      // A daemon that knows no pages begins with the first of all.
+      if (session.key.vehicle < vehicle) continue;
+      if (!vehicle.empty() && session.key.vehicle > vehicle) return sessions;
+      if (session.key <= last) {
         return Error(StatusCode::kInvalidData,
-                     StrCat("sessions: the daemon told of ", session.key, " behind ",
-                            sessions.back().key, ", expected them in order"));
+                     StrCat("sessions: the daemon told of ", session.key, " behind ", last,
+                            ", expected them in order"));
       }
+      last = session.key;
       sessions.push_back(std::move(session));
     }
     if (!reply->sessions_reply().has_more()) return sessions;
-    if (sessions.size() == before) {
+    if (last == before) {
       return Error(StatusCode::kInvalidData, "sessions: the daemon has more of them and told none");
     }
   }

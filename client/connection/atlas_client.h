@@ -89,9 +89,9 @@ class AtlasClient {
   Result<AtlasStatus> ReadStatus();
   // Returns when no tile is dirty; kTimeout after `timeout`.
   Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
-  // All, by vehicle and session. Page by page: one that begins or vanishes meanwhile may be in it
-  // or not, every other one is.
-  Result<std::vector<SessionSummary>> ListSessions();
+  // All, or all of a vehicle, by vehicle and session. Page by page: one that begins or vanishes
+  // meanwhile may be in it or not, every other one is.
+  Result<std::vector<SessionSummary>> ListSessions(const std::string& vehicle = {});
   // Takes a session out of the map, or puts it back. kNotFound: unknown. One that is so already
   // stays as it is. The reason is for people: one line of at most 256 bytes, or none.
   Result<SessionChangeSummary> ChangeSession(const SessionKey& key,

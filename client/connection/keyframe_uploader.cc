@@ -39,6 +39,15 @@ struct KeyframeUploader::Answer {
   const wire::Envelope& envelope;
 };
 
+void UploadTotals::Add(const UploadTotals& more) {
+  sent += more.sent;
+  acked += more.acked;
+  duplicates += more.duplicates;
+  tiles_marked += more.tiles_marked;
+  bytes_sent += more.bytes_sent;
+  revision = std::max(revision, more.revision);
+}
+
 KeyframeUploader::KeyframeUploader(const AtlasClient& client, const UploadOptions& options)
     : channel_(client.channel_), options_(options) {}
 
@@ -76,6 +85,7 @@ Result<bool> KeyframeUploader::AwaitRoom(std::size_t next_bytes, Clock::time_poi
 
 Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
   InFlight next{next_number_++, 0, upload, upload.blob.size(), {}};
+  open_.insert(next.number);
   if (options_.patience.count() > 0) {
     if (next.number == 0) taken_ = Clock::now();
     next.blob.assign(upload.blob.begin(), upload.blob.end());
@@ -92,6 +102,7 @@ Result<bool> KeyframeUploader::UploadUntil(const KeyframeUpload& upload, Clock::
   const Result<bool> has_room = AwaitRoom(upload.blob.size(), latest);
   if (!has_room || !*has_room) return has_room;
   if (!first_refusal_.ok()) return Error(first_refusal_);
+  open_.insert(next_number_);
   Status status = Transmit({next_number_++, 0, upload, upload.blob.size(), {}}, latest);
   if (!status.ok()) return Error(std::move(status));
   return true;
@@ -123,7 +134,10 @@ void KeyframeUploader::NoteRefusal(InFlight upload, const Status& refusal) {
   // later, and it is the one to be named when the patience ends.
   if (is_busy && (!busy_.empty() || Clock::now() - taken_ < options_.patience)) {
     busy_.push_back(std::move(upload));
-  } else if (options_.on_answer) {
+    return;
+  }
+  if (options_.on_answer) {
+    open_.erase(upload.number);
     options_.on_answer(upload.upload.key, named);
   } else if (first_refusal_.ok()) {
     first_refusal_ = named;
@@ -180,6 +194,7 @@ Status KeyframeUploader::OnAnswer(const Answer& answer) {
   const wire::UploadReply& ack = reply.upload_reply();
   taken_ = Clock::now();
   ++totals_.acked;
+  open_.erase(answered.number);
   totals_.duplicates += ack.duplicate() ? 1U : 0U;
   totals_.tiles_marked += ack.tiles_marked();
   totals_.revision = std::max(totals_.revision, ack.revision());

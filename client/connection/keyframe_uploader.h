@@ -8,6 +8,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ struct UploadTotals {
   std::uint64_t tiles_marked = 0;
   std::uint64_t bytes_sent = 0;  // frames, as on the wire
   std::uint64_t revision = 0;    // of the newest acknowledgement
+
+  void Add(const UploadTotals& more);
 };
 
 class KeyframeUploader {
@@ -64,6 +67,9 @@ class KeyframeUploader {
   // Whether it is this client's connection that it uploads on.
   bool IsOf(const AtlasClient& client) const;
   std::size_t in_flight() const { return in_flight_.size(); }
+  // The first that was not acknowledged, counted from 0 in the order of Upload: with it another
+  // connection goes on.
+  std::uint64_t first_open() const { return open_.empty() ? next_number_ : *open_.begin(); }
   const UploadTotals& totals() const { return totals_; }
 
  private:
@@ -95,6 +101,7 @@ class KeyframeUploader {
   std::size_t in_flight_bytes_ = 0;
   std::vector<InFlight> busy_;  // refused, to be sent again
   std::uint64_t next_number_ = 0;
+  std::set<std::uint64_t> open_;            // numbers that were not acknowledged
   Clock::time_point taken_ = Clock::now();  // when the daemon took one last
   Status first_refusal_;
 };

@@ -51,8 +51,8 @@ SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
 
 class Ingest {
  public:
-  Ingest(const DriveFolder& drive, const IngestOptions& options, AtlasClient& client)
-      : drive_(drive), options_(options), uploader_(client, options.upload) {
+  Ingest(const DriveFolder& drive, const IngestOptions& options)
+      : drive_(drive), options_(options) {
     for (const DriveScan& scan : drive.scans) {
       poses_.push_back(scan.T_world_sensor);
     }
@@ -72,24 +72,20 @@ class Ingest {
     builder_.emplace(profile, survey->layout, builder_options);
     report_.mount = survey->mount;
     if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
-    return {};
+    return Plan();
   }
 
-  Status Run(const std::function<void(std::size_t, std::size_t)>& progress) {
-    for (std::size_t i = 0; i < selected_.size(); ++i) {
-      const DriveScan& scan = drive_.scans[selected_[i].index];
-      if (const Status status = UploadOne(selected_[i], scan); !status.ok()) {
-        return FinishAfter(status);
-      }
-      if (progress) progress(i + 1, selected_.size());
-    }
-    return uploader_.Finish();
+  Status Run(AtlasLink& link, const LastingUpload::Progress& progress) {
+    const auto send = [this](std::size_t i, KeyframeUploader& uploader) {
+      return UploadOne(i, uploader);
+    };
+    LastingUpload upload(planned_, options_.upload, send, progress);
+    Status status = upload.Run(link);
+    report_.upload = upload.report();
+    return status;
   }
 
-  IngestReport Report() {
-    report_.totals = uploader_.totals();
-    return report_;
-  }
+  const IngestReport& report() const { return report_; }
 
  private:
   Status Select() {
@@ -104,6 +100,15 @@ class Ingest {
       ATLAS_RETURN_IF_ERROR(KeyOf(scan).Validate());  // "S.12" may be too long a name
     }
     report_.sessions = parts.size();
+    return {};
+  }
+
+  Status Plan() {
+    for (const SelectedScan& selected : selected_) {
+      const Result<std::int64_t> time_ms = TimeOf(drive_.scans[selected.index]);
+      if (!time_ms) return time_ms.error();
+      planned_.push_back({KeyOf(selected), *time_ms});
+    }
     return {};
   }
 
@@ -135,18 +140,17 @@ class Ingest {
     return std::llround(time_s * 1e3);
   }
 
-  Status UploadOne(const SelectedScan& selected, const DriveScan& scan) {
-    const Result<PointCloud> cloud = ReadScan(scan.scan);
+  Status UploadOne(std::size_t i, KeyframeUploader& uploader) {
+    const std::size_t index = selected_[i].index;
+    const Result<PointCloud> cloud = ReadScan(drive_.scans[index].scan);
     if (!cloud) return cloud.error();
-    const Result<std::int64_t> time_ms = TimeOf(scan);
-    if (!time_ms) return time_ms.error();
-    const Bytes blob = BuildBlob(*cloud, selected.index);
+    const Bytes blob = BuildBlob(*cloud, index);
     KeyframeUpload upload;
-    upload.key = KeyOf(selected);
-    upload.time_ms = *time_ms;
-    upload.T_world_sensor = QuantizedPose::FromPose(scan.T_world_sensor);
+    upload.key = planned_[i].key;
+    upload.time_ms = planned_[i].time_ms;
+    upload.T_world_sensor = QuantizedPose::FromPose(drive_.scans[index].T_world_sensor);
     upload.blob = blob;
-    return uploader_.Upload(upload);
+    return uploader.Upload(upload);
   }
 
   Bytes BuildBlob(const PointCloud& cloud, std::size_t index) {
@@ -165,20 +169,12 @@ class Ingest {
     return TrailBefore(std::span(poses_).first(index + 1), builder_->mount());
   }
 
-  // What is in flight is waited for, so that it is either there or refused when this returns.
-  Status FinishAfter(const Status& failure) {
-    const Status finished = uploader_.Finish();
-    return finished.ok() || finished.code() == failure.code()
-               ? failure
-               : Status(failure.code(), failure.message() + "; and " + finished.message());
-  }
-
   const DriveFolder& drive_;
   const IngestOptions& options_;
   std::vector<Pose> poses_;  // of all scans
-  KeyframeUploader uploader_;
   std::optional<KeyframeBuilder> builder_;
   std::vector<SelectedScan> selected_;
+  std::vector<PlannedKeyframe> planned_;  // of the selected ones
   IngestReport report_;
 };
 
@@ -199,14 +195,16 @@ Status IngestOptions::Validate() const {
 
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
-                                 AtlasClient& client,
-                                 const std::function<void(std::size_t, std::size_t)>& progress) {
-  Ingest ingest(drive, options, client);
-  if (Status status = ingest.Prepare(client.profile()); !status.ok()) {
+                                 AtlasLink& link,
+                                 const LastingUpload::Progress& progress) {
+  const Result<AtlasClient*> client = link.Client(options.connect_timeout);
+  if (!client) return Error(client.error());
+  Ingest ingest(drive, options);
+  if (Status status = ingest.Prepare((*client)->profile()); !status.ok()) {
     return Error(std::move(status));
   }
-  if (Status status = ingest.Run(progress); !status.ok()) return Error(std::move(status));
-  return ingest.Report();
+  if (Status status = ingest.Run(link, progress); !status.ok()) return Error(std::move(status));
+  return ingest.report();
 }
 
 }  // namespace atlas

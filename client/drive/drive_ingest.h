@@ -3,14 +3,14 @@
 
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "client/connection/atlas_client.h"
 #include "client/connection/keyframe_uploader.h"
 #include "client/drive/drive_selection.h"
+#include "client/drive/lasting_upload.h"
+#include "client/vehicle/atlas_link.h"
 #include "core/base/status.h"
 #include "core/keyframe/sensor_mount.h"
 #include "core/scan/drive_folder.h"
@@ -28,6 +28,7 @@ struct IngestOptions {
   double now_s = 0.0;    // since 1970: later scans than a minute from now are refused
   std::optional<std::uint64_t> shuffle_seed;
   UploadOptions upload = {.patience = std::chrono::minutes(1)};
+  std::chrono::milliseconds connect_timeout{5'000};  // for the first connection
 
   // kInvalidArgument naming the first option out of range, those aside that depend on the atlas.
   Status Validate() const;
@@ -36,7 +37,7 @@ struct IngestOptions {
 struct IngestReport {
   std::uint64_t keyframes = 0;    // selected
   std::uint64_t empty_scans = 0;  // of those: without a return from beyond the vehicle
-  UploadTotals totals;
+  LastingUploadReport upload;
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob
   SensorMount mount;
@@ -45,11 +46,14 @@ struct IngestReport {
 };
 
 // `progress` (may be empty) is called with the number of keyframes sent. A scan that is bad is
-// named and nothing is uploaded. A daemon that is busy is waited for. Fails at the first keyframe
-// that the daemon refuses otherwise, naming it; what was acknowledged until then stays.
+// named and nothing is uploaded. A daemon that is busy is waited for, a connection that breaks is
+// made again, both for as long as the patience; what an interrupted run left with the daemon is not
+// made and sent again (lasting_upload.h). Fails at once where the daemon cannot be reached at all,
+// and at the first keyframe that it refuses otherwise, naming it; what was acknowledged until then
+// stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
-                                 AtlasClient& client,
-                                 const std::function<void(std::size_t, std::size_t)>& progress);
+                                 AtlasLink& link,
+                                 const LastingUpload::Progress& progress);
 
 }  // namespace atlas

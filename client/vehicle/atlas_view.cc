@@ -130,8 +130,13 @@ bool AtlasView::Collect(const DiscArea& disc, const AroundOptions& options, MapA
 
 void AtlasView::NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) const {
   map.sync = synced ? Status() : synced.error();
-  map.is_current = synced && synced->is_complete;
+  map.is_current = synced && synced->is_complete && synced->has_room;
   if (!synced) return;
+  if (!synced->has_room) {
+    map.sync = Status(StatusCode::kResourceExhausted,
+                      "tile store: no room for the map around, whose finest levels are followed "
+                      "nearby only: max_disk_bytes or max_memory_bytes is too small");
+  }
   map.revision = synced->revision;
   map.transfer.tiles += synced->tiles;
   map.transfer.bytes += synced->bytes;
@@ -142,6 +147,7 @@ void AtlasView::NoteSync(const Result<StoreSyncReport>& synced, MapAround& map) 
 
 void AtlasView::NoteDropped(const DiscArea& disc, std::uint8_t finest, MapAround& map) {
   const std::vector<TileId> dropped = store_.TakeDropped();
+  feed_->NoteDropped(store_, dropped);
   const auto is_missing = [&](const TileId& id) {
     return id.level >= finest && Touches(disc, id, store_.atlas().profile) &&
            store_.Find(id) == nullptr;

@@ -1,7 +1,11 @@
 // A store's tiles from a daemon, over a link that may be down.
 #pragma once
 
+#include <chrono>
+#include <vector>
+
 #include "client/vehicle/atlas_link.h"
+#include "client/vehicle/fine_reach.h"
 #include "client/vehicle/store_sync.h"
 #include "client/vehicle/tile_feed.h"
 
@@ -12,14 +16,36 @@ class LinkFeed final : public TileFeed {
   // Null: never anybody to ask. Outlives the feed.
   explicit LinkFeed(AtlasLink* link) : link_(link) {}
 
-  // Errors as of AtlasLink::Client and SyncStore.
+  // Errors as of AtlasLink::Client and SyncStore. Of a disc for which the store has no room it
+  // follows what FineReach says, and what it held beyond that, it holds no more.
   Result<StoreSyncReport> Sync(TileStore& store,
                                const MapArea& area,
                                const AroundOptions& options) override;
+  void NoteDropped(const TileStore& store, const std::vector<TileId>& dropped) override;
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  Result<StoreSyncReport> SyncArea(AtlasClient& client,
+                                   TileStore& store,
+                                   const MapArea& area,
+                                   const AroundOptions& options,
+                                   Clock::time_point end);
+  Result<StoreSyncReport> SyncParts(AtlasClient& client,
+                                    TileStore& store,
+                                    const AroundOptions& options,
+                                    Clock::time_point end);
+  // Of all levels that are wanted.
+  Result<StoreSyncReport> SyncDisc(AtlasClient& client,
+                                   TileStore& store,
+                                   const DiscArea& disc,
+                                   const AroundOptions& options,
+                                   Clock::time_point end);
+
   AtlasLink* link_;
   StoreSyncRest rest_;
+  FineReach reach_;
+  std::vector<DiscPart> parts_;  // of the last disc
 };
 
 }  // namespace atlas

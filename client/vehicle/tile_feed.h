@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <vector>
 
 #include "client/connection/sync_query.h"
 #include "client/vehicle/tile_store.h"
@@ -25,7 +26,8 @@ struct StoreSyncReport {
   std::uint64_t bytes = 0;   // of the replies' frames, or of a file's blobs
   std::uint64_t requests = 0;
   std::uint64_t revision = 0;  // the area is at least as new, if `is_complete`
-  bool is_complete = false;    // the store got all that the query wants
+  bool is_complete = false;    // the store got all that the query wants, as far as it has room
+  bool has_room = true;        // false: the finest levels of a disc are followed nearby only
 };
 
 class TileFeed {
@@ -42,6 +44,8 @@ class TileFeed {
   virtual Result<StoreSyncReport> Sync(TileStore& store,
                                        const MapArea& area,
                                        const AroundOptions& options) = 0;
+  // For these the store had no room since the last Sync of a disc.
+  virtual void NoteDropped(const TileStore& /*store*/, const std::vector<TileId>& /*dropped*/) {}
 };
 
 }  // namespace atlas

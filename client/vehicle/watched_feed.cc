@@ -74,8 +74,10 @@ Result<StoreSyncReport> WatchedFeed::Sync(TileStore& store,
   AroundOptions rest = options;
   const auto spent = std::chrono::duration_cast<milliseconds>(Clock::now() - start);
   rest.deadline = std::max(options.deadline - spent, milliseconds(1));
-  Result<StoreSyncReport> report = feed_.Sync(store, watched_->disc, rest);
-  const bool is_all = report && report->is_complete && store.changes() == store_changes;
+  Result<StoreSyncReport> report = feed_.Sync(store, had_room_ ? watched_->disc : *disc, rest);
+  had_room_ &= !report || report->has_room;
+  const bool is_all =
+      had_room_ && report && report->is_complete && store.changes() == store_changes;
   if (is_all && is_watched) settled_ = {&store, store_changes, report->revision, Clock::now()};
   return report;
 }

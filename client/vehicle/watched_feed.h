@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "client/connection/atlas_watch.h"
 #include "client/vehicle/atlas_link.h"
@@ -33,10 +34,14 @@ class WatchedFeed final : public TileFeed {
 
   // Of a disc: the disc and its margin. Complete without a request, with the revision of the last
   // one, while nothing in it was told to have changed, and the store holds what it held then. Of
-  // any other area, and else, as LinkFeed.
+  // any other area, and else, as LinkFeed. From when a store had no room for such a disc on, of the
+  // disc alone, and with a request in every call.
   Result<StoreSyncReport> Sync(TileStore& store,
                                const MapArea& area,
                                const AroundOptions& options) override;
+  void NoteDropped(const TileStore& store, const std::vector<TileId>& dropped) override {
+    feed_.NoteDropped(store, dropped);
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -67,6 +72,7 @@ class WatchedFeed final : public TileFeed {
   std::optional<AtlasWatch> watch_;  // none: refused, ended, or its connection is gone
   Clock::time_point next_watch_ = Clock::time_point::min();
   std::optional<Settled> settled_;
+  bool had_room_ = true;
 };
 
 }  // namespace atlas

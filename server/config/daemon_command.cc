@@ -1,12 +1,14 @@
 #include "server/config/daemon_command.h"
 
-#include <cstdlib>
+#include <algorithm>
 #include <map>
+#include <string_view>
 #include <utility>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <unistd.h>
 
 #include "core/base/str_cat.h"
 #include "server/config/config_file.h"
@@ -14,6 +16,29 @@
 
 namespace atlas {
 namespace {
+
+constexpr std::string_view kPrefix = "ATLASD_";
+
+// Every variable that begins as those of the settings do has to be one of them.
+Status AddEnvironment(const char* const* variables, GivenSettings& settings) {
+  for (; variables != nullptr && *variables != nullptr; ++variables) {
+    const std::string_view variable = *variables;
+    if (!variable.starts_with(kPrefix)) {
+      continue;
+    }
+    const std::string_view name = variable.substr(0, variable.find('='));
+    const auto all = AllSettings();
+    const auto setting = std::find_if(
+        all.begin(), all.end(), [name](const Setting& known) { return name == known.environment; });
+    if (setting == all.end()) {
+      return {StatusCode::kInvalidArgument, StrCat("environment: unknown variable '", name, "'")};
+    }
+    settings[setting->key] = {
+        std::string(variable.substr(std::min(name.size() + 1, variable.size()))),
+        setting->environment};
+  }
+  return {};
+}
 
 // File, then environment, then flags: later ones win.
 Result<GivenSettings> Collect(const GivenSettings& flags, const std::string& file) {
@@ -29,10 +54,8 @@ Result<GivenSettings> Collect(const GivenSettings& flags, const std::string& fil
     }
     settings = std::move(*read);
   }
-  for (const Setting& setting : AllSettings()) {
-    if (const char* value = std::getenv(setting.environment); value != nullptr) {
-      settings[setting.key] = {value, setting.environment};
-    }
+  if (Status status = AddEnvironment(environ, settings); !status.ok()) {
+    return Error(std::move(status));
   }
   for (const auto& [key, given] : flags) {
     settings[key] = given;

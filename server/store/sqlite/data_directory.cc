@@ -64,14 +64,29 @@ Status CheckContents(const fs::path& directory) {
   return error ? DiskError("data directory", directory, error.value()) : Status();
 }
 
+// Makes it where it is missing.
+Status MakeDirectory(const fs::path& directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (!error) {
+    return {};
+  }
+  const Status failure = DiskError("data directory", directory, error.value());
+  if (failure.code() != StatusCode::kConflict) {
+    return failure;
+  }
+  // It, or what it should be in, is a file: nobody else's doing, the path is wrong.
+  return {StatusCode::kInvalidArgument,
+          failure.message() + "; expected a directory, or a path at which one can be made"};
+}
+
 }  // namespace
 
 Result<DataDirectory> DataDirectory::Lock(const fs::path& directory) {
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error) {
-    return Error(DiskError("data directory", directory, error.value()));
+  if (Status status = MakeDirectory(directory); !status.ok()) {
+    return Error(std::move(status));
   }
+  std::error_code error;
   if (!fs::exists(directory / "atlas.db", error)) {
     if (Status status = CheckContents(directory); !status.ok()) {
       return Error(std::move(status));

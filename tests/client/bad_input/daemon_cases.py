@@ -26,8 +26,10 @@ def start_cases(cases, work, data):
     cases.report.equal("a second daemon: the atlas", cases.state(), before)
     folder = pathlib.Path(work)
     (folder / "file").write_text("notes", encoding="ascii")
-    refuses_to_start(cases, "a file for a data directory", folder / "file", [], 4, "conflict: .*file")
-    refuses_to_start(cases, "a data directory below a file", folder / "file/data", [], 4, "conflict: .*file")
+    refuses_to_start(cases, "a file for a data directory", folder / "file", [], 2,
+                     "invalid_argument: data directory .*file: .*expected a directory")
+    refuses_to_start(cases, "a data directory below a file", folder / "file/data", [], 2,
+                     "invalid_argument: data directory .*file/data: .*expected a directory")
     cases.report.equal("the file", (folder / "file").read_text(encoding="ascii"), "notes")
     (folder / "notes").mkdir()
     (folder / "notes/todo.txt").write_text("notes", encoding="ascii")

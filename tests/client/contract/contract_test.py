@@ -16,7 +16,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 
 KEYS = {
-    "ingest": "keyframes acked duplicates metres bytes_sent frontend_ms_per_scan sensor_height_m sessions wall_s",
+    "ingest": "keyframes acked duplicates sent_before reconnections metres bytes_sent frontend_ms_per_scan "
+              "sensor_height_m sessions wall_s",
     "wait": "revision dirty_tiles",
     "status": "revision preset keyframes sessions tiles dirty_tiles damaged_tiles store_bytes tile_bytes keyframe_bytes "
               "cells multilayer_cells rss_bytes compacted quarantined used_bytes store_limit_bytes disk_free_bytes "

@@ -111,6 +111,8 @@ std::uint16_t DaemonProcess::PortOf(const std::string& address) {
 }
 
 void DaemonProcess::Signal(int signal) const {
+  // kill(-1, ...) is everybody.
+  if (pid_ <= 0) throw std::logic_error("a signal to a daemon that was stopped");
   kill(pid_, signal);
 }
 
@@ -124,7 +126,7 @@ std::string DaemonProcess::ReadLogUntil(const std::string& words) {
 }
 
 int DaemonProcess::Stop(int signal) {
-  kill(pid_, signal);
+  Signal(signal);
   int status = 0;
   waitpid(pid_, &status, 0);
   pid_ = -1;

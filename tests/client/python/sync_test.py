@@ -56,6 +56,14 @@ class AreaTest(SyncCase):
         reply = self.sync(geometry.tiles(keys + [geometry.tile_key(0, 999, 999)]))
         self.assertEqual(sorted(tile.key for tile in reply.tiles), keys)
 
+    def test_keys_of_tiles_rise(self):
+        low, high = self.finest_block()[:2]
+        for keys in ([high, low], [low, low], [5, 3]):
+            unsorted = atlas_pb2.Area(tiles=atlas_pb2.Area.Tiles(keys=keys))
+            self.refused(Code.INVALID_ARGUMENT, self.sync, unsorted)
+        reply = self.sync(geometry.tiles([high, low]))
+        self.assertEqual(sorted(tile.key for tile in reply.tiles), [low, high])
+
     def test_levels(self):
         reply = self.sync(finest_level=2, coarsest_level=4)
         self.assertEqual({geometry.tile_place(tile.key)[0] for tile in reply.tiles}, {2, 3, 4})

@@ -87,6 +87,20 @@ TEST_F(DaemonConfigTest, AnUnknownKeyIsAnErrorWithItsLine) {
               HasSubstr("unknown key 'map.deep'"));
 }
 
+TEST_F(DaemonConfigTest, AnUnknownVariableIsAnErrorAndThoseOfOthersAreNot) {
+  SetVariable("ATLASD_WORKER", "3");
+  EXPECT_EQ(Refusal({"--data", "/x"}), "environment: unknown variable 'ATLASD_WORKER'");
+  EXPECT_EQ(Refusal({"--data", "/x", "--workers", "2"}),
+            "environment: unknown variable 'ATLASD_WORKER'");
+  ::unsetenv("ATLASD_WORKER");
+  SetVariable("ATLAS_SERVER", "127.0.0.1:1");
+  SetVariable("ATLASDAEMON", "3");
+  SetVariable("ATLASD_BACKUP_FOLDER", "/y=z");
+  const auto command = Parse({"--data", "/x"});
+  ASSERT_TRUE(command.has_value()) << command.error().message();
+  EXPECT_EQ(command->config.backup_folder, "/y=z");
+}
+
 TEST_F(DaemonConfigTest, AFolderIsNoConfigurationFile) {
   EXPECT_THAT(Refusal({"--config", std::filesystem::temp_directory_path().string()}),
               HasSubstr("is a folder"));

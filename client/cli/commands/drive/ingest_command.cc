@@ -8,24 +8,27 @@
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
 #include "client/drive/drive_ingest.h"
+#include "client/vehicle/atlas_link.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
 
 double FrontendMsPerScan(const IngestReport& report) {
-  return report.totals.sent == 0
+  return report.upload.totals.sent == 0
              ? 0.0
-             : 1e3 * report.frontend_s / static_cast<double>(report.totals.sent);
+             : 1e3 * report.frontend_s / static_cast<double>(report.upload.totals.sent);
 }
 
 boost::json::object ReportJson(const IngestReport& report, double wall_s) {
   return {{"keyframes", report.keyframes},
           {"empty_scans", report.empty_scans},
-          {"acked", report.totals.acked},
-          {"duplicates", report.totals.duplicates},
+          {"acked", report.upload.totals.acked},
+          {"duplicates", report.upload.totals.duplicates},
+          {"sent_before", report.upload.sent_before},
+          {"reconnections", report.upload.reconnections},
           {"metres", Rounded(report.metres, 3)},
-          {"bytes_sent", report.totals.bytes_sent},
+          {"bytes_sent", report.upload.totals.bytes_sent},
           {"frontend_ms_per_scan", Rounded(FrontendMsPerScan(report), 3)},
           {"sensor_height_m", Rounded(report.mount.height_m, 3)},
           {"sensor_tilt_deg", Rounded(report.mount.TiltDeg(), 2)},
@@ -38,9 +41,17 @@ void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
   FactList facts;
   facts.Add("keyframes", StrCat(report.keyframes, " along ", FixedText(report.metres, 1), " m, ",
                                 report.sessions, " session(s)"));
-  facts.Add("acknowledged", StrCat(report.totals.acked, ", of them ", report.totals.duplicates,
-                                   " were there already"));
-  facts.Add("sent", BytesText(report.totals.bytes_sent));
+  facts.Add("acknowledged", StrCat(report.upload.totals.acked, ", of them ",
+                                   report.upload.totals.duplicates, " were there already"));
+  if (report.upload.sent_before > 0) {
+    facts.Add("resumed", StrCat("behind ", report.upload.sent_before,
+                                " keyframes that an earlier run had sent"));
+  }
+  if (report.upload.reconnections > 0) {
+    facts.Add("connection",
+              StrCat("lost and made again ", report.upload.reconnections, " time(s)"));
+  }
+  facts.Add("sent", BytesText(report.upload.totals.bytes_sent));
   facts.Add("sensor", StrCat(FixedText(report.mount.height_m, 3), " m above the ground, tilted by ",
                              FixedText(report.mount.TiltDeg(), 1), " deg"));
   facts.Add("front end", FixedText(FrontendMsPerScan(report), 1) + " ms CPU a scan");
@@ -77,9 +88,7 @@ class IngestCommand : public Command {
     const auto start = std::chrono::steady_clock::now();
     const Result<DriveFolder> drive = OpenDriveFolder(drive_.directory());
     if (!drive) return drive.error();
-    Result<AtlasClient> client = context.Connect();
-    if (!client) return client.error();
-    const Result<IngestReport> report = Ingest(*drive, *client, context);
+    const Result<IngestReport> report = Ingest(*drive, context);
     if (!report) return Explained(report.error());
     if (report->keyframes == 0) {
       context.err << "note: none of the drive's " << drive->scans.size()
@@ -137,11 +146,10 @@ class IngestCommand : public Command {
     return NameFrom((error ? given : absolute).filename().string());
   }
 
-  Result<IngestReport> Ingest(const DriveFolder& drive,
-                              AtlasClient& client,
-                              const CommandContext& context) const {
+  Result<IngestReport> Ingest(const DriveFolder& drive, const CommandContext& context) const {
+    AtlasLink link({.connection = context.connection});
     ProgressBar bar(context.err, context.is_err_terminal, "ingest", drive.scans.size());
-    return IngestDrive(drive, options_, client, [&](std::size_t done, std::size_t total) {
+    return IngestDrive(drive, options_, link, [&](std::size_t done, std::size_t total) {
       bar.Update(done * drive.scans.size() / total);
     });
   }

@@ -153,6 +153,7 @@ TEST(SyncAreaTest, HostileNumbersAreRefusedOrHarmless) {
   EXPECT_EQ(CodeOf(CorridorArea{std::vector<Vector2d>(257, Vector2d::Zero()), 1.0}),
             StatusCode::kInvalidArgument);
   EXPECT_EQ(CodeOf(TilesArea{{{0, 1, 1}, {0, 1, 1}}}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(CodeOf(TilesArea{{{0, 9, 1}, {0, 1, 1}}}), StatusCode::kInvalidArgument);
   const SyncArea far = Make(DiscArea{{1e300, -1e300}, 1e300});
   const TileRect rect = far.Bounds(0);
   EXPECT_LE(rect.min_x, rect.max_x);

@@ -1,0 +1,89 @@
+#include "client/drive/lasting_upload.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/str_cat.h"
+
+namespace atlas {
+
+using std::chrono::milliseconds;
+
+LastingUpload::LastingUpload(std::vector<PlannedKeyframe> planned,
+                             const UploadOptions& options,
+                             Send send,
+                             Progress progress)
+    : planned_(std::move(planned)),
+      options_(options),
+      send_(std::move(send)),
+      progress_(std::move(progress)) {}
+
+Status LastingUpload::Run(AtlasLink& link) {
+  acknowledged_ = Clock::now();
+  Result<AtlasClient*> client = link.Wait(options_.patience);
+  while (client) {
+    const std::uint64_t acked_before = report_.totals.acked;
+    const Status status = RunOn(**client);
+    if (status.ok() || !(*client)->is_broken()) return status;
+    if (report_.totals.acked > acked_before) {
+      acknowledged_ = Clock::now();
+      link.Report({});  // it worked: the next attempt is a first one
+    }
+    link.Report(status);
+    client = Reconnect(link, status);
+  }
+  return client.error();
+}
+
+Result<AtlasClient*> LastingUpload::Reconnect(AtlasLink& link, const Status& why) {
+  const auto lost_for = std::chrono::duration_cast<milliseconds>(Clock::now() - acknowledged_);
+  Result<AtlasClient*> client =
+      lost_for < options_.patience ? link.Wait(options_.patience - lost_for) : Error(why);
+  if (!client) {
+    return Error(client.error().code(),
+                 StrCat("keyframe ", planned_[next_].key, ": the connection broke (", why.message(),
+                        ") and was of no use for ", options_.patience.count(), " ms (",
+                        client.error().message(),
+                        "): the same command goes on there once the daemon can be reached"));
+  }
+  ++report_.reconnections;
+  return client;
+}
+
+Status LastingUpload::RunOn(AtlasClient& client) {
+  if (epoch_ != client.atlas().epoch) ATLAS_RETURN_IF_ERROR(FindStart(client));
+  KeyframeUploader uploader(client, options_);
+  Status status = SendAll(uploader);
+  // It is either there or refused when this returns.
+  if (!status.ok() && !client.is_broken()) {
+    const Status finished = uploader.Finish();
+    if (!finished.ok() && finished.code() != status.code()) {
+      status = Status(status.code(), status.message() + "; and " + finished.message());
+    }
+  }
+  next_ += uploader.first_open();
+  report_.totals.Add(uploader.totals());
+  return status;
+}
+
+Status LastingUpload::FindStart(AtlasClient& client) {
+  next_ = 0;
+  if (!planned_.empty()) {
+    const auto sessions = client.ListSessions(planned_.front().key.session.vehicle);
+    if (!sessions) return sessions.error();
+    next_ = CountSentBefore(planned_, *sessions);
+  }
+  if (!epoch_) report_.sent_before = next_;
+  epoch_ = client.atlas().epoch;
+  return {};
+}
+
+Status LastingUpload::SendAll(KeyframeUploader& uploader) {
+  for (std::size_t i = next_; i < planned_.size(); ++i) {
+    ATLAS_RETURN_IF_ERROR(send_(i, uploader));
+    if (progress_) progress_(i + 1, planned_.size());
+  }
+  return uploader.Finish();
+}
+
+}  // namespace atlas

@@ -1,0 +1,60 @@
+// Keyframes in order to one daemon, over a link that may break in between and programs that may
+// end: it goes on where it was.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "client/connection/keyframe_uploader.h"
+#include "client/drive/sent_before.h"
+#include "client/vehicle/atlas_link.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct LastingUploadReport {
+  UploadTotals totals;
+  std::uint64_t sent_before = 0;  // by an earlier run, and not again
+  std::uint64_t reconnections = 0;
+};
+
+class LastingUpload {
+ public:
+  using Clock = std::chrono::steady_clock;
+  // Makes the keyframe of that index and hands it to the uploader.
+  using Send = std::function<Status(std::size_t, KeyframeUploader&)>;
+  // How many were sent, of how many.
+  using Progress = std::function<void(std::size_t, std::size_t)>;
+
+  // `progress` may be empty. The options' patience is that with the link, too.
+  LastingUpload(std::vector<PlannedKeyframe> planned,
+                const UploadOptions& options,
+                Send send,
+                Progress progress);
+
+  // Begins behind what an earlier run left there (CountSentBefore). A connection that breaks is
+  // made again, and what was not acknowledged is sent again, until nothing was acknowledged for as
+  // long as the patience. Fails at the first keyframe that the daemon refuses, naming it, with what
+  // was on its way waited for.
+  Status Run(AtlasLink& link);
+  const LastingUploadReport& report() const { return report_; }
+
+ private:
+  Status RunOn(AtlasClient& client);
+  // Where to go on with this atlas: again, too, when it was restored from a backup meanwhile.
+  Status FindStart(AtlasClient& client);
+  Status SendAll(KeyframeUploader& uploader);
+  Result<AtlasClient*> Reconnect(AtlasLink& link, const Status& why);
+
+  const std::vector<PlannedKeyframe> planned_;
+  const UploadOptions options_;
+  const Send send_;
+  const Progress progress_;
+  LastingUploadReport report_;
+  std::size_t next_ = 0;  // those before it are there
+  std::optional<std::uint64_t> epoch_;
+  Clock::time_point acknowledged_ = Clock::now();  // the last one, or the beginning
+};
+
+}  // namespace atlas

@@ -1,0 +1,143 @@
+// `atlas ingest` over a link that breaks, and after a run that was interrupted.
+#include <atomic>
+#include <memory>
+#include <utility>
+
+#include "client/drive/drive_ingest.h"
+#include "tests/client/end_to_end/vehicle_fixture.h"
+
+namespace atlas {
+namespace {
+
+using std::chrono::milliseconds;
+
+class IngestResumeTest : public VehicleTest {
+ protected:
+  static CommandRun IngestOver(const Endpoint& endpoint, std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {
+        "ingest", shared_drive.string(), "--max-range", "12", "--every", "0"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunAtlas(endpoint.ToText(), arguments);
+  }
+  static std::string DigestOfCleanRun() {
+    const DaemonProcess daemon(NewData(), kSmall);
+    EXPECT_EQ(Ingest(daemon).exit_code, 0);
+    return Digest(daemon);
+  }
+};
+
+TEST_F(IngestResumeTest, AConnectionThatBreaksInTheMiddleIsMadeAgain) {
+  const std::string clean = DigestOfCleanRun();
+  for (const LinkCut::Kind kind : {LinkCut::Kind::kClose, LinkCut::Kind::kReset}) {
+    const DaemonProcess daemon(NewData(), kSmall);
+    std::atomic<int> connections = 0;
+    // Two connections carry a part of it, one in the middle nothing at all.
+    LinkProxy proxy(*Endpoint::Parse(daemon.address()), [&connections, kind] {
+      const int number = connections++;
+      if (number > 2) return LinkPlan{};
+      return LinkPlan{.up = {.after_bytes = number == 1 ? 1 : 200'000, .kind = kind},
+                      .refused_after = milliseconds(50)};
+    });
+    const CommandRun run = IngestOver(proxy.endpoint(), {"--batch", "4"});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.Get<int>("reconnections"), 2);
+    EXPECT_EQ(run.Get<int>("sent_before"), 0);
+    EXPECT_LE(run.Get<int>("duplicates"), 8) << "what was on its way twice";
+    EXPECT_EQ(Connect(daemon).ReadStatus()->keyframes, run.Get<std::uint64_t>("keyframes"));
+    EXPECT_EQ(Digest(daemon), clean);
+  }
+}
+
+TEST_F(IngestResumeTest, ADaemonThatIsStartedAgainGetsTheRest) {
+  const fs::path data = NewData();
+  auto daemon = std::make_unique<DaemonProcess>(data, kSmall);
+  const Endpoint address = *Endpoint::Parse(daemon->address());
+  IngestOptions options;
+  options.session = {"vehicle", "overpass"};
+  options.max_range_m = 12.0;
+  options.now_s = 1e9;
+  options.upload.max_in_flight = 1;
+  options.upload.patience = std::chrono::seconds(30);
+  bool is_restarted = false;  // what was on its way is sent, and told, once more
+  const auto restart = [&](std::size_t done, std::size_t) {
+    if (done != 10 || std::exchange(is_restarted, true)) return;
+    daemon.reset();  // by SIGKILL
+    daemon.reset(new DaemonProcess(DaemonProcess::Begin(data, address.ToText(), kSmall)));
+    ASSERT_EQ(daemon->AwaitListening(), "listening " + address.ToText());
+  };
+  AtlasLink link = LinkTo(address);
+  const auto drive = OpenDriveFolder(shared_drive.string());
+  const auto report = IngestDrive(*drive, options, link, restart);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->upload.reconnections, 1U);
+  EXPECT_EQ(Connect(*daemon).ReadStatus()->keyframes, report->keyframes);
+  EXPECT_EQ(Digest(*daemon), DigestOfCleanRun());
+}
+
+TEST_F(IngestResumeTest, ALinkThatStaysBrokenEndsTheRunWithWhereItWas) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  LinkProxy proxy(*Endpoint::Parse(daemon.address()),
+                  LinkPlan{.up = {.after_bytes = 200'000}, .refused_after = std::chrono::hours(1)});
+  IngestOptions options;
+  options.session = {"vehicle", "overpass"};
+  options.max_range_m = 12.0;
+  options.now_s = 1e9;
+  options.upload.patience = milliseconds(300);
+  AtlasLink link = LinkTo(proxy.endpoint());
+  const auto drive = OpenDriveFolder(shared_drive.string());
+  const auto report = IngestDrive(*drive, options, link, {});
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code(), StatusCode::kUnavailable);
+  EXPECT_NE(report.error().message().find("keyframe vehicle/overpass"), std::string::npos)
+      << report.error().message();
+  EXPECT_NE(report.error().message().find("the same command goes on there"), std::string::npos);
+}
+
+TEST_F(IngestResumeTest, ASecondRunSendsWhatTheFirstDidNot) {
+  const std::string clean = DigestOfCleanRun();
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--range", "0:30"}).exit_code, 0);  // as if it was interrupted there
+  const CommandRun whole = Ingest(daemon);
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_EQ(whole.Get<std::size_t>("sent_before"), 30 - kSentTwice);
+  EXPECT_EQ(whole.Get<std::size_t>("duplicates"), kSentTwice);
+  EXPECT_EQ(whole.Get<std::size_t>("acked"), whole.Get<std::size_t>("keyframes") - 30 + kSentTwice);
+  EXPECT_EQ(Digest(daemon), clean);
+  const CommandRun again = Ingest(daemon);
+  EXPECT_EQ(again.Get<int>("duplicates"), again.Get<int>("keyframes")) << "all of it, as a check";
+}
+
+TEST_F(IngestResumeTest, OtherOptionsThanTheFirstRunsAreAConflict) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--range", "0:30"}).exit_code, 0);
+  const CommandRun other = Ingest(daemon, {"--rings", "8"});
+  EXPECT_EQ(other.exit_code, static_cast<int>(ExitCode::kConflict)) << other.err;
+}
+
+TEST_F(IngestResumeTest, OtherVehiclesSessionsAreNotTakenForOnesOwn) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  for (const char* vehicle : {"a", "vehicle", "w"}) {
+    ASSERT_EQ(Ingest(daemon, {"--vehicle", vehicle, "--range", "0:12"}).exit_code, 0);
+  }
+  AtlasClient client = Connect(daemon);
+  const auto sessions = client.ListSessions("vehicle");
+  ASSERT_TRUE(sessions) << sessions.error().message();
+  ASSERT_EQ(sessions->size(), 1U);
+  EXPECT_EQ(sessions->front().key, (SessionKey{"vehicle", "overpass"}));
+  EXPECT_EQ(client.ListSessions()->size(), 3U);
+  EXPECT_TRUE(client.ListSessions("v")->empty());
+  EXPECT_EQ(Ingest(daemon, {"--range", "0:20"}).Get<std::size_t>("sent_before"), 12 - kSentTwice);
+}
+
+TEST_F(IngestResumeTest, AnotherPartOfTheDriveIsNotTakenForTheBeginning) {
+  const std::string clean = DigestOfCleanRun();
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--range", "20:30"}).exit_code, 0);
+  const CommandRun whole = Ingest(daemon);
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_EQ(whole.Get<int>("sent_before"), 0);
+  EXPECT_EQ(Digest(daemon), clean);
+}
+
+}  // namespace
+}  // namespace atlas
