@@ -235,6 +235,7 @@ TEST_F(CompactionTest, AnAcknowledgedOneSurvivesAKilledProcess) {
   std::array<int, 2> pipe_ends{};
   ASSERT_EQ(::pipe(pipe_ends.data()), 0);
   const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
   if (child == 0) {
     OpenWithThree();
     const char ok = Compact({1}).has_value() ? 1 : 0;

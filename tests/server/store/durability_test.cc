@@ -51,6 +51,7 @@ TEST_F(DurabilityTest, AnAcknowledgedWriteSurvivesAKilledProcess) {
   std::array<int, 2> pipe_ends{};
   ASSERT_EQ(::pipe(pipe_ends.data()), 0);
   const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
   if (child == 0) {
     Open();
     const char ok = Put(MakeKeyframe(1, {kA})).has_value() ? 1 : 0;
