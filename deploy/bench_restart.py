@@ -25,6 +25,7 @@ VEHICLES = 4
 ON_THEIR_WAY = 8  # keyframes of each
 FUSED_WITHIN_MS = 3_600_000
 PATIENCE_S = 120
+PERIOD_S = 0.5  # between uploads of a vehicle: fusion is not to fall behind without end
 AT_WORK_S = (0.5, 2.0)  # between these it is killed, once all are at work
 
 
@@ -54,7 +55,8 @@ def kill_at_work(atlas, street, number):
     failures = Failures()
     with contextlib.ExitStack() as stack:
         for i in range(VEHICLES):
-            stack.enter_context(Actor(atlas.port, failures, f"car.{i}", 0, vehicle_act(street, i, f"late.{number}")))
+            act = vehicle_act(street, i, f"late.{number}")
+            stack.enter_context(Actor(atlas.port, failures, f"car.{i}", PERIOD_S, act))
         wait_until_at_work(atlas)
         time.sleep(random.uniform(*AT_WORK_S))
         row = {"in_flight": atlas.metric("roadatlas_requests_in_flight"),

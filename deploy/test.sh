@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize [--without-fuzzers]] [--long]
-#   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, TSan over
-#               the tests labelled threads, and 10 s of each fuzzer
+#   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, but those that
+#               compute for minutes (label compute), TSan over the tests labelled threads, and 10 s of
+#               each fuzzer
 #   --without-fuzzers
 #               these not: what they found before and mutations of it are tried under ASan all the same
 #   --long      ten times as many random worlds in the tests that make them, the same payloads from
@@ -56,7 +57,7 @@ run dev all
 if ((sanitize)); then
   unset ATLAS_PROPERTY_CASES
   export ATLAS_TEST_SCALE=0.1
-  run asan all -L 'unit|integration' -LE data
+  run asan all -L 'unit|integration' -LE 'data|compute'
   run tsan threads_tests -L threads
   ((fuzzers == 0)) || deploy/fuzz.sh 10
 fi

@@ -23,7 +23,7 @@ inline KeyframeUpload WideUpload(
                                        (row + 0.5) * profile.tile_size_m(), 1.8);
   KeyframeUpload upload;
   upload.key = key;
-  upload.time_ms = kTime_ms + key.sequence;
+  upload.time_ms = kTime_ms + 1'000 * std::int64_t{key.sequence};  // a tile a second
   upload.T_world_sensor = QuantizedPose::FromPose(pose);
   upload.blob = blob;
   return upload;
