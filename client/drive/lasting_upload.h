@@ -2,8 +2,10 @@
 // end: it goes on where it was.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "client/connection/keyframe_uploader.h"
