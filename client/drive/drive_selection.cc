@@ -8,10 +8,6 @@
 namespace atlas {
 namespace {
 
-double Distance(const DriveScan& a, const DriveScan& b) {
-  return (a.T_world_sensor.translation() - b.T_world_sensor.translation()).norm();
-}
-
 bool IsWanted(std::uint32_t number, const SelectionOptions& options) {
   if (number < options.begin || number >= options.end) return false;
   switch (options.parity) {
@@ -33,6 +29,10 @@ Result<ScanParity> ParseScanParity(const std::string& text) {
   if (text == "odd") return ScanParity::kOdd;
   return Error(StatusCode::kInvalidArgument,
                StrCat("scans '", text.substr(0, 80), "': expected even, odd or all"));
+}
+
+double Distance(const DriveScan& from, const DriveScan& to) {
+  return (from.T_world_sensor.translation() - to.T_world_sensor.translation()).norm();
 }
 
 bool IsJump(const DriveScan& from, const DriveScan& to) {

@@ -29,6 +29,7 @@ struct SelectedScan {
 
 // A step between neighbouring scans of the folder above this starts another part.
 inline constexpr double kSessionJump_m = 10.0;
+double Distance(const DriveScan& from, const DriveScan& to);  // in metres
 bool IsJump(const DriveScan& from, const DriveScan& to);
 
 std::vector<SelectedScan> SelectScans(const DriveFolder& drive, const SelectionOptions& options);

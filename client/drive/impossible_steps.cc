@@ -29,6 +29,31 @@ std::vector<bool> OnImpossibleWays(const std::vector<DriveScan>& scans) {
   return on_way;
 }
 
+// Where nothing tells the time: whether the step to this scan leads away, or back to where the
+// drive goes on after a few scans as if it had never been away.
+std::vector<bool> OnExcursions(const std::vector<DriveScan>& scans) {
+  std::vector<bool> on_excursion(scans.size(), false);
+  const auto goes_on = [&](std::size_t before, std::size_t back) {
+    const double most_m = kSessionJump_m * static_cast<double>(back - before);
+    return IsJump(scans[back - 1], scans[back]) && Distance(scans[before], scans[back]) <= most_m;
+  };
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    if (!IsJump(scans[i - 1], scans[i])) {
+      continue;
+    }
+    const std::size_t end = std::min(scans.size(), i + kMostJudgedSteps);
+    for (std::size_t back = i + 1; back < end; ++back) {
+      if (goes_on(i - 1, back)) {
+        for (std::size_t step = i; step <= back; ++step) {
+          on_excursion[step] = true;
+        }
+        break;
+      }
+    }
+  }
+  return on_excursion;
+}
+
 }  // namespace
 
 double ScanTime_s(const DriveScan& scan) {
@@ -37,10 +62,9 @@ double ScanTime_s(const DriveScan& scan) {
 
 void JoinImpossibleParts(const DriveFolder& drive, std::vector<SelectedScan>& selected) {
   const std::vector<DriveScan>& scans = drive.scans;
-  if (!std::all_of(scans.begin(), scans.end(), [](const auto& scan) { return scan.time_s; })) {
-    return;
-  }
-  const std::vector<bool> on_way = OnImpossibleWays(scans);
+  const bool is_timed =
+      std::all_of(scans.begin(), scans.end(), [](const auto& scan) { return scan.time_s; });
+  const std::vector<bool> on_way = is_timed ? OnImpossibleWays(scans) : OnExcursions(scans);
   std::vector<std::uint32_t> sessions{0, 1};  // by part
   for (std::size_t i = 1; i < scans.size(); ++i) {
     if (IsJump(scans[i - 1], scans[i])) {

@@ -13,8 +13,9 @@ namespace atlas {
 // In seconds of the drive's own clock; ten scans a second where there is no times.txt.
 double ScanTime_s(const DriveScan& scan);
 
-// Makes parts that an impossible step separates one session. Where there is no times.txt nothing
-// tells what is possible, and the parts stay. `selected` as SelectScans returned it.
+// Makes parts that an impossible step separates one session. Where there is no times.txt the parts
+// stay, but for a few scans away after which the drive goes on where it was: wild poses. `selected`
+// as SelectScans returned it.
 void JoinImpossibleParts(const DriveFolder& drive, std::vector<SelectedScan>& selected);
 
 // Why the daemon keeps sessions of these out of the map, in the words of ImplausibleWay; a scan's

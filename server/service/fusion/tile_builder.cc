@@ -43,11 +43,11 @@ TileBuilder::TileBuilder(AtlasStore& store,
       tile_bytes_(tile_bytes),
       profile_(store.identity().profile) {}
 
-Result<BuiltTile> TileBuilder::Build(const TileId& id) {
-  return id.level == 0 ? BuildFromKeyframes(id) : BuildFromChildren(id);
+Result<BuiltTile> TileBuilder::Build(const TileId& id, const CheckStop& check_stop) {
+  return id.level == 0 ? BuildFromKeyframes(id, check_stop) : BuildFromChildren(id);
 }
 
-Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
+Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id, const CheckStop& check_stop) {
   const auto sources = store_.GatherTile(id, 0);
   if (!sources) {
     return Error(sources.error());
@@ -56,7 +56,10 @@ Result<BuiltTile> TileBuilder::BuildFromKeyframes(const TileId& id) {
   if (!frames) {
     return Error(frames.error());
   }
-  const auto source = [&](std::size_t i) {
+  const auto source = [&](std::size_t i) -> Result<KeyframeCache::Handle> {
+    if (Status status = check_stop(); !status.ok()) {
+      return Error(std::move(status));
+    }
     return ReadKeyframe((*frames)[i], store_, keyframes_);
   };
   const auto tile = FuseTile(id, *frames, source, profile_, tile_bytes_);

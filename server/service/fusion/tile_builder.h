@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -42,11 +43,14 @@ class TileBuilder {
               TileCache& tiles,
               std::size_t tile_bytes);
 
+  // Asked before each keyframe: a failed status ends the building with it.
+  using CheckStop = std::function<Status()>;
+
   // kInvalidData names the damaged keyframe, pose or child tile.
-  Result<BuiltTile> Build(const TileId& id);
+  Result<BuiltTile> Build(const TileId& id, const CheckStop& check_stop);
 
  private:
-  Result<BuiltTile> BuildFromKeyframes(const TileId& id);
+  Result<BuiltTile> BuildFromKeyframes(const TileId& id, const CheckStop& check_stop);
   Result<BuiltTile> BuildFromChildren(const TileId& id);
   Result<std::shared_ptr<const Tile>> ReadChild(const TileSummary& child);
 

@@ -14,25 +14,26 @@ Status Stopping() {
   return {StatusCode::kUnavailable, "the daemon stops"};
 }
 
-// What is begun is done, unless it takes longer than this: what was known of a tile is lost then.
 class StopGrace {
  public:
-  explicit StopGrace(const std::stop_token& stop) : stop_(stop) {}
+  StopGrace(const std::stop_token& stop, std::chrono::milliseconds length)
+      : stop_(stop), length_(length) {}
 
-  bool IsOver() {
+  // kUnavailable when it is over.
+  Status Check() {
     if (!stop_.stop_requested()) {
-      return false;
+      return {};
     }
     const auto now = Clock::now();
-    until_ = std::min(until_, now + kLength);
-    return now >= until_;
+    until_ = std::min(until_, now + length_);
+    return now < until_ ? Status() : Stopping();
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds kLength{5};
 
   const std::stop_token& stop_;
+  const std::chrono::milliseconds length_;
   Clock::time_point until_ = Clock::time_point::max();
 };
 
@@ -46,6 +47,7 @@ TileRefresher::TileRefresher(AtlasStore& store,
       sigmas_(profile_, Keyframe::kMaxRadiusCells),
       group_bytes_(options.group_bytes),
       alone_bytes_(std::max(options.group_bytes, options.surveys.plain_bytes)),
+      stop_grace_(options.stop_grace),
       keyframes_(options.keyframe_bytes),
       tiles_(options.tile_bytes),
       survey_files_(
@@ -67,13 +69,17 @@ void TileRefresher::Build(std::span<const TileId> ids,
                           const OnBuilt& on_built) {
   std::vector<Job> jobs;
   std::size_t bytes = 0;
+  StopGrace grace(stop, stop_grace_);
+  const auto check_stop = [&grace] {
+    return grace.Check();
+  };
   for (const TileId& id : ids) {
     if (stop.stop_requested()) {
       on_built(id, Error(Stopping()));
       continue;
     }
     if (id.level > 0 || profile_.preset == FusionPreset::kPaper) {
-      on_built(id, builder_.Build(id));
+      on_built(id, builder_.Build(id, check_stop));
       continue;
     }
     Result<Job> job = Prepare(id);
@@ -84,18 +90,18 @@ void TileRefresher::Build(std::span<const TileId> ids,
     const std::size_t job_bytes = job->surveys.ExpectedBytes(profile_);
     if (job_bytes > alone_bytes_) {
       job->surveys = TileSurveys(id);  // not beside what is built
-      on_built(id, builder_.Build(id));
+      on_built(id, builder_.Build(id, check_stop));
       continue;
     }
     if (bytes + job_bytes > group_bytes_) {
-      Run(jobs, stop, on_built);
+      Run(jobs, check_stop, on_built);
       jobs.clear();
       bytes = 0;
     }
     jobs.push_back(*std::move(job));
     bytes += job_bytes;
   }
-  Run(jobs, stop, on_built);
+  Run(jobs, check_stop, on_built);
 }
 
 // With the surveys of the last time, where they are still there. They are taken out meanwhile: what
@@ -124,9 +130,9 @@ Result<TileRefresher::Job> TileRefresher::Prepare(const TileId& id) {
 }
 
 void TileRefresher::Run(std::vector<Job>& jobs,
-                        const std::stop_token& stop,
+                        const TileBuilder::CheckStop& check_stop,
                         const OnBuilt& on_built) {
-  AddKeyframes(jobs, stop);
+  AddKeyframes(jobs, check_stop);
   for (Job& job : jobs) {
     const TileId id = job.surveys.id();
     if (!job.status.ok()) {
@@ -145,7 +151,7 @@ void TileRefresher::Run(std::vector<Job>& jobs,
 }
 
 // In canonical order, which is that of each job.
-void TileRefresher::AddKeyframes(std::vector<Job>& jobs, const std::stop_token& stop) {
+void TileRefresher::AddKeyframes(std::vector<Job>& jobs, const TileBuilder::CheckStop& check_stop) {
   struct Use {
     const FrameOnMap* frame = nullptr;
     Job* job = nullptr;
@@ -160,13 +166,12 @@ void TileRefresher::AddKeyframes(std::vector<Job>& jobs, const std::stop_token& 
                    [](const Use& a, const Use& b) { return a.frame->key < b.frame->key; });
   std::uint64_t content = 0;
   Result<KeyframeCache::Handle> keyframe = KeyframeCache::Handle();
-  StopGrace grace(stop);
   for (const Use& use : uses) {
     if (!use.job->status.ok()) {
       continue;
     }
-    if (grace.IsOver()) {
-      use.job->status = Stopping();
+    if (Status status = check_stop(); !status.ok()) {
+      use.job->status = std::move(status);
       continue;
     }
     if (*keyframe == nullptr || use.frame->content != content) {

@@ -2,6 +2,7 @@
 // is known of a tile from the last time is not asked for again. Used by the workers. Thread-safe.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -26,6 +27,9 @@ struct TileRefresherOptions {
   SurveyFilesOptions survey_files;  // and where memory has no room for them
   // Surveys of the tiles at hand, a worker; a single tile may take as much as what is kept plain.
   std::size_t group_bytes = std::size_t{128} << 20;
+  // What is begun when it stops is done, unless it takes longer than this from then on: what was
+  // known of such a tile is lost.
+  std::chrono::milliseconds stop_grace = std::chrono::seconds(5);
 };
 
 class TileRefresher {
@@ -35,7 +39,7 @@ class TileRefresher {
   TileRefresher(AtlasStore& store, const TileRefresherOptions& options, const LogSink& log);
 
   // Calls `on_built` once for each tile, in any order. Errors as TileBuilder's; kUnavailable:
-  // `stop` was requested, and the tile would take longer than a moment.
+  // `stop` was requested, and the tile was not begun then or not done within stop_grace.
   void Build(std::span<const TileId> ids, const std::stop_token& stop, const OnBuilt& on_built);
 
   // A tile at hand is made of its keyframes alone, all of them.
@@ -60,8 +64,10 @@ class TileRefresher {
   };
 
   Result<Job> Prepare(const TileId& id);
-  void Run(std::vector<Job>& jobs, const std::stop_token& stop, const OnBuilt& on_built);
-  void AddKeyframes(std::vector<Job>& jobs, const std::stop_token& stop);
+  void Run(std::vector<Job>& jobs,
+           const TileBuilder::CheckStop& check_stop,
+           const OnBuilt& on_built);
+  void AddKeyframes(std::vector<Job>& jobs, const TileBuilder::CheckStop& check_stop);
   FusionContext context() const { return {profile_, sigmas_}; }
 
   AtlasStore& store_;
@@ -69,6 +75,7 @@ class TileRefresher {
   const SigmaTable sigmas_;
   const std::size_t group_bytes_;
   const std::size_t alone_bytes_;  // the same of a tile that is alone in its group
+  const std::chrono::milliseconds stop_grace_;
   KeyframeCache keyframes_;
   TileCache tiles_;
   SurveyFiles survey_files_;

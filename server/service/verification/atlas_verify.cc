@@ -264,7 +264,7 @@ Status AtlasVerifier::CheckTile(const TileId& id) {
 // Parents are rebuilt from stored children, which are themselves compared: level by level this is a
 // rebuild from the keyframes.
 Status AtlasVerifier::CompareTile(const TileId& id, const std::optional<StoredTile>& stored) {
-  const auto built = builder_.Build(id);
+  const auto built = builder_.Build(id, options_.check_stop);
   if (!built) {
     return built.error().WithContext(StrCat("rebuilding tile ", id));
   }

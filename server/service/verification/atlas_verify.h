@@ -41,7 +41,8 @@ class AtlasVerifier {
     std::size_t keyframe_bytes = std::size_t{128} << 20;  // decoded
     std::size_t tile_bytes = std::size_t{128} << 20;      // of the tile that is rebuilt
     std::size_t max_findings = 20;
-    // Asked between tiles; a failed status ends the verification with it.
+    // Asked between tiles, and before each keyframe of one that is rebuilt; a failed status ends
+    // the verification with it.
     std::function<Status()> check_stop;
     // Told the size of each blob that was checked, if given.
     std::function<void(std::size_t)> on_read = {};

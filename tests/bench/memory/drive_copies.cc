@@ -53,7 +53,7 @@ Status DriveCopies::Upload(AtlasClient& client, std::uint32_t number) const {
     Pose T_world_sensor = recorded.T_world_sensor;
     T_world_sensor.translation().head<2>() += shift_m;
     KeyframeUpload upload;
-    upload.key = {{"car", StrCat("copy.", number)}, recorded.sequence};
+    upload.key = {{StrCat("car.", number), "copy"}, recorded.sequence};
     upload.time_ms = std::int64_t{100} * recorded.sequence;
     upload.T_world_sensor = QuantizedPose::FromPose(T_world_sensor);
     upload.blob = recorded.blob;

@@ -66,11 +66,31 @@ TEST(ImpossibleStepsTest, StepsThatAreImpossibleTogetherStartNone) {
   EXPECT_EQ(FindImpossibleSteps(zigzag, every_second), Reasons{}) << "the daemon sees no zigzag";
 }
 
-TEST(ImpossibleStepsTest, WithoutTimesEveryJumpStartsAnotherSession) {
-  DriveFolder drive = Along({0, 1, 208, 209});
+DriveFolder Untimed(const std::vector<double>& x_m) {
+  DriveFolder drive = Along(x_m);
   for (DriveScan& scan : drive.scans) {
     scan.time_s.reset();
   }
+  return drive;
+}
+
+TEST(ImpossibleStepsTest, WithoutTimesWildPosesStayInTheirSession) {
+  const DriveFolder one = Untimed({0, 1, 2, 5'000, 4, 5});
+  EXPECT_EQ(Parts(Selected(one)), (Numbers{1, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(FindImpossibleSteps(one, Selected(one)).size(), 2U);
+  const DriveFolder several = Untimed({0, 1, 2, 900, -900, -901, 6, 7, 300, 9});
+  EXPECT_EQ(Parts(Selected(several)), (Numbers{1, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
+}
+
+TEST(ImpossibleStepsTest, WithoutTimesADriveThatIsAwayForLongIsAnother) {
+  const DriveFolder away = Untimed({0, 1, 500, 501, 502, 503, 504, 505, 506, 507, 508, 2, 3});
+  EXPECT_EQ(Parts(Selected(away)), (Numbers{1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3}));
+  const DriveFolder elsewhere = Untimed({0, 1, 500, 501, 60, 61});
+  EXPECT_EQ(Parts(Selected(elsewhere)), (Numbers{1, 1, 2, 2, 3, 3}));
+}
+
+TEST(ImpossibleStepsTest, WithoutTimesOtherJumpsStartAnotherSession) {
+  const DriveFolder drive = Untimed({0, 1, 208, 209});
   const auto selected = Selected(drive);
   EXPECT_EQ(Parts(selected), (Numbers{1, 1, 2, 2}));
   EXPECT_EQ(FindImpossibleSteps(drive, selected), Reasons{});
