@@ -49,6 +49,8 @@ def serve(bin_dir, folder, gib, emit):
             with Watch(atlas.process.pid) as watch:
                 row, = rows_of(bin_dir / "memory_bench", "read", atlas.server, folder, filled["copies"], READ_S)
             emit(f"{name}.round_{turn}.tiles_per_s", row["tiles"] / READ_S, "tiles/s", "none", None)
+            emit(f"{name}.round_{turn}.request", row["bytes"] / (row["syncs"] + row["queries"]) / 2**10,
+                 "KiB, a request's tiles", "none", None)
             for field in ("VmRSS", "RssAnon", "RssFile"):
                 emit(f"{name}.round_{turn}.{field}", watch.most[field], "MiB", "asked at most 256", 256)
         peak = memory_of(atlas.process.pid)["VmHWM"]

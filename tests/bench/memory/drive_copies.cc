@@ -1,5 +1,6 @@
 #include "tests/bench/memory/drive_copies.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -16,10 +17,18 @@ namespace {
 // surfaces are cut into other cells each time.
 constexpr double kColumn_m = 97.37;
 constexpr double kRow_m = 61.53;
-constexpr std::uint32_t kColumns = 200;
 
+// The first n^2 numbers are a square, whatever n: an atlas of more copies is larger, and not
+// another around a place of it.
 Eigen::Vector2d ShiftOf(std::uint32_t number) {
-  return {kColumn_m * (number % kColumns), kRow_m * (number / kColumns)};
+  std::uint32_t n = 0;
+  while ((n + 1) * (n + 1) <= number) {
+    ++n;
+  }
+  const std::uint32_t on_edge = number - n * n;
+  const std::uint32_t column = std::min(n, on_edge);
+  const std::uint32_t row = std::min(n, 2 * n - on_edge);
+  return {kColumn_m * column, kRow_m * row};
 }
 
 }  // namespace

@@ -25,8 +25,8 @@ class DriveCopies {
 
   std::size_t keyframes() const { return keyframes_.size(); }
   // Uploads the copy as the drive of a vehicle of its own (one may begin only so many an hour),
-  // acknowledged when this returns. The same number is the same keyframes at the
-  // same place: rows of a square grid that grows outwards.
+  // acknowledged when this returns. The same number is the same keyframes at the same place, of a
+  // square grid that grows outwards.
   Status Upload(AtlasClient& client, std::uint32_t number) const;
   // Where it is.
   Eigen::Vector2d MiddleOf(std::uint32_t number) const;
