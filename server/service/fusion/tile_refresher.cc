@@ -135,6 +135,9 @@ void TileRefresher::Run(std::vector<Job>& jobs,
   AddKeyframes(jobs, check_stop);
   for (Job& job : jobs) {
     const TileId id = job.surveys.id();
+    if (job.status.ok()) {
+      job.status = check_stop();
+    }
     if (!job.status.ok()) {
       on_built(id, Error(std::move(job.status)));
       continue;
