@@ -71,6 +71,8 @@ class KeyframeUploader {
   // connection goes on.
   std::uint64_t first_open() const { return open_.empty() ? next_number_ : *open_.begin(); }
   const UploadTotals& totals() const { return totals_; }
+  // When the daemon took one last, or the first was to be sent.
+  Clock::time_point taken() const { return taken_; }
 
  private:
   struct Answer;  // a message

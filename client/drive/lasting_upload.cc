@@ -1,6 +1,7 @@
 #include "client/drive/lasting_upload.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -26,7 +27,6 @@ Status LastingUpload::Run(AtlasLink& link) {
     const Status status = RunOn(**client);
     if (status.ok() || !(*client)->is_broken()) return status;
     if (report_.totals.acked > acked_before) {
-      acknowledged_ = Clock::now();
       link.Report({});  // it worked: the next attempt is a first one
     }
     link.Report(status);
@@ -39,15 +39,20 @@ Result<AtlasClient*> LastingUpload::Reconnect(AtlasLink& link, const Status& why
   const auto lost_for = std::chrono::duration_cast<milliseconds>(Clock::now() - acknowledged_);
   Result<AtlasClient*> client =
       lost_for < options_.patience ? link.Wait(options_.patience - lost_for) : Error(why);
-  if (!client) {
-    return Error(client.error().code(),
-                 StrCat("keyframe ", planned_[next_].key, ": the connection broke (", why.message(),
-                        ") and was of no use for ", options_.patience.count(), " ms (",
-                        client.error().message(),
-                        "): the same command goes on there once the daemon can be reached"));
-  }
+  if (!client) return Error(GivenUp(why, client.error()));
   ++report_.reconnections;
   return client;
+}
+
+Status LastingUpload::GivenUp(const Status& broke, const Status& failure) const {
+  const auto lost_for =
+      std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - acknowledged_);
+  const bool may_pass = IsTemporary(failure.code());
+  return {
+      failure.code(),
+      StrCat("keyframe ", planned_[next_].key, ": the connection broke (", broke.message(),
+             "), and ", lost_for.count(), " s after the last acknowledgement: ", failure.message(),
+             may_pass ? "; the same command goes on there once the daemon can be reached" : "")};
 }
 
 Status LastingUpload::RunOn(AtlasClient& client) {
@@ -62,16 +67,18 @@ Status LastingUpload::RunOn(AtlasClient& client) {
     }
   }
   next_ += uploader.first_open();
+  if (uploader.totals().acked > 0) acknowledged_ = uploader.taken();
   report_.totals.Add(uploader.totals());
   return status;
 }
 
 Status LastingUpload::FindStart(AtlasClient& client) {
-  next_ = 0;
+  next_ = there_ = 0;
   if (!planned_.empty()) {
     const auto sessions = client.ListSessions(planned_.front().key.session.vehicle);
     if (!sessions) return sessions.error();
-    next_ = CountSentBefore(planned_, *sessions);
+    there_ = CountSentBefore(planned_, *sessions);
+    next_ = there_ - std::min(there_, kSentTwice);
   }
   if (!epoch_) report_.sent_before = next_;
   epoch_ = client.atlas().epoch;
@@ -79,7 +86,13 @@ Status LastingUpload::FindStart(AtlasClient& client) {
 }
 
 Status LastingUpload::SendAll(KeyframeUploader& uploader) {
+  std::map<SessionKey, std::size_t> sent;
   for (std::size_t i = next_; i < planned_.size(); ++i) {
+    // Those that are there, and the first ones of each session, say whether it is ours at all: new
+    // ones follow when they are known to be.
+    std::size_t& of_session = sent[planned_[i].key.session];
+    if (i == there_ || of_session == kSentTwice) ATLAS_RETURN_IF_ERROR(uploader.Finish());
+    ++of_session;
     ATLAS_RETURN_IF_ERROR(send_(i, uploader));
     if (progress_) progress_(i + 1, planned_.size());
   }

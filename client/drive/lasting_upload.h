@@ -38,7 +38,8 @@ class LastingUpload {
   // Begins behind what an earlier run left there (CountSentBefore). A connection that breaks is
   // made again, and what was not acknowledged is sent again, until nothing was acknowledged for as
   // long as the patience. Fails at the first keyframe that the daemon refuses, naming it, with what
-  // was on its way waited for.
+  // was on its way waited for; of a session that has another content under the first of its keys
+  // that are sent, nothing is on its way then but these (kSentTwice).
   Status Run(AtlasLink& link);
   const LastingUploadReport& report() const { return report_; }
 
@@ -48,13 +49,15 @@ class LastingUpload {
   Status FindStart(AtlasClient& client);
   Status SendAll(KeyframeUploader& uploader);
   Result<AtlasClient*> Reconnect(AtlasLink& link, const Status& why);
+  Status GivenUp(const Status& broke, const Status& failure) const;
 
   const std::vector<PlannedKeyframe> planned_;
   const UploadOptions options_;
   const Send send_;
   const Progress progress_;
   LastingUploadReport report_;
-  std::size_t next_ = 0;  // those before it are there
+  std::size_t next_ = 0;   // those before it are there
+  std::size_t there_ = 0;  // and those before this one, as an earlier run left them
   std::optional<std::uint64_t> epoch_;
   Clock::time_point acknowledged_ = Clock::now();  // the last one, or the beginning
 };

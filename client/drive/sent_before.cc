@@ -47,8 +47,7 @@ std::size_t CountSentBefore(std::span<const PlannedKeyframe> planned,
         return session == nullptr || !expected.at(keyframe.key.session).IsOf(*session);
       });
   if (first_missing == planned.end()) return 0;
-  const auto there = static_cast<std::size_t>(first_missing - planned.begin());
-  return there - std::min(there, kSentTwice);
+  return static_cast<std::size_t>(first_missing - planned.begin());
 }
 
 }  // namespace atlas

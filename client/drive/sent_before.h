@@ -16,11 +16,11 @@ struct PlannedKeyframe {
   std::int64_t time_ms = 0;
 };
 
-// So many of those that are there are sent once more: other content under their keys is then
-// refused, where the first run was one with other options.
+// So many of those that are there are sent once more, and answered before any that is not: other
+// content under their keys is refused, where the first run was one with other options.
 inline constexpr std::size_t kSentTwice = 8;
 
-// Where to go on: how many of the first ones need not be sent. A session has ours up to its last
+// How many of the first ones are there. A session has ours up to its last
 // sequence number when it has as many keyframes as we have up to there, and its first and last
 // times are those of ours; else none of ours counts as there. 0, too, when all are there: nothing
 // was interrupted, and to send all of it again is what finds a keyframe that differs.

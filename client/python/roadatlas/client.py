@@ -79,6 +79,11 @@ class AtlasClient:
         return self.hello.role
 
     @property
+    def atlas_id(self) -> bytes:
+        """Of this atlas, whatever daemon serves it: 16 bytes."""
+        return self.hello.atlas_id
+
+    @property
     def epoch(self) -> int:
         """Another number after the atlas was restored from a backup."""
         return self.hello.epoch

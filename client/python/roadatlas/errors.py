@@ -45,6 +45,10 @@ class ConnectionLost(RoadAtlasError):
     """The daemon is not there, closed the connection, or the network broke."""
 
 
+class OtherAtlas(RoadAtlasError):
+    """Another atlas answers than before: nothing that was said of the first one counts there."""
+
+
 class BadCredentials(RoadAtlasError):
     """A certificate, key or token file that is of no use, or half of what it takes: a setting of ours."""
 

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable
 import atlas_pb2
 
 from roadatlas.client import AtlasClient
-from roadatlas.errors import Code, ConnectionLost, DeadlinePassed, FrameCut, RequestRefused, RoadAtlasError
+from roadatlas.errors import (
+    Code, ConnectionLost, DeadlinePassed, FrameCut, OtherAtlas, RequestRefused, RoadAtlasError)
 
 ON_THEIR_WAY = 32  # keyframes sent and not answered
 _LONGEST_PAUSE_S = 30.0
@@ -25,7 +26,7 @@ class UploadReport:
 
 
 class SessionUploader:
-    """Connects for itself, and again after a failure that may pass."""
+    """Connects for itself, and again after a failure that may pass, to one atlas: the first that answers."""
 
     def __init__(self, connect: Callable[..., AtlasClient], vehicle: str, session: str, *, rising: bool = False,
                  attempts: int = 8, first_pause_s: float = 0.5) -> None:
@@ -39,11 +40,12 @@ class SessionUploader:
         self._rising = rising
         self._attempts = attempts
         self._first_pause_s = first_pause_s
+        self._atlas_id: bytes | None = None
 
     def upload(self, uploads: Iterable[atlas_pb2.UploadKeyframe]) -> UploadReport:
         """All of them, by sequence number. Raises why it gave up, RequestRefused at once for a client that may not
-        upload at all: nothing is wrong with its keyframes, and whoever has them keeps them. What is on disk is not
-        sent by the next call."""
+        upload at all: nothing is wrong with its keyframes, and whoever has them keeps them; OtherAtlas at once: what
+        was acknowledged is not in that one. What is on disk is not sent by the next call."""
         work = _Work(uploads, self._vehicle, self._session, self._rising)
         failures = 0
         while work.waiting:
@@ -61,6 +63,7 @@ class SessionUploader:
         """Why something is left, if it may pass."""
         try:
             with self._connect(resume=(self._vehicle, self._session)) as client:
+                self._check_atlas(client.atlas_id)
                 work.begin(client.epoch)
                 work.skip(client.last_sequence)
                 work.send(client)
@@ -73,6 +76,11 @@ class SessionUploader:
         if work.denied is not None:
             raise work.denied
         return next(iter(work.postponed.values()), None)
+
+    def _check_atlas(self, atlas_id: bytes) -> None:
+        if self._atlas_id not in (None, atlas_id):
+            raise OtherAtlas(f"atlas {atlas_id.hex()} answers, the session went to {self._atlas_id.hex()}")
+        self._atlas_id = atlas_id
 
     def _pause_s(self, failures: int, failure: RoadAtlasError) -> float:
         asked_s = failure.retry_after_ms / 1000 if isinstance(failure, RequestRefused) else 0.0

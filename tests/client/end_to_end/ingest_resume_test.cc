@@ -110,8 +110,60 @@ TEST_F(IngestResumeTest, ASecondRunSendsWhatTheFirstDidNot) {
 TEST_F(IngestResumeTest, OtherOptionsThanTheFirstRunsAreAConflict) {
   const DaemonProcess daemon(NewData(), kSmall);
   ASSERT_EQ(Ingest(daemon, {"--range", "0:30"}).exit_code, 0);
+  const std::string first = Digest(daemon);
   const CommandRun other = Ingest(daemon, {"--rings", "8"});
   EXPECT_EQ(other.exit_code, static_cast<int>(ExitCode::kConflict)) << other.err;
+  EXPECT_NE(other.err.find("with other content"), std::string::npos) << other.err;
+  EXPECT_EQ(Connect(daemon).ReadStatus()->keyframes, 30U) << "none of them was stored";
+  EXPECT_EQ(Digest(daemon), first);
+  EXPECT_EQ(Ingest(daemon).exit_code, 0) << "the right command goes on";
+}
+
+TEST_F(IngestResumeTest, AnotherDriveUnderTheSameNameStoresNothing) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--range", "0:5"}).exit_code, 0);
+  const CommandRun later = Ingest(daemon, {"--start", "1"});  // no time is what it was
+  EXPECT_EQ(later.exit_code, static_cast<int>(ExitCode::kConflict)) << later.err;
+  const std::uint64_t most = 5 + (kSentTwice - 5);  // were sent with the first ones
+  EXPECT_LE(Connect(daemon).ReadStatus()->keyframes, most);
+}
+
+TEST_F(IngestResumeTest, APurgedSessionIsNotTakenForOneWithOtherOptions) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--range", "0:3"}).exit_code, 0);
+  ASSERT_EQ(RunAtlas(daemon.address(), {"session", "purge", "vehicle/overpass", "--yes"}).exit_code,
+            0);
+  const CommandRun again = Ingest(daemon);
+  EXPECT_EQ(again.exit_code, static_cast<int>(ExitCode::kConflict)) << again.err;
+  EXPECT_NE(again.err.find("purged"), std::string::npos) << again.err;
+  EXPECT_EQ(again.err.find("--deskew"), std::string::npos) << again.err;
+}
+
+TEST_F(IngestResumeTest, AnotherAtlasAtTheSameAddressEndsTheRun) {
+  auto daemon = std::make_unique<DaemonProcess>(NewData(), kSmall);
+  const Endpoint address = *Endpoint::Parse(daemon->address());
+  IngestOptions options;
+  options.session = {"vehicle", "overpass"};
+  options.max_range_m = 12.0;
+  options.now_s = 1e9;
+  options.upload.max_in_flight = 1;
+  options.upload.patience = std::chrono::seconds(30);
+  bool is_replaced = false;
+  const auto replace = [&](std::size_t done, std::size_t) {
+    if (done != 10 || std::exchange(is_replaced, true)) return;
+    daemon.reset();
+    daemon.reset(new DaemonProcess(DaemonProcess::Begin(NewData(), address.ToText(), kSmall)));
+    ASSERT_EQ(daemon->AwaitListening(), "listening " + address.ToText());
+  };
+  AtlasLink link = LinkTo(address);
+  const auto drive = OpenDriveFolder(shared_drive.string());
+  const auto report = IngestDrive(*drive, options, link, replace);
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code(), StatusCode::kConflict);
+  const std::string& message = report.error().message();
+  EXPECT_NE(message.find("another atlas"), std::string::npos) << message;
+  EXPECT_EQ(message.find("goes on there"), std::string::npos) << message;
+  EXPECT_EQ(Connect(*daemon).ReadStatus()->keyframes, 0U);
 }
 
 TEST_F(IngestResumeTest, OtherVehiclesSessionsAreNotTakenForOnesOwn) {

@@ -9,7 +9,7 @@ import unittest
 import unittest.mock
 
 import atlas_pb2
-from roadatlas import AtlasClient, Code, RequestRefused, SessionUploader
+from roadatlas import AtlasClient, Code, OtherAtlas, RequestRefused, SessionUploader
 from roadatlas.errors import ConnectionLost
 from roadatlas.framing import FrameReader
 from support import AtlasCase, key
@@ -189,6 +189,7 @@ class BusyDaemon:
         self.sent = []
         self.wait_ms = 1  # of those that are busy; what is behind them is told to come in 1 ms
 
+    atlas_id = bytes(16)
     epoch = 1
 
     def __call__(self, resume):
@@ -234,6 +235,15 @@ class RestoredDaemon(BusyDaemon):
             self.taken = [0, 1, 2]
 
 
+class ReplacedDaemon(RestoredDaemon):
+    """Another atlas comes in its place, which has the same epoch."""
+
+    def __exit__(self, *_):
+        if self.atlas_id == bytes(16):
+            self.atlas_id = bytes(range(16))
+            self.taken = []
+
+
 class Reply:
     duplicate = False
 
@@ -260,6 +270,16 @@ class PostponedTest(unittest.TestCase):
         report = SessionUploader(daemon, "car", "near", rising=True, first_pause_s=0.001).upload(map(self.named, range(8)))
         self.assertEqual(daemon.sent, [*range(6), *range(3, 8)])
         self.assertEqual((report.acknowledged, report.there_already), ([3, 4, 5, 6, 7], [0, 1, 2]))
+
+    def test_another_atlas_is_not_taken_for_the_first_one(self):
+        for rising in (False, True):
+            daemon = ReplacedDaemon()
+            uploader = SessionUploader(daemon, "car", "near", rising=rising, first_pause_s=0.001)
+            with self.assertRaises(OtherAtlas):
+                uploader.upload(map(self.named, range(8)))
+            with self.assertRaises(OtherAtlas):
+                uploader.upload([self.named(9)])
+            self.assertEqual((daemon.sent, daemon.taken), ([*range(6)], []))
 
     @staticmethod
     def named(sequence):

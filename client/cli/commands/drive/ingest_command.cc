@@ -89,7 +89,7 @@ class IngestCommand : public Command {
     const Result<DriveFolder> drive = OpenDriveFolder(drive_.directory());
     if (!drive) return drive.error();
     const Result<IngestReport> report = Ingest(*drive, context);
-    if (!report) return Explained(report.error());
+    if (!report) return report.error();
     if (report->keyframes == 0) {
       context.err << "note: none of the drive's " << drive->scans.size()
                   << " scans is selected (--range, --scans)\n";
@@ -114,16 +114,6 @@ class IngestCommand : public Command {
   }
 
  private:
-  // What else differs is seldom the scan.
-  static Status Explained(const Status& failure) {
-    return failure.code() != StatusCode::kConflict
-               ? failure
-               : Status(failure.code(), failure.message() +
-                                            "; were other options given then, or were the sensor's "
-                                            "height and tilt estimated from fewer scans of the "
-                                            "folder? --session gives it a name of its own");
-  }
-
   Status CompleteOptions() {
     const Result<ScanParity> parity = drive_.parity();
     if (!parity) return parity.error();

@@ -217,9 +217,11 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
   if (!IsSameUpload(**stored, keyframe)) {
     return Error(
         StatusCode::kConflict,
-        StrCat("keyframe ", keyframe.key,
-               " is in the atlas with other content: another scan, time (--start), sensor height, "
-               "range, number of rings or --deskew"));
+        StrCat(
+            "keyframe ", keyframe.key,
+            " is in the atlas with other content: another scan, time (--start), range, number of "
+            "rings, --deskew, or sensor height and tilt (estimated from other scans of the "
+            "folder?); --session gives it a name of its own"));
   }
   return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
 }
