@@ -156,14 +156,21 @@ TEST_F(PrefetchRoomTest, AnEarlierRouteGoesFirst) {
 }
 
 TEST_F(PrefetchRoomTest, ABudgetThatEndsIsNoLackOfRoom) {
-  TileStore store = StoreOf(all_bytes_);
-  AtlasView view(store, &link_);
-  ASSERT_TRUE(view.Around(kPlace_m, kRadius_m, options_)->is_current);
-  options_.budget_bytes = disc_bytes_;
-  const StoreSyncReport report = Prefetch(view);
-  EXPECT_FALSE(report.is_complete);
-  EXPECT_TRUE(report.has_room);
-  EXPECT_GT(report.tiles, 0U);
+  for (const bool is_full : {false, true}) {
+    TileStore store = StoreOf(is_full ? 3 * disc_bytes_ : all_bytes_);
+    AtlasView view(store, &link_);
+    options_.budget_bytes = 0;
+    if (is_full) {
+      EXPECT_FALSE(view.Prefetch({{30.0, 4.0}, {70.0, 4.0}}, 5.0, options_)->has_room);
+    }
+    ASSERT_TRUE(view.Around(kPlace_m, kRadius_m, options_)->is_current);
+    options_.budget_bytes = disc_bytes_ / 2;
+    EXPECT_EQ(store.held_bytes() + options_.budget_bytes > store.capacity_bytes(), is_full);
+    const StoreSyncReport report = Prefetch(view);
+    EXPECT_FALSE(report.is_complete);
+    EXPECT_TRUE(report.has_room) << is_full;
+    EXPECT_GT(report.tiles, 0U);
+  }
 }
 
 // Of a disc that is followed in part, the rest along the route comes with the route, and stays as
