@@ -206,7 +206,21 @@ Result<StoreSyncReport> AtlasView::Prefetch(const std::vector<Eigen::Vector2d>& 
   if (Status status = CheckOptions(options, store_.atlas().profile); !status.ok()) {
     return Error(std::move(status));
   }
-  return feed_->Sync(store_, CorridorArea{route_m, half_width_m}, options);
+  const MapArea route = CorridorArea{route_m, half_width_m};
+  store_.TakeDropped();
+  Result<StoreSyncReport> report = feed_->Sync(store_, route, options);
+  if (!report) return report;
+  const std::vector<TileId> dropped = store_.TakeDropped();
+  report->has_room &= std::none_of(dropped.begin(), dropped.end(), [&](const TileId& id) {
+    return id.level >= options.finest_level && Touches(route, id, store_.atlas().profile) &&
+           store_.Find(id) == nullptr;
+  });
+  if (!report->has_room) {
+    report->sync = Status(StatusCode::kResourceExhausted,
+                          "tile store: no room for all of the route beside the map around: "
+                          "max_disk_bytes or max_memory_bytes is too small");
+  }
+  return report;
 }
 
 }  // namespace atlas

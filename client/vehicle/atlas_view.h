@@ -52,7 +52,9 @@ class AtlasView {
   Result<MapAround> Around(const Eigen::Vector2d& position_m,
                            double radius_m,
                            const AroundOptions& options = {});
-  // Fetches what will be needed along a route of 1 to 256 points that begins where the vehicle is.
+  // Fetches what will be needed along a route of 1 to 256 points that begins where the vehicle is,
+  // as far as the store has room beside what was followed around last: else `has_room` is false and
+  // `sync` says so.
   Result<StoreSyncReport> Prefetch(const std::vector<Eigen::Vector2d>& route_m,
                                    double half_width_m,
                                    const AroundOptions& options);

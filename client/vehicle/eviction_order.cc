@@ -33,6 +33,14 @@ std::optional<TileId> EvictionOrder::TakeAbove(std::size_t max_bytes) {
   return std::nullopt;
 }
 
+std::optional<TileId> EvictionOrder::TakeCoarse(
+    const std::function<bool(const TileId&)>& is_wanted) {
+  for (std::size_t rank = 1; rank < ranks_.size(); ++rank) {
+    if (auto oldest = ranks_[rank].TakeOldest(is_wanted)) return oldest;
+  }
+  return std::nullopt;
+}
+
 std::size_t EvictionOrder::bytes() const {
   std::size_t sum = 0;
   for (const LruList<TileId>& rank : ranks_) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -22,8 +23,11 @@ class EvictionOrder {
   void Insert(const TileId& id, std::size_t bytes);
   void Use(const TileId& id);
   void Remove(const TileId& id);
+  bool IsCoarse(const TileId& id) const { return id.level >= first_coarse_; }
   // Takes out what goes first, if all together are more than `max_bytes`.
   std::optional<TileId> TakeAbove(std::size_t max_bytes);
+  // Takes out the coarse one that goes first of those of which `is_wanted` is true.
+  std::optional<TileId> TakeCoarse(const std::function<bool(const TileId&)>& is_wanted);
 
   std::size_t bytes() const;
 

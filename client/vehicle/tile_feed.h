@@ -27,7 +27,10 @@ struct StoreSyncReport {
   std::uint64_t requests = 0;
   std::uint64_t revision = 0;  // the area is at least as new, if `is_complete`
   bool is_complete = false;    // the store got all that the query wants, as far as it has room
-  bool has_room = true;        // false: the finest levels of a disc are followed nearby only
+  // False: the finest levels of a disc are followed nearby only, or of another area there was no
+  // room for all beside the last disc.
+  bool has_room = true;
+  Status sync;  // of AtlasView::Prefetch: kResourceExhausted where there was no room
 };
 
 class TileFeed {

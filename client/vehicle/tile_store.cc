@@ -16,6 +16,8 @@ namespace atlas {
 namespace {
 
 constexpr std::size_t kMaxDropped = 65'536;
+// Of what the store can hold, for the coarse tiles elsewhere where there is no room.
+constexpr std::uint64_t kCoarsePart = 4;
 
 // Every byte of the blob is looked at here, once, so that nothing damaged is ever kept.
 Status CheckBlob(ByteSpan blob,
@@ -47,6 +49,14 @@ Result<Bytes> Joined(const TileBlob& tile, const Bytes* base) {
   if (tile.base_hash == 0) return base == nullptr ? tile.blob : MergeSections(*base, tile.blob);
   if (base == nullptr) return Error(StatusCode::kInvalidData, "a delta to what is not held");
   return ApplyTileDelta(*base, tile.blob);
+}
+
+std::unordered_set<std::uint64_t> KeysOf(const std::vector<TileId>& ids) {
+  std::unordered_set<std::uint64_t> keys;
+  for (const TileId& id : ids) {
+    keys.insert(id.Key());
+  }
+  return keys;
 }
 
 // Nothing is left to be read. All else the disk may say and have the file all the same.
@@ -84,9 +94,10 @@ Status TileStore::OpenFolder() {
   others_ = OtherAtlases(options_.folder, files_->folder());
   for (const TileFiles::Found& found : *found_tiles) {
     disk_.Insert(found.facts.id, found.bytes);
-    tiles_[found.facts.id.Key()] = {found.facts, nullptr, true};
+    tiles_[found.facts.id.Key()] = {found.facts, nullptr, found.bytes, true};
+    held_bytes_ += found.bytes;
   }
-  Trim();
+  TrimDisk(false);
   return {};
 }
 
@@ -168,33 +179,101 @@ void TileStore::Keep(const TileFacts& facts, Bytes blob) {
   // A file of this name is written over, and stays as it is where that fails.
   const bool has_file = old != tiles_.end() && old->second.is_on_disk && old->second.facts == facts;
   if (old != tiles_.end() && !has_file) Erase(old);
-  Entry entry{facts, nullptr, has_file};
+  if (has_file) held_bytes_ -= old->second.bytes;
+  Entry entry{facts, nullptr, blob.size(), has_file};
   if (files_) {
     const Result<std::uint64_t> written = files_->Write(facts, blob);
+    is_disk_taking_ = written.has_value();
     entry.is_on_disk = has_file || written;
+    entry.bytes = written.value_or(has_file ? old->second.bytes : entry.bytes);
     if (written) disk_.Insert(facts.id, *written);
   }
   disk_failures_ += !options_.folder.empty() && !entry.is_on_disk ? 1U : 0U;
   memory_.Insert(facts.id, blob.size());
   entry.blob = std::make_shared<const Bytes>(std::move(blob));
+  held_bytes_ += entry.bytes;
   tiles_[facts.id.Key()] = std::move(entry);
   Trim();
 }
 
 void TileStore::Trim() {
+  TrimMemory();
+  TrimDisk(true);
+}
+
+void TileStore::TrimMemory() {
   while (const auto id = memory_.TakeAbove(options_.max_memory_bytes)) {
     const auto entry = tiles_.find(id->Key());
     entry->second.blob = nullptr;
     if (!entry->second.is_on_disk) Drop(entry);
   }
+}
+
+void TileStore::TrimDisk(bool may_read) {
   if (disk_bytes() > options_.max_disk_bytes) {
     others_.Remove(disk_bytes() - options_.max_disk_bytes);
   }
   while (const auto id = disk_.TakeAbove(options_.max_disk_bytes)) {
     const auto entry = tiles_.find(id->Key());
+    const bool stays = entry->second.blob != nullptr || (may_read && TakeIntoMemory(entry->second));
     files_->Remove(entry->second.facts);
     entry->second.is_on_disk = false;
-    if (entry->second.blob == nullptr) Drop(entry);
+    if (!stays) Drop(entry);
+  }
+}
+
+bool TileStore::TakeIntoMemory(Entry& entry) {
+  if (memory_.bytes() + entry.bytes > options_.max_memory_bytes) return false;
+  Result<Bytes> blob = files_->Read(entry.facts);
+  if (!blob) return false;
+  memory_.Insert(entry.facts.id, blob->size());
+  entry.blob = std::make_shared<const Bytes>(*std::move(blob));
+  entry.comes_whole = false;
+  return true;
+}
+
+std::uint64_t TileStore::capacity_bytes() const {
+  if (!files_) return options_.max_memory_bytes;
+  const std::uint64_t on_disk = is_disk_taking_ ? options_.max_disk_bytes : disk_.bytes();
+  return std::max<std::uint64_t>(options_.max_memory_bytes, on_disk);
+}
+
+std::uint64_t TileStore::BytesOf(const std::vector<TileId>& ids) const {
+  std::uint64_t bytes = 0;
+  for (const TileId& id : ids) {
+    const auto found = tiles_.find(id.Key());
+    bytes += found == tiles_.end() ? 0 : found->second.bytes;
+  }
+  return bytes;
+}
+
+std::uint64_t TileStore::OtherCoarseBytes(const std::unordered_set<std::uint64_t>& keys) const {
+  std::uint64_t bytes = 0;
+  for (const auto& [key, entry] : tiles_) {
+    if (memory_.IsCoarse(entry.facts.id) && !keys.contains(key)) bytes += entry.bytes;
+  }
+  return bytes;
+}
+
+std::uint64_t TileStore::RoomAmong(const std::vector<TileId>& ids) const {
+  const std::uint64_t capacity = capacity_bytes();
+  return capacity - std::min(capacity, OtherCoarseBytes(KeysOf(ids)));
+}
+
+void TileStore::RemoveCoarse(const std::vector<TileId>& but) {
+  const auto keys = KeysOf(but);
+  const std::uint64_t most = capacity_bytes() / kCoarsePart;
+  std::uint64_t bytes = OtherCoarseBytes(keys);
+  const auto is_other = [&](const TileId& id) {
+    return !keys.contains(id.Key());
+  };
+  while (bytes > most) {
+    auto id = disk_.TakeCoarse(is_other);
+    if (!id) id = memory_.TakeCoarse(is_other);
+    if (!id) return;
+    const auto entry = tiles_.find(id->Key());
+    bytes -= entry->second.bytes;
+    Erase(entry);
   }
 }
 
@@ -207,6 +286,7 @@ void TileStore::Use(const TileId& id) {
 void TileStore::Drop(Entries::iterator entry) {
   ++changes_;
   if (dropped_.size() < kMaxDropped) dropped_.push_back(entry->second.facts.id);
+  held_bytes_ -= entry->second.bytes;
   tiles_.erase(entry);
 }
 
@@ -216,6 +296,7 @@ void TileStore::Erase(Entries::iterator entry) {
   memory_.Remove(facts.id);
   disk_.Remove(facts.id);
   if (entry->second.is_on_disk) files_->Remove(facts);
+  held_bytes_ -= entry->second.bytes;
   tiles_.erase(entry);
 }
 
@@ -253,13 +334,13 @@ std::vector<HeldGroup> TileStore::Held(const MapArea& area,
   return summary.Take();
 }
 
-std::vector<TileId> TileStore::TilesIn(const DiscArea& disc, std::uint8_t finest) const {
+std::vector<TileId> TileStore::TilesIn(const MapArea& area, std::uint8_t finest) const {
+  const AreaBounds bounds(area, atlas_.profile);
   std::vector<TileId> ids;
   for (auto entry = tiles_.lower_bound(std::uint64_t{finest} << 58U); entry != tiles_.end();
        ++entry) {
-    if (Touches(disc, entry->second.facts.id, atlas_.profile)) {
-      ids.push_back(entry->second.facts.id);
-    }
+    const TileId& id = entry->second.facts.id;
+    if (bounds.MayTouchBlock(id) && Touches(area, id, atlas_.profile)) ids.push_back(id);
   }
   return ids;
 }

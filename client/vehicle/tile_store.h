@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -39,9 +40,9 @@ struct AskedSections {
 
 class TileStore {
  public:
-  // Reads the folder's names, no tile. A folder that the disk does not let it make or use, or that
-  // another store has (kConflict), leaves a store in memory, and disk_problem says why.
-  // kInvalidArgument: an atlas id that is none.
+  // Reads the folder's names, no tile; files beyond the limit go. A folder that the disk does not
+  // let it make or use, or that another store has (kConflict), leaves a store in memory, and
+  // disk_problem says why. kInvalidArgument: an atlas id that is none.
   static Result<TileStore> Open(AtlasKey atlas, const TileStoreOptions& options);
 
   TileStore(const TileStore&) = delete;  // its orders point into themselves
@@ -54,6 +55,15 @@ class TileStore {
   std::size_t size() const { return tiles_.size(); }
   // Moves whenever a tile comes, changes, goes or is to come again.
   std::uint64_t changes() const { return changes_; }
+  // Of the tiles that are held, wherever: of each its file's, or its blob's where it had none.
+  std::uint64_t held_bytes() const { return held_bytes_; }
+  // Of as much there is room for: in memory, or on disk where that is more.
+  std::uint64_t capacity_bytes() const;
+  // The same of these tiles, whether all of them are held or not.
+  std::uint64_t BytesOf(const std::vector<TileId>& ids) const;
+  // What there is room for where these tiles, and others that come, are of use: the coarse ones
+  // elsewhere go last, and stay.
+  std::uint64_t RoomAmong(const std::vector<TileId>& ids) const;
   std::size_t memory_bytes() const { return memory_.bytes(); }
   std::uint64_t disk_bytes() const { return disk_.bytes() + others_.bytes(); }
   // Tiles that the disk had no room for, or would not take: held in memory only.
@@ -78,6 +88,9 @@ class TileStore {
   // it, or the disk failed at its file. Not told to a daemon; a Read that succeeds ends it.
   bool ComesWhole(const TileId& id) const;
   void Remove(const TileId& id);
+  // Where there is no room: the coarse tiles but these go, until they are a quarter of what it can
+  // hold.
+  void RemoveCoarse(const std::vector<TileId>& but);
   // Tiles for which there was no room any more since the last call, 65,536 of them at most.
   std::vector<TileId> TakeDropped() { return std::exchange(dropped_, {}); }
   // What a sync said of held tiles: some are no more, some blocks must be told tile by tile.
@@ -90,13 +103,14 @@ class TileStore {
                               std::uint8_t coarsest,
                               HeldInPart& in_part) const;
   // Of these levels, in key order: finest first.
-  std::vector<TileId> TilesIn(const DiscArea& disc, std::uint8_t finest) const;
+  std::vector<TileId> TilesIn(const MapArea& area, std::uint8_t finest) const;
   std::vector<TileId> Tiles() const;
 
  private:
   struct Entry {
     TileFacts facts;
     std::shared_ptr<const Bytes> blob;  // null: only on disk
+    std::uint64_t bytes = 0;            // of its file, or of its blob where it had none
     bool is_on_disk = false;
     bool comes_whole = false;
   };
@@ -107,6 +121,12 @@ class TileStore {
   Result<std::shared_ptr<const Bytes>> BaseOf(const TileBlob& tile, SectionBits& sections);
   void Keep(const TileFacts& facts, Bytes blob);
   void Trim();
+  void TrimMemory();
+  // A tile that is only there stays in memory where that has room, if it may be read.
+  void TrimDisk(bool may_read);
+  // False: there is no room, or it cannot be read.
+  bool TakeIntoMemory(Entry& entry);
+  std::uint64_t OtherCoarseBytes(const std::unordered_set<std::uint64_t>& keys) const;
   void Drop(Entries::iterator entry);
   void Erase(Entries::iterator entry);
 
@@ -120,6 +140,8 @@ class TileStore {
   EvictionOrder disk_;
   std::set<std::uint64_t> differing_;  // blocks to be told tile by tile
   std::vector<TileId> dropped_;
+  std::uint64_t held_bytes_ = 0;
+  bool is_disk_taking_ = true;  // it took the last tile
   std::uint64_t changes_ = 0;
   std::uint64_t disk_failures_ = 0;
   Status disk_problem_;

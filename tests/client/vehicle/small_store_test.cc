@@ -58,7 +58,7 @@ class SmallStoreTest : public ::testing::Test {
     EXPECT_NE(store.Find(id), nullptr) << id;
   }
   void ExpectNothingStale(const TileStore& store) {
-    for (const TileId& id : store.TilesIn({kMiddle_m, kRadius_m}, 0)) {
+    for (const TileId& id : store.TilesIn(DiscArea{kMiddle_m, kRadius_m}, 0)) {
       const auto now = world_.tiles().find(id);
       ASSERT_NE(now, world_.tiles().end()) << id;
       EXPECT_EQ(store.Find(id)->payload_hash, now->second.encoded.payload_hash) << id;

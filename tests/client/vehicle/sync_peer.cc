@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <set>
 
 #include "core/base/hash.h"
@@ -10,6 +9,7 @@
 #include "core/tile/tile_delta.h"
 #include "core/tile/tile_pyramid.h"
 #include "proto/wire/convert.h"
+#include "tests/client/vehicle/asked_area.h"
 
 namespace atlas {
 namespace {
@@ -28,7 +28,10 @@ SectionMask SectionsOf(const google::protobuf::RepeatedField<std::uint32_t>& num
 class Answer {
  public:
   Answer(const TinyWorld& world, const wire::SyncRequest& request)
-      : world_(world), request_(request), wanted_(SectionsOf(request.sections())) {
+      : world_(world),
+        request_(request),
+        area_(AreaOf(request.area())),
+        wanted_(SectionsOf(request.sections())) {
     for (const wire::Held& held : request.held()) {
       HearTiles(held);
       HearBlocks(held);
@@ -52,16 +55,7 @@ class Answer {
  private:
   bool IsInArea(const TileId& id) const {
     if (id.level < request_.finest_level()) return false;
-    if (!request_.area().has_disc()) return true;
-    const auto& disc = request_.area().disc();
-    const double side = std::ldexp(TinyProfile().tile_size_m(), id.level);
-    const Eigen::Vector2d low = side * Eigen::Vector2d(id.x, id.y);
-    const Eigen::Vector2d high = low.array() + side;
-    const Eigen::Vector2d center =
-        1e-6 * Eigen::Vector2d(static_cast<double>(disc.center().x_um()),
-                               static_cast<double>(disc.center().y_um()));
-    return (center.cwiseMax(low).cwiseMin(high) - center).norm() <=
-           1e-6 * static_cast<double>(disc.radius_um());
+    return !area_ || Touches(*area_, id, TinyProfile());
   }
 
   void HearTiles(const wire::Held& held) {
@@ -104,6 +98,7 @@ class Answer {
 
   const TinyWorld& world_;
   const wire::SyncRequest& request_;
+  std::optional<MapArea> area_;
   SectionMask wanted_;
   std::map<TileId, SectionMask> current_;
   std::map<TileId, std::pair<std::uint64_t, SectionMask>> bases_;
@@ -235,9 +230,7 @@ void TinyWorld::Set(std::int32_t x, std::int32_t y, std::int32_t altitude_mm) {
     tile.layers.push_back(layer);
     tile.cell_begin[cell + 1] = static_cast<std::uint32_t>(cell + 1);
   }
-  ++revision_;
-  Store(tile);
-  BuildParents(tile.id);
+  Put(tile);
 }
 
 void TinyWorld::Erase(std::int32_t x, std::int32_t y) {
@@ -309,11 +302,15 @@ void SyncPeer::Serve(PeerSocket& socket) {
     if (AnswerWatch(socket, *request)) continue;
     ++syncs_;
     for (wire::Envelope& frame : Reply(world_, *request)) {
-      if (frames_left_-- <= 0) return;
+      if (frames_left_-- <= 0) {
+        Flush(socket);
+        return;
+      }
       tiles_sent_ += frame.has_tile() ? 1 : 0;
       frame.set_request_id(request->request_id());
       if (!Send(socket, frame)) return;
     }
+    if (!Flush(socket)) return;
   }
 }
 
@@ -367,14 +364,15 @@ bool SyncPeer::Send(PeerSocket& socket, const wire::Envelope& frame) {
   const Bytes bytes = *EncodeEnvelopeFrame(frame);
   std::unique_lock lock(mutex_);
   if (frames_until_silence_-- > 0) {
-    lock.unlock();
-    return socket.Write(bytes);
+    unsent_.insert(unsent_.end(), bytes.begin(), bytes.end());
+    return true;
   }
-  const std::size_t half = bytes.size() / 2;
-  const bool is_sent = socket.Write(ByteSpan(bytes).first(half));
+  const auto half = bytes.begin() + static_cast<std::ptrdiff_t>(bytes.size() / 2);
+  unsent_.insert(unsent_.end(), bytes.begin(), half);
+  const bool is_sent = Flush(socket);
   released_.wait_for(lock, std::chrono::seconds(10), [this] { return frames_until_silence_ >= 0; });
-  lock.unlock();
-  return is_sent && socket.Write(ByteSpan(bytes).subspan(half));
+  unsent_.insert(unsent_.end(), half, bytes.end());
+  return is_sent;
 }
 
 void SyncPeer::FallSilentAfter(int frames) {

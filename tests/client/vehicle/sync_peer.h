@@ -9,6 +9,7 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "client/vehicle/tile_files.h"
@@ -30,6 +31,12 @@ class TinyWorld {
 
   // The tile at level 0 with one surface at this altitude, and its parents.
   void Set(std::int32_t x, std::int32_t y, std::int32_t altitude_mm);
+  // This one of level 0, and its parents.
+  void Put(const Tile& tile) {
+    ++revision_;
+    Store(tile);
+    BuildParents(tile.id);
+  }
   void Erase(std::int32_t x, std::int32_t y);
   void ChangeSome(std::mt19937& random, int side, int changes);
 
@@ -83,6 +90,8 @@ class SyncPeer {
  private:
   void Serve(PeerSocket& socket);
   bool Send(PeerSocket& socket, const wire::Envelope& frame);
+  // In one piece what is left of a reply: the link acknowledges small ones late.
+  bool Flush(PeerSocket& socket) { return socket.Write(std::exchange(unsent_, {})); }
   // False: the request is another one.
   bool AnswerWatch(PeerSocket& socket, const wire::Envelope& request);
   void TellWatch(wire::Envelope reply);
@@ -94,6 +103,7 @@ class SyncPeer {
   int frames_until_silence_ = kNever;
   int frames_left_;
   Watches watches_ = Watches::kTaken;
+  Bytes unsent_;
   PeerSocket* watcher_ = nullptr;  // as long as it is connected
   std::uint64_t watch_id_ = 0;
   std::atomic<int> watches_asked_{0};
