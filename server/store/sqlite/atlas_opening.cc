@@ -94,20 +94,21 @@ void WhereThereIsRoom(const std::function<void()>& write) {
 }
 
 struct DamagedLog {
-  std::filesystem::path kept;  // a copy
+  std::filesystem::path kept;  // a copy, if anything was done to it
   LogDamage damage;
 
   bool is_lossy() const { return damage.lost_commits > 0; }
 };
 
-// Before SQLite drops what is behind the damage. Who knows better can look at the copy.
-Result<DamagedLog> KeepDamagedLog(const std::filesystem::path& log) {
+// Before bits are turned back in it, and SQLite drops what is behind other damage. Who knows better
+// can look at the copy.
+Result<DamagedLog> MendLog(const std::filesystem::path& log) {
   const Result<LogDamage> found = FindLogDamage(log, HasRunSince(log));
   if (!found) {
     return Error(found.error());
   }
   DamagedLog damaged{{}, *found};
-  if (damaged.is_lossy()) {
+  if (damaged.is_lossy() || !found->turned.empty()) {
     std::error_code error;
     for (int number = 1; number == 1 || std::filesystem::exists(damaged.kept, error); ++number) {
       damaged.kept = log.string() + StrCat(".damaged-", number);
@@ -118,7 +119,50 @@ Result<DamagedLog> KeepDamagedLog(const std::filesystem::path& log) {
                           ", and no copy of it can be kept: ", error.message()));
     }
   }
+  if (!found->turned.empty()) {
+    if (Status status = TurnBack(log, found->turned); !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
   return damaged;
+}
+
+// Part of what is lost may have been copied into the database before the damage: then pages of
+// different commits are in it, and what is left of the log goes to none of them. Nothing is written
+// then.
+Status CheckWhatIsLeft(Connection& writer, const DamagedLog& log) {
+  writer.KeepLog(true);
+  Status left;
+  try {
+    left = CheckCounters(writer);
+  } catch (const std::exception& error) {
+    left = StatusFromException(error);
+  }
+  if (left.ok()) {
+    writer.KeepLog(false);
+    return {};
+  }
+  if (log.damage.turned.empty()) {
+    std::error_code ignored;
+    std::filesystem::remove(log.kept, ignored);  // the log is what it was
+  }
+  return {StatusCode::kInvalidData,
+          StrCat("the log is damaged at frame ", log.damage.frame, ", ", log.damage.lost_commits,
+                 " commits are lost, and what is left is no atlas (", left.message(),
+                 "): nothing was changed; restore a backup")};
+}
+
+// Of bits that were turned back.
+std::string NoteMended(Connection& writer, const DamagedLog& log) {
+  const std::string what =
+      StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.turned.size(),
+             " bits were turned back, nothing is lost by them; a copy of the "
+             "log as it was is ",
+             log.kept.filename().string());
+  writer.Begin();
+  AddEvent(writer, {EventKind::kTablesRepaired, kAtlasItself, log.kept.filename().string(), what});
+  writer.Commit();
+  return what;
 }
 
 // Vehicles are told by the epoch, as after a restore from a backup.
@@ -166,7 +210,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       return Error(std::move(status));
     }
   }
-  const auto log = KeepDamagedLog(directory.database_file().string() + "-wal");
+  const auto log = MendLog(directory.database_file().string() + "-wal");
   if (!log) {
     return Error(log.error());
   }
@@ -176,6 +220,11 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
   try {
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     AddRowHash(*writer);
+    if (log->is_lossy()) {
+      if (Status status = CheckWhatIsLeft(*writer, *log); !status.ok()) {
+        return Error(status.WithContext(directory.database_file().string()));
+      }
+    }
     if (Status status = MigrateStore(*writer, options.on_upgrade); !status.ok()) {
       return Error(status.WithContext(directory.database_file().string()));
     }
@@ -191,11 +240,16 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
     Mend(*writer, identity->profile.levels);
-    if (log->is_lossy()) {
-      const std::string what = NoteLoss(*writer, *identity, *log);
+    const auto tell = [&options](const std::string& what) {
       if (options.on_damaged_log) {
         options.on_damaged_log(what);
       }
+    };
+    if (!log->damage.turned.empty()) {
+      tell(NoteMended(*writer, *log));
+    }
+    if (log->is_lossy()) {
+      tell(NoteLoss(*writer, *identity, *log));
     }
     KeepVehicleBytes(*writer);
     identity->restores = RevisionsOf(*writer, EventKind::kBackupRestored);

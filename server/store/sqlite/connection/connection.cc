@@ -204,6 +204,11 @@ void Connection::LeaveLogTo(std::function<void(int)> on_commit) {
   sqlite3_wal_hook(database_.getHandle(), hook, this);
 }
 
+void Connection::KeepLog(bool is_kept) {
+  sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, is_kept ? 1 : 0,
+                    nullptr);
+}
+
 std::optional<int> Connection::CopyLog() {
   int copied = 0;
   sqlite3* handle = database_.getHandle();

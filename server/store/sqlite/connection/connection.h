@@ -124,6 +124,8 @@ class Connection {
   using IntegerFunction = std::function<std::int64_t(std::span<const std::int64_t>)>;
   void AddFunction(const char* name, IntegerFunction function);
 
+  // Whether what is not in the database yet stays in the log when this connection is closed.
+  void KeepLog(bool is_kept);
   // From now on this connection does not copy the log into the database by itself; `on_commit` is
   // told after each commit how many pages the log has. It must not throw.
   void LeaveLogTo(std::function<void(int)> on_commit);

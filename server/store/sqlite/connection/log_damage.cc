@@ -1,5 +1,6 @@
 #include "server/store/sqlite/connection/log_damage.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <chrono>
@@ -8,6 +9,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/base/bytes.h"
 #include "core/base/str_cat.h"
@@ -45,15 +47,24 @@ class LogSum {
   bool Is(ByteSpan bytes, std::size_t at) const {
     return BigEndian(bytes, at) == first_ && BigEndian(bytes, at + 4) == second_;
   }
-  // Of `words` before this sum was taken; or of the sum at `at` of `bytes`. Whether one bit that is
-  // turned makes them fit.
-  bool IsOneBitOff(ByteSpan words, ByteSpan bytes, std::size_t at) const {
+  // Of `words` before this sum was taken; or of the sum at `at` of `bytes`: the bits of which each
+  // alone makes them fit when it is turned. Sums lose what the highest bits of words are: there may
+  // be many.
+  struct Bit {
+    bool is_in_words = false;
+    std::size_t byte = 0;  // of `words`, or of `bytes`
+    std::uint8_t mask = 0;
+  };
+  std::vector<Bit> FindTurned(ByteSpan words, ByteSpan bytes, std::size_t at) const {
+    std::vector<Bit> found;
     const std::uint32_t first = BigEndian(bytes, at) - first_;
     const std::uint32_t second = BigEndian(bytes, at + 4) - second_;
-    if (std::popcount(BigEndian(bytes, at) ^ first_) +
-            std::popcount(BigEndian(bytes, at + 4) ^ second_) ==
-        1) {
-      return true;
+    const std::uint64_t stored =
+        std::uint64_t{BigEndian(bytes, at)} << 32 | BigEndian(bytes, at + 4);
+    const std::uint64_t differing = stored ^ (std::uint64_t{first_} << 32 | second_);
+    if (std::popcount(differing) == 1) {
+      const auto place = static_cast<std::size_t>(std::countl_zero(differing));
+      found.push_back({false, at + place / 8, static_cast<std::uint8_t>(0x80u >> (place % 8))});
     }
     // What one more in a word makes of both numbers at the end, from the last word back.
     std::array<std::uint32_t, 2> of_first{1, 1};
@@ -62,17 +73,19 @@ class LogSum {
       for (const auto& [effect, offset] :
            {std::pair(of_first, 8 * pair), std::pair(of_second, 8 * pair + 4)}) {
         const std::uint32_t word = Word(words, offset);
-        for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
-          const std::uint32_t change = (word & bit) == 0 ? bit : 0u - bit;
+        for (std::size_t bit = 0; bit < 32; ++bit) {
+          const std::uint32_t one = std::uint32_t{1} << bit;
+          const std::uint32_t change = (word & one) == 0 ? one : 0u - one;
           if (effect[0] * change == first && effect[1] * change == second) {
-            return true;
+            const std::size_t byte = is_big_endian_ ? 3 - bit / 8 : bit / 8;
+            found.push_back({true, offset + byte, static_cast<std::uint8_t>(1u << (bit % 8))});
           }
         }
       }
       of_first = {of_first[0] + of_first[1], of_first[0] + 2 * of_first[1]};
       of_second = {of_second[0] + of_second[1], of_second[0] + 2 * of_second[1]};
     }
-    return false;
+    return found;
   }
 
  private:
@@ -156,18 +169,78 @@ std::size_t GuessPageBytes(LogReading& log, std::array<std::uint32_t, 2>& salts)
   return 0;
 }
 
-// Of the frame at which `sum` is.
-bool IsFlipped(const LogSum& sum, ByteSpan frame, const std::array<std::uint32_t, 2>& salts) {
-  if (SaltsOf(frame) != salts) {
-    return sum.Is(frame, 16);  // but for the bit of a salt
+// The header's bit that is turned, turned back in `bytes`, too: if it is one, and by the salts of
+// the first frame no other. Which order of bytes sums are of may be what turned.
+std::optional<TurnedBit> MendHeader(LogReading& log, Bytes& bytes) {
+  Bytes first(kFrameHeaderBytes);
+  log.Seek(kHeaderBytes);
+  if (!log.Read(first)) {
+    return std::nullopt;
   }
-  Bytes words(frame.begin(), frame.begin() + 8);
-  words.insert(words.end(), frame.begin() + kFrameHeaderBytes, frame.end());
-  return sum.IsOneBitOff(words, frame, 16);
+  std::vector<TurnedBit> fitting;
+  for (const bool is_big_endian : {false, true}) {
+    LogSum sum(is_big_endian);
+    sum.Add(ByteSpan(bytes).first(24));
+    for (const LogSum::Bit& bit : sum.FindTurned(ByteSpan(bytes).first(24), bytes, 24)) {
+      Bytes mended = bytes;
+      mended[bit.byte] ^= bit.mask;
+      const LogHeader header = ReadHeader(mended);
+      if (header.sum && header.salts == SaltsOf(first)) {
+        fitting.push_back({bit.byte, bit.mask});
+      }
+    }
+  }
+  if (fitting.size() != 1) {
+    return std::nullopt;
+  }
+  bytes[fitting.front().byte] ^= fitting.front().mask;
+  return fitting.front();
 }
 
-LogDamage Scan(LogReading& log, LogHeader header) {
-  LogDamage damage;
+LogSum Sum(LogSum before, ByteSpan frame) {
+  before.Add(frame.first(8));
+  before.Add(frame.subspan(kFrameHeaderBytes));
+  return before;
+}
+
+Bytes SummedPart(ByteSpan frame) {
+  Bytes words(8 + frame.size() - kFrameHeaderBytes);
+  std::copy_n(frame.begin(), 8, words.begin());
+  std::copy(frame.begin() + kFrameHeaderBytes, frame.end(), words.begin() + 8);
+  return words;
+}
+
+bool IsWhole(const LogSum& sum, ByteSpan frame, const LogHeader& header) {
+  return SaltsOf(frame) == header.salts && sum.Is(frame, 16);
+}
+
+// The only bit that makes `frame`, at which `sum` is, whole, by its place in the frame.
+std::optional<TurnedBit> FindTurnedBit(const LogSum& sum, ByteSpan frame, const LogHeader& header) {
+  const auto salts = SaltsOf(frame);
+  const std::uint64_t differing =
+      std::uint64_t{salts[0] ^ header.salts[0]} << 32 | (salts[1] ^ header.salts[1]);
+  if (differing != 0) {
+    const auto place = static_cast<std::size_t>(std::countl_zero(differing));
+    const bool is_all = std::popcount(differing) == 1 && sum.Is(frame, 16);
+    return is_all ? std::optional(
+                        TurnedBit{8 + place / 8, static_cast<std::uint8_t>(0x80u >> (place % 8))})
+                  : std::nullopt;
+  }
+  const auto found = sum.FindTurned(SummedPart(frame), frame, 16);
+  if (found.size() != 1) {
+    return std::nullopt;
+  }
+  const bool is_of_page = found.front().is_in_words && found.front().byte >= 8;
+  return TurnedBit{found.front().byte + (is_of_page ? kFrameHeaderBytes - 8 : 0),
+                   found.front().mask};
+}
+
+// Whether a bit makes it whole, be it one of several.
+bool MayBeTurned(const LogSum& sum, ByteSpan frame, const LogHeader& header) {
+  return SaltsOf(frame) == header.salts && !sum.FindTurned(SummedPart(frame), frame, 16).empty();
+}
+
+LogDamage Scan(LogReading& log, LogHeader header, LogDamage damage) {
   bool is_over = !header.sum;
   if (is_over) {
     header.page_bytes = GuessPageBytes(log, header.salts);
@@ -181,14 +254,25 @@ LogDamage Scan(LogReading& log, LogHeader header) {
   for (std::uint64_t number = 0; log.Read(frame); ++number) {
     const bool is_of_log = AreSame(SaltsOf(frame), header.salts);  // else of one before
     if (!is_over) {
-      header.sum->Add(ByteSpan(frame).first(8));
-      header.sum->Add(ByteSpan(frame).subspan(kFrameHeaderBytes));
-      if (SaltsOf(frame) == header.salts && header.sum->Is(frame, 16)) {
+      const LogSum before = *header.sum;
+      header.sum = Sum(before, frame);
+      if (IsWhole(*header.sum, frame, header)) {
+        continue;
+      }
+      if (damage.turned.empty()) {
+        damage.frame = number;
+      }
+      const auto turned = is_of_log ? FindTurnedBit(*header.sum, frame, header) : std::nullopt;
+      if (turned) {
+        frame[turned->byte] ^= turned->mask;
+        header.sum = Sum(before, frame);
+        const std::uint64_t at = kHeaderBytes + number * frame.size();
+        damage.turned.push_back({at + turned->byte, turned->mask});
         continue;
       }
       is_over = true;
       damage.frame = number;
-      is_torn = is_of_log && !IsFlipped(*header.sum, frame, header.salts);
+      is_torn = is_of_log && !MayBeTurned(*header.sum, frame, header);
     } else if (is_of_log) {
       is_torn = false;
     }
@@ -214,7 +298,15 @@ Result<LogDamage> FindLogDamage(const std::filesystem::path& path, bool ran_sinc
   if (!log.is_open() || !log.Read(bytes)) {
     return Error(StatusCode::kUnavailable, StrCat(path.string(), ": the log cannot be read"));
   }
-  LogDamage damage = Scan(log, ReadHeader(bytes));
+  LogDamage damage;
+  LogHeader header = ReadHeader(bytes);
+  if (!header.sum) {
+    if (const auto turned = MendHeader(log, bytes)) {
+      damage.turned.push_back(*turned);
+      header = ReadHeader(bytes);
+    }
+  }
+  damage = Scan(log, header, std::move(damage));
   if (log.has_failed()) {
     return Error(StatusCode::kUnavailable, StrCat(path.string(), ": the log cannot be read"));
   }
@@ -222,6 +314,21 @@ Result<LogDamage> FindLogDamage(const std::filesystem::path& path, bool ran_sinc
     damage.lost_commits = 0;
   }
   return damage;
+}
+
+Status TurnBack(const std::filesystem::path& path, const std::vector<TurnedBit>& bits) {
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  for (const TurnedBit& bit : bits) {
+    const auto at = static_cast<std::streamoff>(bit.byte);
+    file.seekg(at);
+    const int byte = file.get();
+    file.seekp(at);
+    file.put(static_cast<char>(byte ^ bit.mask));
+  }
+  file.flush();
+  return file ? Status()
+              : Status(StatusCode::kUnavailable,
+                       StrCat(path.string(), ": damaged bits cannot be turned back"));
 }
 
 bool HasRunSince(const std::filesystem::path& path) {
