@@ -7,6 +7,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/log_damage.h"
@@ -186,13 +187,15 @@ void Mend(Connection& writer, std::uint8_t levels) {
   writer.Begin();
   RestoreCounters(writer);
   FinishMigration(writer);
+  std::vector<SessionRow> sessions;
   for (const std::int64_t session : ListDamagedSessions(writer)) {
-    if (RestoreSession(writer, session, Vouching::kByChecksum)
-            .ok()) {  // who needs one that cannot be, is told
+    if (auto row = TellSession(writer, session, Vouching::kByChecksum)) {
+      sessions.push_back(*std::move(row));
       AddEvent(writer, {EventKind::kTablesRepaired, kAtlasItself,
                         StrCat("session number ", session), "its row was damaged"});
-    }
+    }  // who needs one that cannot be told, is told so
   }
+  PutBackSessions(writer, sessions);
   if (const Status status = CheckMarks(writer); !status.ok()) {
     MarkAllInStore(writer, status.message(), levels);
   }

@@ -1,5 +1,8 @@
 // The list of sessions while rows of it are damaged, under a store that stays open: who opens it
 // puts them right.
+#include <fstream>
+#include <iterator>
+
 #include <gmock/gmock.h>
 
 #include "tests/server/store/store_fixture.h"
@@ -99,6 +102,32 @@ TEST_F(DamagedSessionsTest, ANameThatIsNoneIsDamageOfTheIndex) {
   const auto page = store_->ListSessions({}, 10);
   ASSERT_FALSE(page);
   EXPECT_EQ(page.error().code(), StatusCode::kInvalidData);
+}
+
+// An index still has what was there, and SQLite writes no row that it does not find in there.
+TEST_F(DamagedSessionsTest, ABitOfARowThatItsIndexesLackKeepsNobodyFromStarting) {
+  const std::string name = "a session of its own";
+  Begin({name, "other"});
+  Retract("other");
+  store_.reset();
+  std::ifstream in(Database(), std::ios::binary);
+  const std::string file{std::istreambuf_iterator<char>(in), {}};
+  std::size_t places = 0;
+  std::size_t listed = 0;
+  for (auto at = file.find(name); at != std::string::npos; at = file.find(name, at + 1)) {
+    SCOPED_TRACE(++places);
+    std::string flipped = file;
+    flipped[at] = static_cast<char>(flipped[at] ^ 2);
+    std::ofstream(Database(), std::ios::binary) << flipped;
+    Open();
+    ASSERT_NE(store_, nullptr);
+    const auto page = store_->ListSessions({}, 10);
+    listed += page ? page->size() : 0U;
+    EXPECT_TRUE(page || page.error().code() == StatusCode::kInvalidData) << "of an index";
+    store_.reset();
+  }
+  EXPECT_GT(places, 1U) << "its row and an index";
+  EXPECT_GE(listed, 2U) << "its row was told by the index";
 }
 
 TEST_F(DamagedSessionsTest, TheNextStartPutsThemRight) {

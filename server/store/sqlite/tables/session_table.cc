@@ -244,7 +244,7 @@ std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
   return damaged;
 }
 
-Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching) {
+Result<SessionRow> TellSession(Connection& connection, std::int64_t id, Vouching vouching) {
   SessionRow row;
   row.id = id;
   SessionRecord& r = row.record;
@@ -254,24 +254,44 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
         "WHERE vehicle >= '' AND id = ?");
     names.Bind(id);
     if (!names.Step()) {
-      return Status(StatusCode::kInvalidData,
-                    StrCat("store: the index of session ", id, " is damaged, as is its row"));
+      return Error(StatusCode::kInvalidData,
+                   StrCat("store: the index of session ", id, " is damaged, as is its row"));
     }
     r.key.vehicle = names.Text();
     r.key.session = names.Text();
   }
   const auto state = ReadSessionStateAt(connection, id, std::numeric_limits<std::int64_t>::max());
   if (!state) {
-    return state.error();
+    return Error(state.error());
   }
   r.state = *state;
   CountRows(connection, row);
   if (vouching == Vouching::kByChecksum && !Vouches(ReadChecksum(connection, id), HashOf(row))) {
-    return Status(StatusCode::kInvalidData,
-                  StrCat("store: what the row of session ", id, " was cannot be told"));
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: what the row of session ", id, " was cannot be told"));
   }
-  WithoutCounting(connection, RowKind::kSession, [&] { WriteSession(connection, row); });
+  return row;
+}
+
+Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching) {
+  const auto row = TellSession(connection, id, vouching);
+  if (!row) {
+    return row.error();
+  }
+  WithoutCounting(connection, RowKind::kSession, [&] { WriteSession(connection, *row); });
   return {};
+}
+
+void PutBackSessions(Connection& connection, const std::vector<SessionRow>& rows) {
+  if (rows.empty()) {
+    return;
+  }
+  connection.Execute("REINDEX sessions");
+  WithoutCounting(connection, RowKind::kSession, [&] {
+    for (const SessionRow& row : rows) {
+      WriteSession(connection, row);
+    }
+  });
 }
 
 int RecountSessions(Connection& connection) {

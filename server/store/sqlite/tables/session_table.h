@@ -33,11 +33,17 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 std::uint64_t CountQuarantined(Connection& connection);
 // Ids of those whose rows are damaged.
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection);
-// Writes the row anew, from the index of names, the history of states and the keyframes.
-// kInvalidData when the history does not tell, or the row's checksum speaks against it, unless that
-// is not to count any more.
+// What the row was, from the index of names, the history of states and the keyframes. kInvalidData
+// when the history does not tell, or the row's checksum speaks against it, unless that is not to
+// count any more.
 enum class Vouching { kByChecksum, kByNobody };
+Result<SessionRow> TellSession(Connection& connection, std::int64_t id, Vouching vouching);
+// Writes it anew. SQLite does not, and throws, where an index has something else than the damaged
+// row.
 Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching);
+// Writes rows anew whatever indexes have. Of other damaged rows the index of names says no more
+// what they were called.
+void PutBackSessions(Connection& connection, const std::vector<SessionRow>& rows);
 // Counts what is stored of each. How many counted something else.
 int RecountSessions(Connection& connection);
 
