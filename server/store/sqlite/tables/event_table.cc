@@ -1,5 +1,6 @@
 #include "server/store/sqlite/tables/event_table.h"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <string_view>
@@ -101,6 +102,56 @@ std::vector<std::uint64_t> RevisionsOf(Connection& connection, EventKind kind) {
     }
   }
   return revisions;
+}
+
+Status CheckEvents(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events");
+  while (row.Step()) {
+    if (!ReadEvent(row)) {
+      row.Rewind();
+      return Status(StatusCode::kInvalidData,
+                    StrCat("store: event ", row.Unsigned(), " is damaged: wrong checksum"));
+    }
+  }
+  return {};
+}
+
+int RepairEvents(Connection& connection) {
+  const std::uint64_t revision = ReadCounter(connection, Counter::kRevision);
+  std::vector<Event> damaged;
+  {
+    Query row = connection.Prepare(
+        "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events");
+    while (row.Step()) {
+      if (!ReadEvent(row)) {
+        row.Rewind();
+        Event event;
+        event.id = row.Unsigned();
+        event.revision = std::min(row.Unsigned(), revision);
+        event.time_ms = row.Int();
+        damaged.push_back(std::move(event));
+      }
+    }
+  }
+  for (Event& event : damaged) {
+    event.kind = EventKind::kTablesRepaired;
+    event.author = kAtlasItself;
+    event.detail = "what this event was is not known: its row was damaged";
+    connection
+        .Prepare(
+            "UPDATE events SET revision = ?, kind = ?, author = ?, subject = ?, detail = ?, "
+            "checksum = ? WHERE id = ?")
+        .Bind(event.revision)
+        .Bind(static_cast<std::int64_t>(event.kind))
+        .Bind(std::string_view(event.author))
+        .Bind(std::string_view(event.subject))
+        .Bind(std::string_view(event.detail))
+        .Bind(HashOf(event))
+        .Bind(event.id)
+        .Run();
+  }
+  return static_cast<int>(damaged.size());
 }
 
 }  // namespace atlas

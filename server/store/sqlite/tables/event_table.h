@@ -29,4 +29,10 @@ Result<std::vector<Event>> ReadEvents(Connection& connection,
 // Of all of a kind, in order; damaged ones are left out.
 std::vector<std::uint64_t> RevisionsOf(Connection& connection, EventKind kind);
 
+// kInvalidData names the first that is damaged.
+Status CheckEvents(Connection& connection);
+// Of damaged ones nobody knows more than that they were; when, and at which revision, as far as
+// their rows say. How many.
+int RepairEvents(Connection& connection);
+
 }  // namespace atlas

@@ -1,8 +1,16 @@
 #include "server/store/sqlite/tables/pose_table.h"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
+#include "server/store/event_types.h"
+#include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/table_sums.h"
 
@@ -113,6 +121,36 @@ std::int64_t HashOfBatch(std::uint64_t id,
       .Unsigned(updated)
       .Unsigned(if_revision)
       .value();
+}
+
+struct PoseBatchRow {
+  std::uint64_t id = 0;
+  std::uint64_t revision = 0;
+  std::string author;
+  std::uint64_t updated = 0;
+  std::uint64_t if_revision = 0;
+
+  std::int64_t Hash() const { return HashOfBatch(id, revision, author, updated, if_revision); }
+};
+
+// The first `most`.
+std::vector<PoseBatchRow> ListDamagedBatches(Connection& connection, std::size_t most) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, author, updated, if_revision, checksum FROM pose_batches");
+  std::vector<PoseBatchRow> damaged;
+  while (damaged.size() < most && row.Step()) {
+    row.Rewind();
+    PoseBatchRow batch;
+    batch.id = row.Unsigned();
+    batch.revision = row.Unsigned();
+    batch.author = row.Text();
+    batch.updated = row.Unsigned();
+    batch.if_revision = row.Unsigned();
+    if (row.Int() != batch.Hash()) {
+      damaged.push_back(std::move(batch));
+    }
+  }
+  return damaged;
 }
 
 }  // namespace
@@ -254,21 +292,28 @@ void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBa
 }
 
 Status CheckPoseBatches(Connection& connection) {
-  Query row = connection.Prepare(
-      "SELECT id, revision, author, updated, if_revision, checksum FROM pose_batches");
-  while (row.Step()) {
-    row.Rewind();
-    const std::uint64_t id = row.Unsigned();
-    const std::uint64_t revision = row.Unsigned();
-    const std::string author = row.Text();
-    const std::uint64_t updated = row.Unsigned();
-    const std::uint64_t if_revision = row.Unsigned();
-    if (row.Int() != HashOfBatch(id, revision, author, updated, if_revision)) {
-      return Status(StatusCode::kInvalidData,
-                    StrCat("store: pose batch ", id, " is damaged: wrong checksum"));
-    }
+  const std::vector<PoseBatchRow> damaged = ListDamagedBatches(connection, 1);
+  return damaged.empty()
+             ? Status()
+             : Status(StatusCode::kInvalidData, StrCat("store: pose batch ", damaged.front().id,
+                                                       " is damaged: wrong checksum"));
+}
+
+int RepairPoseBatches(Connection& connection) {
+  const std::vector<PoseBatchRow> damaged =
+      ListDamagedBatches(connection, std::numeric_limits<std::size_t>::max());
+  for (PoseBatchRow batch : damaged) {
+    batch.author = kAtlasItself;
+    batch.revision = std::min(batch.revision, ReadCounter(connection, Counter::kRevision));
+    connection
+        .Prepare("UPDATE pose_batches SET revision = ?, author = ?, checksum = ? WHERE id = ?")
+        .Bind(batch.revision)
+        .Bind(std::string_view(batch.author))
+        .Bind(batch.Hash())
+        .Bind(batch.id)
+        .Run();
   }
-  return {};
+  return static_cast<int>(damaged.size());
 }
 
 }  // namespace atlas

@@ -53,5 +53,7 @@ void DeletePoses(Connection& connection, std::int64_t keyframe_id);
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
 // kInvalidData names the first batch whose row is damaged.
 Status CheckPoseBatches(Connection& connection);
+// Of damaged ones nobody knows whose they were. How many.
+int RepairPoseBatches(Connection& connection);
 
 }  // namespace atlas

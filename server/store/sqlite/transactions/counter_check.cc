@@ -7,6 +7,7 @@
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
+#include "server/store/sqlite/tables/pose_table.h"
 
 namespace atlas {
 namespace {
@@ -90,7 +91,8 @@ Status CheckCounters(Connection& connection) {
       add(StrCat("store: counter ", recount.name, " is ", counted, ", and the rows say ", found));
     }
   }
-  for (const auto check : {&CheckTableSums, &CheckIndexes, &CheckStructure}) {
+  for (const auto check :
+       {&CheckTableSums, &CheckIndexes, &CheckStructure, &CheckEvents, &CheckPoseBatches}) {
     if (const Status status = check(connection); status.code() == StatusCode::kInvalidData) {
       add(status.message());
     } else if (!status.ok()) {

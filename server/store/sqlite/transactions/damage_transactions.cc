@@ -227,6 +227,8 @@ Result<std::uint32_t> RepairRowsInStore(Connection& connection,
   repaired += static_cast<std::uint32_t>(RestoreIndexes(connection));
   repaired += PutBackLostTiles(connection);
   connection.Execute("REINDEX");
+  repaired += static_cast<std::uint32_t>(RepairEvents(connection));
+  repaired += static_cast<std::uint32_t>(RepairPoseBatches(connection));
   const auto sessions = RepairSessions(connection, author);
   if (!sessions) {
     return Error(sessions.error());

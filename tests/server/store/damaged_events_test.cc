@@ -1,0 +1,77 @@
+// Who did what, while rows of it are damaged: it is noticed, and a repair tells as much as is left.
+#include <gmock/gmock.h>
+
+#include "tests/server/store/store_fixture.h"
+
+namespace atlas {
+namespace {
+
+using ::testing::HasSubstr;
+
+class DamagedEventsTest : public StoreTest {
+ protected:
+  void Spoil(const std::string& sql) {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
+    sqlite3_busy_timeout(db, 10'000);
+    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(db);
+  }
+  std::uint32_t Repair() {
+    std::uint32_t repaired = 0;
+    for (const TableRepair what : {TableRepair::kRows, TableRepair::kSums}) {
+      const auto result = Await<std::uint32_t>(
+          [&](auto done) { store_->RepairTables(what, "tester", std::move(done)); });
+      EXPECT_TRUE(result) << result.error().message();
+      repaired += result.value_or(0U);
+    }
+    return repaired;
+  }
+  // A correction and a retraction.
+  void Live() {
+    Open();
+    ASSERT_TRUE(Put(MakeKeyframe(1, {{0, 1, 2}})));
+    NewPose pose;
+    pose.key = {{"bus", "day"}, 1};
+    pose.pose = PoseAt(1'000);
+    pose.footprint = {{0, 1, 2}};
+    ASSERT_TRUE(Update({pose}));
+    ASSERT_TRUE(Await<SessionChangeResult>([&](auto done) {
+      store_->ChangeSession({{"bus", "day"}, SessionAction::kRetract, "tester", "why not"},
+                            std::move(done));
+    }));
+  }
+};
+
+TEST_F(DamagedEventsTest, AnEventThatIsDamagedIsNoticedAndRepaired) {
+  for (const char* const damage : {"author = 'mallory'", "kind = 77", "detail = ''", "time_ms = 3",
+                                   "revision = revision + 1", "checksum = checksum + 1"}) {
+    SCOPED_TRACE(damage);
+    store_.reset();
+    std::filesystem::remove_all(options_.directory);
+    Live();
+    ASSERT_TRUE(store_->CheckCounters().ok());
+    const std::size_t count = store_->ListEvents(0, 100)->size();
+    Spoil("UPDATE events SET " + std::string(damage) + " WHERE id = 2");
+    EXPECT_THAT(store_->CheckCounters().message(), HasSubstr("event 2 is damaged"));
+    EXPECT_GE(Repair(), 1U);
+    EXPECT_TRUE(store_->CheckCounters().ok()) << store_->CheckCounters().message();
+    const auto events = store_->ListEvents(0, 100);
+    ASSERT_TRUE(events) << events.error().message();
+    EXPECT_GE(events->size(), count);
+    EXPECT_EQ((*events)[1].id, 2U);
+    EXPECT_THAT((*events)[1].detail, HasSubstr("is not known"));
+  }
+}
+
+TEST_F(DamagedEventsTest, SoIsABatchOfCorrections) {
+  Live();
+  Spoil("UPDATE pose_batches SET author = 'mallory', revision = 77");
+  EXPECT_THAT(store_->CheckCounters().message(), HasSubstr("pose batch 1 is damaged"));
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_TRUE(store_->CheckCounters().ok()) << store_->CheckCounters().message();
+  EXPECT_EQ(Repair(), 0U);
+}
+
+}  // namespace
+}  // namespace atlas
