@@ -210,6 +210,19 @@ TEST_F(DamageTest, ASessionWithoutItsRowGetsAName) {
   EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
 }
 
+// It may be another one's name, and what keyframes make of a tile goes by it.
+TEST_F(DamageTest, TilesOfASessionForWhoseNameNothingVouchesAreBuiltAgain) {
+  Fill();
+  Tamper("UPDATE sessions SET vehicle = 'tram'");
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_THAT(Events(), ::testing::Contains(EventKind::kTablesRepaired));
+  EXPECT_EQ(Digest().tiles, intact_.tiles);
+  const auto report = service_->Verify({.rebuild = true}, Long());
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
+}
+
 TEST_F(DamageTest, ASessionWithoutItsHistoryIsRetractedAndRestored) {
   Fill();
   Tamper("DELETE FROM session_states");

@@ -73,8 +73,14 @@ class SessionRepair {
       if (!HasState(connection_, id)) {
         BeginHistoryOf(id, SessionState::kLive);
       }
+      const bool is_vouched = TellSession(connection_, id, Vouching::kByChecksum).has_value();
       if (Status status = RestoreSession(connection_, id, Vouching::kByNobody); !status.ok()) {
         return Error(std::move(status));
+      }
+      if (!is_vouched) {
+        MarkTilesOf(id);
+        AddEvent(connection_, {EventKind::kTablesRepaired, author_, StrCat("session number ", id),
+                               "its row was damaged, and nothing vouches for its name"});
       }
       ++repaired_;
     }
