@@ -77,12 +77,21 @@ Status LastingUpload::FindStart(AtlasClient& client) {
   if (!planned_.empty()) {
     const auto sessions = client.ListSessions(planned_.front().key.session.vehicle);
     if (!sessions) return sessions.error();
+    ATLAS_RETURN_IF_ERROR(Compare(client, *sessions));
     there_ = CountSentBefore(planned_, *sessions);
     next_ = there_ - std::min(there_, kSentTwice);
   }
   if (!epoch_) report_.sent_before = next_;
   epoch_ = client.atlas().epoch;
   return {};
+}
+
+Status LastingUpload::Compare(AtlasClient& client, std::span<const SessionSummary> sessions) {
+  KeyframeUploader uploader(client, options_);
+  for (const std::size_t i : FindThere(planned_, sessions)) {
+    ATLAS_RETURN_IF_ERROR(send_(i, uploader));
+  }
+  return uploader.Finish();
 }
 
 Status LastingUpload::SendAll(KeyframeUploader& uploader) {

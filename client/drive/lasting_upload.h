@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "client/connection/keyframe_uploader.h"
@@ -38,8 +39,8 @@ class LastingUpload {
   // Begins behind what an earlier run left there (CountSentBefore). A connection that breaks is
   // made again, and what was not acknowledged is sent again, until nothing was acknowledged for as
   // long as the patience. Fails at the first keyframe that the daemon refuses, naming it, with what
-  // was on its way waited for; of a session that has another content under the first of its keys
-  // that are sent, nothing is on its way then but these (kSentTwice).
+  // was on its way waited for; of a session that has other content under the last of its keys, or
+  // under the first ones that are sent (kSentTwice), nothing else is on its way then.
   Status Run(AtlasLink& link);
   const LastingUploadReport& report() const { return report_; }
 
@@ -47,6 +48,9 @@ class LastingUpload {
   Status RunOn(AtlasClient& client);
   // Where to go on with this atlas: again, too, when it was restored from a backup meanwhile.
   Status FindStart(AtlasClient& client);
+  // Sends those of which the daemon has the keys for certain: where it has other content under one,
+  // that is another drive, of which nothing is to be stored.
+  Status Compare(AtlasClient& client, std::span<const SessionSummary> sessions);
   Status SendAll(KeyframeUploader& uploader);
   Result<AtlasClient*> Reconnect(AtlasLink& link, const Status& why);
   Status GivenUp(const Status& broke, const Status& failure) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 
 namespace atlas {
 namespace {
@@ -25,6 +26,21 @@ struct Expected {
 };
 
 }  // namespace
+
+std::vector<std::size_t> FindThere(std::span<const PlannedKeyframe> planned,
+                                   std::span<const SessionSummary> sessions) {
+  std::set<KeyframeKey> there;
+  for (const SessionSummary& session : sessions) {
+    if (session.keyframes + session.compacted > 0) {
+      there.insert({session.key, session.last_sequence});
+    }
+  }
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < planned.size(); ++i) {
+    if (there.contains(planned[i].key)) found.push_back(i);
+  }
+  return found;
+}
 
 std::size_t CountSentBefore(std::span<const PlannedKeyframe> planned,
                             std::span<const SessionSummary> sessions) {

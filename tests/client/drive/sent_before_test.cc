@@ -44,6 +44,17 @@ TEST(SentBeforeTest, WhatIsThereAsAWholeIsSentAgain) {
   EXPECT_EQ(CountWith({}, {Stored(100)}), 0U);
 }
 
+TEST(SentBeforeTest, TheLastOfASessionIsThereForCertain) {
+  using Indices = std::vector<std::size_t>;
+  EXPECT_EQ(FindThere(Drive(100), {}), Indices{});
+  const std::vector<SessionSummary> stored{Stored(40), Stored(200, "tuesday")};
+  EXPECT_EQ(FindThere(Drive(100), stored), Indices{39});
+  EXPECT_EQ(FindThere(Drive(100, "tuesday"), stored), Indices{}) << "it is not one of ours";
+  SessionSummary none = Stored(1);
+  none.keyframes = 0;
+  EXPECT_EQ(FindThere(Drive(100), std::vector{none}), Indices{});
+}
+
 TEST(SentBeforeTest, CompactedOnesWereThere) {
   SessionSummary stored = Stored(40);
   stored.keyframes = 10;

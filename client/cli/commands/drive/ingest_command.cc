@@ -137,7 +137,8 @@ class IngestCommand : public Command {
   }
 
   Result<IngestReport> Ingest(const DriveFolder& drive, const CommandContext& context) const {
-    AtlasLink link({.connection = context.connection});
+    // Somebody waits: no attempt is left out for longer than this.
+    AtlasLink link({.connection = context.connection, .max_delay = std::chrono::seconds(5)});
     ProgressBar bar(context.err, context.is_err_terminal, "ingest", drive.scans.size());
     return IngestDrive(drive, options_, link, [&](std::size_t done, std::size_t total) {
       bar.Update(done * drive.scans.size() / total);
