@@ -19,6 +19,16 @@ class IngestResumeTest : public VehicleTest {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunAtlas(endpoint.ToText(), arguments);
   }
+  // One keyframe after the other.
+  static IngestOptions OverpassOptions(milliseconds patience) {
+    IngestOptions options;
+    options.session = {"vehicle", "overpass"};
+    options.max_range_m = 12.0;
+    options.now_s = 1e9;
+    options.upload.max_in_flight = 1;
+    options.upload.patience = patience;
+    return options;
+  }
   static std::string DigestOfCleanRun() {
     const DaemonProcess daemon(NewData(), kSmall);
     EXPECT_EQ(Ingest(daemon).exit_code, 0);
@@ -52,12 +62,7 @@ TEST_F(IngestResumeTest, ADaemonThatIsStartedAgainGetsTheRest) {
   const fs::path data = NewData();
   auto daemon = std::make_unique<DaemonProcess>(data, kSmall);
   const Endpoint address = *Endpoint::Parse(daemon->address());
-  IngestOptions options;
-  options.session = {"vehicle", "overpass"};
-  options.max_range_m = 12.0;
-  options.now_s = 1e9;
-  options.upload.max_in_flight = 1;
-  options.upload.patience = std::chrono::seconds(30);
+  const IngestOptions options = OverpassOptions(std::chrono::seconds(30));
   bool is_restarted = false;  // what was on its way is sent, and told, once more
   const auto restart = [&](std::size_t done, std::size_t) {
     if (done != 10 || std::exchange(is_restarted, true)) return;
@@ -78,11 +83,7 @@ TEST_F(IngestResumeTest, ALinkThatStaysBrokenEndsTheRunWithWhereItWas) {
   const DaemonProcess daemon(NewData(), kSmall);
   LinkProxy proxy(*Endpoint::Parse(daemon.address()),
                   LinkPlan{.up = {.after_bytes = 200'000}, .refused_after = std::chrono::hours(1)});
-  IngestOptions options;
-  options.session = {"vehicle", "overpass"};
-  options.max_range_m = 12.0;
-  options.now_s = 1e9;
-  options.upload.patience = milliseconds(300);
+  const IngestOptions options = OverpassOptions(milliseconds(300));
   AtlasLink link = LinkTo(proxy.endpoint());
   const auto drive = OpenDriveFolder(shared_drive.string());
   const auto report = IngestDrive(*drive, options, link, {});
@@ -154,12 +155,7 @@ TEST_F(IngestResumeTest, APurgedSessionIsNotTakenForOneWithOtherOptions) {
 TEST_F(IngestResumeTest, AnotherAtlasAtTheSameAddressEndsTheRun) {
   auto daemon = std::make_unique<DaemonProcess>(NewData(), kSmall);
   const Endpoint address = *Endpoint::Parse(daemon->address());
-  IngestOptions options;
-  options.session = {"vehicle", "overpass"};
-  options.max_range_m = 12.0;
-  options.now_s = 1e9;
-  options.upload.max_in_flight = 1;
-  options.upload.patience = std::chrono::seconds(30);
+  const IngestOptions options = OverpassOptions(std::chrono::seconds(30));
   bool is_replaced = false;
   const auto replace = [&](std::size_t done, std::size_t) {
     if (done != 10 || std::exchange(is_replaced, true)) return;

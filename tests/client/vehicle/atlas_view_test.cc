@@ -14,16 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TinyWorld SquareWorld(int side) {
-  TinyWorld world;
-  for (int x = 0; x < side; ++x) {
-    for (int y = 0; y < side; ++y) {
-      world.Set(x, y, 100 * x + y);
-    }
-  }
-  return world;
-}
-
 AtlasLink LinkTo(const SyncPeer& peer) {
   LinkOptions options;
   options.connection = peer.options();

@@ -11,16 +11,6 @@ namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 
-TinyWorld SquareWorld(int side) {
-  TinyWorld world;
-  for (int x = 0; x < side; ++x) {
-    for (int y = 0; y < side; ++y) {
-      world.Set(x, y, 100 * x + y);
-    }
-  }
-  return world;
-}
-
 Status Put(TileStore& store, const TinyWorld& world, const TileId& id) {
   const TinyWorld::Stored& stored = world.tiles().at(id);
   return store.Put({id, stored.revision, stored.encoded.payload_hash, stored.encoded.blob});

@@ -279,6 +279,16 @@ void TinyWorld::ChangeSome(std::mt19937& random, int side, int changes) {
   }
 }
 
+TinyWorld SquareWorld(int side) {
+  TinyWorld world;
+  for (int x = 0; x < side; ++x) {
+    for (int y = 0; y < side; ++y) {
+      world.Set(x, y, 100 * x + y);
+    }
+  }
+  return world;
+}
+
 SyncPeer::SyncPeer(const TinyWorld& world, int frames_until_cut)
     : world_(world),
       frames_left_(frames_until_cut),

@@ -55,6 +55,9 @@ class TinyWorld {
   std::uint64_t revision_ = 0;
 };
 
+// Tiles at (0, 0) to (side - 1, side - 1), each at another altitude.
+TinyWorld SquareWorld(int side);
+
 // One connection to a daemon with this world. Change the world only while nothing is asked. All its
 // waits end after 10 s.
 class SyncPeer {

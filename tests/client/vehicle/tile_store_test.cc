@@ -49,16 +49,6 @@ void ExpectHolds(TileStore& store, const TinyWorld& world) {
   }
 }
 
-TinyWorld SquareWorld(int side) {
-  TinyWorld world;
-  for (int x = 0; x < side; ++x) {
-    for (int y = 0; y < side; ++y) {
-      world.Set(x, y, 100 * x + y);
-    }
-  }
-  return world;
-}
-
 std::vector<fs::path> TilePaths(const fs::path& root) {
   std::vector<fs::path> paths;
   for (const auto& entry : fs::recursive_directory_iterator(root)) {

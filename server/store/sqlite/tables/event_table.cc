@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -31,8 +33,8 @@ std::int64_t NowMs() {
   return std::chrono::duration_cast<milliseconds>(now).count();
 }
 
-// The columns of a row in order; nothing if its checksum is another.
-std::optional<Event> ReadEvent(Query& row) {
+// The columns of a row in order.
+Event ReadColumns(Query& row) {
   row.Rewind();
   Event event;
   event.id = row.Unsigned();
@@ -42,7 +44,31 @@ std::optional<Event> ReadEvent(Query& row) {
   event.author = row.Text();
   event.subject = row.Text();
   event.detail = row.Text();
+  return event;
+}
+
+// Nothing if its checksum is another.
+std::optional<Event> ReadEvent(Query& row) {
+  Event event = ReadColumns(row);
   return row.Int() == HashOf(event) ? std::optional(std::move(event)) : std::nullopt;
+}
+
+// The first `most`, as their columns have them.
+std::vector<Event> ListDamagedEvents(Connection& connection, std::size_t most) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events");
+  std::vector<Event> damaged;
+  while (damaged.size() < most && row.Step()) {
+    if (!ReadEvent(row)) {
+      damaged.push_back(ReadColumns(row));
+    }
+  }
+  return damaged;
+}
+
+Status DamageOf(const Event& event) {
+  return {StatusCode::kInvalidData,
+          StrCat("store: event ", event.id, " is damaged: wrong checksum")};
 }
 
 }  // namespace
@@ -81,9 +107,7 @@ Result<std::vector<Event>> ReadEvents(Connection& connection,
   while (row.Step()) {
     std::optional<Event> event = ReadEvent(row);
     if (!event) {
-      row.Rewind();
-      return Error(StatusCode::kInvalidData,
-                   StrCat("store: event ", row.Unsigned(), " is damaged: wrong checksum"));
+      return Error(DamageOf(ReadColumns(row)));
     }
     events.push_back(*std::move(event));
   }
@@ -105,38 +129,19 @@ std::vector<std::uint64_t> RevisionsOf(Connection& connection, EventKind kind) {
 }
 
 Status CheckEvents(Connection& connection) {
-  Query row = connection.Prepare(
-      "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events");
-  while (row.Step()) {
-    if (!ReadEvent(row)) {
-      row.Rewind();
-      return Status(StatusCode::kInvalidData,
-                    StrCat("store: event ", row.Unsigned(), " is damaged: wrong checksum"));
-    }
-  }
-  return {};
+  const std::vector<Event> damaged = ListDamagedEvents(connection, 1);
+  return damaged.empty() ? Status() : DamageOf(damaged.front());
 }
 
 int RepairEvents(Connection& connection) {
   const std::uint64_t revision = ReadCounter(connection, Counter::kRevision);
-  std::vector<Event> damaged;
-  {
-    Query row = connection.Prepare(
-        "SELECT id, revision, time_ms, kind, author, subject, detail, checksum FROM events");
-    while (row.Step()) {
-      if (!ReadEvent(row)) {
-        row.Rewind();
-        Event event;
-        event.id = row.Unsigned();
-        event.revision = std::min(row.Unsigned(), revision);
-        event.time_ms = row.Int();
-        damaged.push_back(std::move(event));
-      }
-    }
-  }
+  std::vector<Event> damaged =
+      ListDamagedEvents(connection, std::numeric_limits<std::size_t>::max());
   for (Event& event : damaged) {
+    event.revision = std::min(event.revision, revision);
     event.kind = EventKind::kTablesRepaired;
     event.author = kAtlasItself;
+    event.subject.clear();
     event.detail = "what this event was is not known: its row was damaged";
     connection
         .Prepare(
