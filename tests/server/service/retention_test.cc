@@ -76,6 +76,7 @@ TEST_F(RetentionTest, TheOldestPassesGoUntilThereIsRoom) {
   const AtlasDigest before = Digest();
   LimitTo(0.95, true);
   ASSERT_TRUE(Until([this] { return Filled() < 0.85; })) << Filled();
+  Open();  // a step under way ends first; there is no limit any more
   const std::uint64_t dropped = Dropped();
   EXPECT_GT(dropped, 0u);
   EXPECT_EQ(dropped % kKeyframes, 0u) << "a pass at a step";
