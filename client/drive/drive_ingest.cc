@@ -158,8 +158,9 @@ class Ingest {
     std::optional<Pose> T_now_later;
     if (options_.is_deskewed) T_now_later = MotionAt(drive_, index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
-    Bytes blob = EncodeKeyframe(builder_->Build(cloud, SplitYaw(R_world_sensor).R_level_sensor,
-                                                TrailUntil(index), T_now_later));
+    const GridAttitude attitude{SplitYaw(R_world_sensor).R_level_sensor,
+                                GridYaw(drive_.scans[index].number)};
+    Bytes blob = EncodeKeyframe(builder_->Build(cloud, attitude, TrailUntil(index), T_now_later));
     report_.frontend_s += timer.elapsed_s();
     return blob;
   }

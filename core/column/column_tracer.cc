@@ -208,6 +208,7 @@ ColumnOptions ColumnOptions::FromProfile(const MapProfile& profile, std::int32_t
 LocalColumns TraceColumns(const LeveledScan& scan,
                           const RayTable& rays,
                           std::span<const KeyframeCell> cells,
+                          const VehiclePlace& here,
                           std::span<const VehiclePlace> trail,
                           const ColumnOptions& options) {
   const float foot_m = GroundHeight(cells[rays.grid().Index(0, 0)]);
@@ -235,14 +236,15 @@ LocalColumns TraceColumns(const LeveledScan& scan,
     }
   });
   BodyMarker marker(grid, options, halves, cells, result);
-  const float clearance_m = options.body.clearance_m;
-  for (const VehiclePlace& place : trail) {
+  const auto mark = [&](const VehiclePlace& place) {
     options.body.ForEachCell(grid, place, [&](std::int32_t ix, std::int32_t iy, float, float) {
-      marker.Mark(ix, iy, place.sensor_m.z() + clearance_m);
+      marker.Mark(ix, iy, place.sensor_m.z() + options.body.clearance_m);
     });
+  };
+  for (const VehiclePlace& place : trail) {
+    mark(place);
   }
-  options.body.ForEachCell(
-      grid, [&](std::int32_t ix, std::int32_t iy) { marker.Mark(ix, iy, clearance_m); });
+  mark(here);
   return result;
 }
 

@@ -35,10 +35,12 @@ struct ColumnOptions {
 // `cells`: the ground below (LocalGrid); columns stand only where it is known. Ground returns are
 // traced too: that is what clears a parked car with nothing behind it. A segment is missed where
 // rays passed both its halves, and never where anything was measured in it, ground included, nor
-// within `blur_m` of an obstacle in it. Free is where the vehicle itself is, or was on its `trail`.
+// within `blur_m` of an obstacle in it. Free is where the vehicle itself is
+// (`here`, at the grid's middle), or was on its `trail`.
 LocalColumns TraceColumns(const LeveledScan& scan,
                           const RayTable& rays,
                           std::span<const KeyframeCell> cells,
+                          const VehiclePlace& here,
                           std::span<const VehiclePlace> trail,
                           const ColumnOptions& options);
 

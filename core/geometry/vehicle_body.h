@@ -2,7 +2,6 @@
 // on: the surest evidence there is, also against what stood or moved there.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -12,7 +11,7 @@
 
 namespace atlas {
 
-// Where the vehicle stood while it drove here: its sensor in the levelled frame of a later scan.
+// Where the vehicle stands, or stood while it drove here: its sensor in the frame of a scan's grid.
 struct VehiclePlace {
   Eigen::Vector3f sensor_m = Eigen::Vector3f::Zero();
   Eigen::Vector2f ahead = Eigen::Vector2f::UnitX();   // unit length, where its x axis points
@@ -25,7 +24,7 @@ struct VehiclePlace {
   }
 };
 
-// A box around the sensor, levelled frame, from the ground to `clearance_m` above the sensor.
+// A box around the sensor, upright, from the ground to `clearance_m` above the sensor.
 // Default: a car with its mirrors, shorter than it is, for the sensor may stand at either end, and
 // the room that it keeps above itself.
 struct VehicleBody {
@@ -33,19 +32,8 @@ struct VehicleBody {
   float half_width_m = 1.1F;
   float clearance_m = 0.3F;
 
-  // Calls visit(ix, iy) for the cells of `grid` below it.
-  template <typename Visit>
-  void ForEachCell(const GridGeometry& grid, Visit&& visit) const {
-    const std::int32_t reach_x = Reach(half_length_m, grid);
-    const std::int32_t reach_y = Reach(half_width_m, grid);
-    for (std::int32_t iy = -reach_y; iy < reach_y; ++iy) {
-      for (std::int32_t ix = -reach_x; ix < reach_x; ++ix) {
-        visit(ix, iy);
-      }
-    }
-  }
-
-  // The same where it stood: calls visit(ix, iy, x_m, y_m), the cell and its centre.
+  // Calls visit(ix, iy, x_m, y_m) for the cells of `grid` whose centre (x_m, y_m) is below it at
+  // `place`.
   template <typename Visit>
   void ForEachCell(const GridGeometry& grid, const VehiclePlace& place, Visit&& visit) const {
     const auto cell_m = static_cast<float>(grid.cell_size_m());
@@ -69,12 +57,6 @@ struct VehicleBody {
         }
       }
     }
-  }
-
- private:
-  static std::int32_t Reach(float half_m, const GridGeometry& grid) {
-    return std::min(static_cast<std::int32_t>(std::lround(half_m / grid.cell_size_m())),
-                    grid.radius_cells);
   }
 };
 

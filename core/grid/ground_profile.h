@@ -18,11 +18,12 @@ namespace atlas {
 struct VehicleContact {
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // levelled frame, unit length
   float sensor_height_m = 1.73F;                      // vertically: what the levelled ground shows
+  Eigen::Vector2f ahead = Eigen::Vector2f::UnitX();   // unit length, where the vehicle points
+
+  VehiclePlace Place() const { return {.ahead = ahead, .normal = normal}; }
 
   // Height of the plane at (x, y), levelled frame.
-  float HeightAt(float x_m, float y_m) const {
-    return VehiclePlace{.normal = normal}.GroundAt(x_m, y_m, sensor_height_m);
-  }
+  float HeightAt(float x_m, float y_m) const { return Place().GroundAt(x_m, y_m, sensor_height_m); }
 };
 
 struct ProfileOptions {

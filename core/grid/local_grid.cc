@@ -179,9 +179,10 @@ LocalGrid BuildLocalGrid(const LeveledScan& scan,
   for (const VehiclePlace& place : trail) {
     AddPlace(place, rays.grid(), contact.sensor_height_m, options, cells);
   }
-  options.body.ForEachCell(rays.grid(), [&](std::int32_t ix, std::int32_t iy) {
-    cells[rays.grid().Index(ix, iy)].occupancy = Occupancy::kDriven;
-  });
+  options.body.ForEachCell(rays.grid(), contact.Place(),
+                           [&](std::int32_t ix, std::int32_t iy, float, float) {
+                             cells[rays.grid().Index(ix, iy)].occupancy = Occupancy::kDriven;
+                           });
   LocalGrid grid;
   grid.cells.reserve(cells.size());
   for (const TracedCell& cell : cells) {

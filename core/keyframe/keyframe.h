@@ -21,14 +21,15 @@ struct Keyframe {
 
   std::uint64_t profile_hash = 0;
   GridGeometry grid;
-  // R_level_sensor (pose.h, SplitYaw) as w x y z, x 2^30: as an IMU knows it when scanning.
+  // From the sensor into the grid's frame (GridAttitude), as w x y z, x 2^30: level as an IMU knows
+  // it when scanning, turned about the vertical as the vehicle chose.
   std::array<std::int32_t, 4> level_quaternion{1 << 30, 0, 0, 0};
   std::int32_t sensor_height_mm = 0;  // above the ground below the sensor
 
   std::vector<KeyframeCell> cells;     // grid.size()
   std::vector<std::uint64_t> columns;  // grid.size(): nibbles, lowest segment first; 0 = no data
   // Per block, row-major: the lowest segment of its columns covers
-  // [anchor, anchor + 1) * segment_height relative to the sensor, levelled frame.
+  // [anchor, anchor + 1) * segment_height relative to the sensor.
   std::vector<std::int16_t> anchors;
 
   std::int32_t blocks_per_side() const { return (grid.side() + kBlockCells - 1) / kBlockCells; }

@@ -56,24 +56,28 @@ KeyframeBuilder::KeyframeBuilder(const MapProfile& map,
       rays_(GridFor(map, options.max_range_m)) {}
 
 Keyframe KeyframeBuilder::Build(const PointCloud& cloud,
-                                const Eigen::Quaterniond& R_level_sensor,
-                                std::span<const VehiclePlace> trail,
+                                const GridAttitude& attitude,
+                                std::span<const VehiclePlace> trail_level,
                                 const std::optional<Pose>& T_now_later) const {
-  const LeveledScan scan = SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor,
+  const Eigen::Quaterniond R_grid_sensor = attitude.R_grid_sensor();
+  const std::vector<VehiclePlace> trail = Turned(trail_level, attitude.yaw_rad);
+  const LeveledScan scan = SegmentScan(cloud, layout_, options_.ring_step, R_grid_sensor,
                                        options_.segmenter, T_now_later);
-  const VehicleContact contact{(R_level_sensor * options_.mount.up).cast<float>(),
-                               static_cast<float>(options_.mount.height_m)};
+  VehicleContact contact;
+  contact.normal = (R_grid_sensor * options_.mount.up).cast<float>();
+  contact.sensor_height_m = static_cast<float>(options_.mount.height_m);
+  contact.ahead = Eigen::Rotation2Df(static_cast<float>(-attitude.yaw_rad)) * contact.ahead;
   LocalGrid grid =
       BuildLocalGrid(scan, rays_, contact, trail, WithClearance(options_.profile, map_));
-  LocalColumns columns = TraceColumns(scan, rays_, grid.cells, trail,
+  LocalColumns columns = TraceColumns(scan, rays_, grid.cells, contact.Place(), trail,
                                       ColumnOptions::FromProfile(map_, Keyframe::kBlockCells));
-  Pose attitude = Pose::Identity();
-  attitude.linear() = R_level_sensor.toRotationMatrix();
+  Pose T_grid_sensor = Pose::Identity();
+  T_grid_sensor.linear() = R_grid_sensor.toRotationMatrix();
 
   Keyframe keyframe;
   keyframe.profile_hash = map_.Hash();
   keyframe.grid = rays_.grid();
-  keyframe.level_quaternion = QuantizedPose::FromPose(attitude).quaternion;
+  keyframe.level_quaternion = QuantizedPose::FromPose(T_grid_sensor).quaternion;
   keyframe.sensor_height_mm = static_cast<std::int32_t>(std::lround(options_.mount.height_m * 1e3));
   keyframe.cells = std::move(grid.cells);
   keyframe.columns = std::move(columns.columns);

@@ -10,6 +10,7 @@
 #include "core/geometry/pose.h"
 #include "core/geometry/vehicle_body.h"
 #include "core/grid/local_grid.h"
+#include "core/keyframe/grid_attitude.h"
 #include "core/keyframe/keyframe.h"
 #include "core/keyframe/sensor_mount.h"
 #include "core/scan/range_image.h"
@@ -46,12 +47,11 @@ class KeyframeBuilder {
                   SensorLayout layout,
                   const KeyframeBuilderOptions& options);
 
-  // `R_level_sensor`: the attitude without yaw (SplitYaw), never a fit to the ground. A scan
-  // without a usable return makes a keyframe that has seen nothing. `trail`: what the vehicle drove
-  // before it (TrailBefore). `T_now_later` as SegmentScan.
+  // A scan without a usable return makes a keyframe that has seen nothing. `trail_level`: what the
+  // vehicle drove before it (TrailBefore). `T_now_later` as SegmentScan.
   Keyframe Build(const PointCloud& cloud,
-                 const Eigen::Quaterniond& R_level_sensor,
-                 std::span<const VehiclePlace> trail = {},
+                 const GridAttitude& attitude,
+                 std::span<const VehiclePlace> trail_level = {},
                  const std::optional<Pose>& T_now_later = std::nullopt) const;
 
   const SensorMount& mount() const { return options_.mount; }

@@ -60,7 +60,7 @@ bool Run(ByteSpan bytes) {
   estimator.Add(*cloud);
   const auto layout = estimator.Estimate();
   Require(!layout || layout->channels() <= 64, "a sensor has no more than 64 channels");
-  const Keyframe keyframe = Builder().Build(*cloud, Eigen::Quaterniond::Identity());
+  const Keyframe keyframe = Builder().Build(*cloud, {});
   Require(ValidateKeyframe(keyframe).ok(), "whatever was scanned makes a keyframe");
   return true;
 }

@@ -69,7 +69,7 @@ Keyframe BuildKeyframe(const KeyframeBuilder& builder, const SimulatedDrive& dri
   for (std::size_t k = i - std::min(i, kTrailScans); k <= i; ++k) {
     poses.push_back(drive.sensor_pose(k));
   }
-  return builder.Build(CloudOf(drive.Scan(i)), LevelOf(drive.sensor_pose(i)),
+  return builder.Build(CloudOf(drive.Scan(i)), {LevelOf(drive.sensor_pose(i)), GridYaw(i)},
                        TrailBefore(poses, builder.mount()));
 }
 

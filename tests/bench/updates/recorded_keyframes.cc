@@ -49,7 +49,8 @@ Result<std::vector<PlacedKeyframe>> ReadKeyframes(const std::filesystem::path& f
     if (!cloud) return Error(cloud.error());
     const YawAndLevel split = SplitYaw(Eigen::Quaterniond(pose.linear()));
     auto keyframe = std::make_shared<const Keyframe>(
-        builder->Build(*cloud, split.R_level_sensor, TrailBefore(poses, builder->mount())));
+        builder->Build(*cloud, {split.R_level_sensor, GridYaw(scan.number)},
+                       TrailBefore(poses, builder->mount())));
     const auto placement = PlaceKeyframe(QuantizedPose::FromPose(pose), keyframe->level_quaternion);
     if (!placement) return Error(placement.error());
     placed.push_back(

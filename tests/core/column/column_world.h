@@ -53,7 +53,7 @@ class ColumnWorld {
   // The vehicle stood there before.
   void Trail(const VehiclePlace& place) { trail_.push_back(place); }
 
-  void Trace() { result_ = TraceColumns(scan_, rays_, cells_, trail_, options_); }
+  void Trace() { result_ = TraceColumns(scan_, rays_, cells_, {}, trail_, options_); }
 
   const GridGeometry& grid() const { return rays_.grid(); }
   const LocalColumns& result() const { return result_; }

@@ -288,9 +288,10 @@ TEST_F(AnyScanTest, EachCellIsWhatTheNearestEndsOfItsRaysSay) {
     for (const std::uint32_t cell : hits) {
       expected[cell] = Occupancy::kObstacle;
     }
-    options_.body.ForEachCell(rays_.grid(), [&](std::int32_t ix, std::int32_t iy) {
-      expected[rays_.grid().Index(ix, iy)] = Occupancy::kDriven;
-    });
+    options_.body.ForEachCell(rays_.grid(), contact_.Place(),
+                              [&](std::int32_t ix, std::int32_t iy, float, float) {
+                                expected[rays_.grid().Index(ix, iy)] = Occupancy::kDriven;
+                              });
     int different = 0;  // where float division and multiplication round a border apart
     for (std::size_t i = 0; i < expected.size(); ++i) {
       different += grid.cells[i].occupancy != expected[i] ? 1 : 0;

@@ -1,8 +1,11 @@
 // The front end in small worlds: flat ground, a kerb, a wall, a ceiling, a ramp.
 #include "core/keyframe/keyframe_builder.h"
 
+#include <array>
 #include <cmath>
 #include <functional>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -30,14 +33,15 @@ class KeyframeBuilderTest : public ::testing::Test {
  protected:
   Keyframe Build(const testing::World& world,
                  const Eigen::Quaterniond& R_level_sensor = Eigen::Quaterniond::Identity(),
-                 std::span<const VehiclePlace> trail = {}) {
+                 std::span<const VehiclePlace> trail = {},
+                 double yaw_rad = 0.0) {
     const PointCloud cloud = Scan(Vlp16(), world);
     SensorLayoutEstimator estimator;
     estimator.Add(cloud);
     KeyframeBuilderOptions options;
     options.mount.height_m = kHeight_m;
     const KeyframeBuilder builder(profile_, *estimator.Estimate(), options);
-    Keyframe keyframe = builder.Build(cloud, R_level_sensor, trail);
+    Keyframe keyframe = builder.Build(cloud, {R_level_sensor, yaw_rad}, trail);
     EXPECT_TRUE(ValidateKeyframe(keyframe).ok());
     const Result<Keyframe> decoded = DecodeKeyframe(EncodeKeyframe(keyframe));
     EXPECT_TRUE(decoded.has_value() && *decoded == keyframe);
@@ -106,6 +110,68 @@ TEST_F(KeyframeBuilderTest, ACeilingIsNoGroundAndStopsNoVehicle) {
   }
 }
 
+TEST_F(KeyframeBuilderTest, ATurnedGridShowsTheSame) {
+  // A wall 6 m ahead of a pitched vehicle that came along a bend.
+  const Eigen::Quaterniond pitch(
+      Eigen::AngleAxisd(3.0 * testing::kDegree, Eigen::Vector3d::UnitY()));
+  const auto world = [&](const Eigen::Vector3d& d) {
+    const Eigen::Vector3d level = pitch * d;
+    return Nearest(GroundRange(level, kHeight_m), WallAhead(level, 6.05));
+  };
+  VehiclePlace before;
+  before.sensor_m = Eigen::Vector3f(-3.0F, 0.5F, 0.0F);
+  before.ahead = Eigen::Vector2f(1.0F, -0.2F).normalized();
+  const std::vector<VehiclePlace> trail{before};
+  const Keyframe straight = Build(world, pitch, trail);
+  for (const double yaw_rad : {0.3, 1.2}) {
+    const Keyframe turned = Build(world, pitch, trail, yaw_rad);
+    const auto cell = [&](double x_m, double y_m) {
+      const Eigen::Vector2d p = Eigen::Rotation2Dd(-yaw_rad) * Eigen::Vector2d(x_m, y_m);
+      return CellAt(turned, p.x(), p.y());
+    };
+    std::size_t same = 0;
+    std::size_t seen = 0;
+    for (double y_m = -5.95; y_m < 6.0; y_m += 0.1) {
+      for (double x_m = -7.95; x_m < 8.0; x_m += 0.1) {
+        const KeyframeCell& of_straight = straight.cells[CellAt(straight, x_m, y_m)];
+        const KeyframeCell& of_turned = turned.cells[cell(x_m, y_m)];
+        same += of_straight.occupancy == of_turned.occupancy ? 1U : 0U;
+        ++seen;
+      }
+    }
+    EXPECT_GT(static_cast<double>(same), 0.93 * static_cast<double>(seen)) << yaw_rad;
+    for (const auto& [x_m, y_m] : {std::pair(1.3, 0.9), {-1.3, -0.9}, {-4.2, 0.9}, {-3.9, 1.5}}) {
+      EXPECT_EQ(turned.cells[cell(x_m, y_m)].occupancy, Occupancy::kDriven) << x_m << ' ' << y_m;
+    }
+    for (const auto& [x_m, y_m] : {std::pair(0.9, 1.4), {1.7, 0.0}, {-3.0, -0.8}, {-4.7, 0.5}}) {
+      EXPECT_NE(turned.cells[cell(x_m, y_m)].occupancy, Occupancy::kDriven) << x_m << ' ' << y_m;
+    }
+    // From the sensor to the grid, both about the same vertical.
+    const auto& q = turned.level_quaternion;
+    const Eigen::Quaterniond R_grid_sensor =
+        Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+    const Eigen::Quaterniond R_grid_level = R_grid_sensor * pitch.conjugate();
+    EXPECT_NEAR(R_grid_level.angularDistance(
+                    Eigen::Quaterniond(Eigen::AngleAxisd(-yaw_rad, Eigen::Vector3d::UnitZ()))),
+                0.0, 1e-6);
+  }
+}
+
+TEST(GridYawTest, GridsStandEvenlyInAllDirections) {
+  for (const std::uint64_t first : {std::uint64_t{0}, std::uint64_t{1'000'003}}) {
+    std::array<int, 9> in_ten_deg{};
+    for (std::uint64_t sequence = first; sequence < first + 90; ++sequence) {
+      const double yaw_deg = GridYaw(sequence) / testing::kDegree;
+      ASSERT_GE(yaw_deg, 0.0);
+      ASSERT_LT(yaw_deg, 90.0);
+      ++in_ten_deg[static_cast<std::size_t>(yaw_deg / 10.0)];
+    }
+    for (const int count : in_ten_deg) {
+      EXPECT_NEAR(count, 10, 1);
+    }
+  }
+}
+
 TEST_F(KeyframeBuilderTest, ATiltedVehicleStandsOnATiltedPlane) {
   // Level ground, the sensor pitched by 10 degrees: the levelled frame shows flat ground again, but
   // below the vehicle itself the plane of its wheels.
@@ -123,7 +189,7 @@ TEST_F(KeyframeBuilderTest, AScanWithoutReturnsSeesNothingButItsOwnPlace) {
   KeyframeBuilderOptions options;
   const KeyframeBuilder builder(profile_, SensorLayout{EgoBox(), std::vector<float>(16, 0.0F)},
                                 options);
-  const Keyframe keyframe = builder.Build(PointCloud(), Eigen::Quaterniond::Identity());
+  const Keyframe keyframe = builder.Build(PointCloud(), {});
   EXPECT_TRUE(ValidateKeyframe(keyframe).ok());
   for (const KeyframeCell& cell : keyframe.cells) {
     EXPECT_NE(cell.occupancy, Occupancy::kObstacle);
