@@ -1,161 +1,91 @@
 #include "core/localization/registration.h"
 
-#include <array>
-#include <cmath>
-
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
+
+#include "core/localization/normal_equations.h"
 
 namespace atlas {
 namespace {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+// What is known besides the scan.
+struct Known {
+  const PosePrior& prior;
+  Eigen::Matrix4d information;  // of the prior
+  double tilt_sigma_rad;
 
-// Normal equations of residuals r(t, w) about the current pose: p = R(w) * arm + t.
-struct NormalEquations {
-  Matrix6d H = Matrix6d::Zero();
-  Vector6d g = Vector6d::Zero();
-  int columns = 0;
-  int ground = 0;
-  // Of features where the map says something: how many, and the sum of their robust weights.
-  int mapped_columns = 0;
-  int mapped_ground = 0;
-  double column_fit = 0.0;
-  double ground_fit = 0.0;
-
-  // Residual along the unit vector `direction` (world) of a point at `arm` from the sensor.
-  void Add(const Eigen::Vector3d& direction,
-           const Eigen::Vector3d& arm,
-           double residual,
-           double weight) {
-    Vector6d J;
-    J.head<3>() = direction;
-    J.tail<3>() = arm.cross(direction);
-    H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
-    g += weight * residual * J;
+  void AddTo(const Pose& pose, NormalEquations& equations) const {
+    equations.AddTiltPrior(pose, tilt_sigma_rad);
+    equations.AddPrior(pose, prior.T_world_level, information);
   }
 };
 
-// Geman-McClure: a residual of several scales has no say.
-double RobustWeight(double residual, double scale) {
-  const double ratio = residual / scale;
-  const double denominator = 1.0 + ratio * ratio;
-  return 1.0 / (denominator * denominator);
+// Lines and planes reach far, but where two cells are as near a feature is pulled to either.
+Pose AlignFeatures(const FeatureFit& features,
+                   const Pose& start,
+                   const Known& known,
+                   const RegistrationOptions& options) {
+  Pose pose = start;
+  for (int iteration = 0; iteration < options.coarse_iterations; ++iteration) {
+    const float left =
+        1.0F - static_cast<float>(iteration) / static_cast<float>(options.coarse_iterations);
+    const FeatureReach reach{
+        options.fine_radius_m + left * (options.coarse_radius_m - options.fine_radius_m),
+        options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m)};
+    NormalEquations equations = features.At(pose, reach).equations;
+    known.AddTo(pose, equations);
+    pose = Moved(pose, equations.Solve());
+  }
+  return pose;
 }
 
-struct Stage {
-  float radius_m;
-  float reach_m;
+struct Alignment {
+  Pose pose;
+  NormalEquations equations;  // of the scan alone
+  bool is_converged = false;
 };
 
-class Problem {
- public:
-  Problem(const MapWindow& map, const ScanFeatures& features, const RegistrationOptions& options)
-      : map_(map), features_(features), options_(options) {}
-
-  NormalEquations Linearize(const Pose& pose, const Stage& stage) const {
-    NormalEquations equations;
-    const Eigen::Matrix3f R = pose.linear().cast<float>();
-    const Eigen::Vector3f t = (pose.translation() - map_.origin()).cast<float>();
-    for (const Eigen::Vector3f& p : features_.columns) {
-      AddColumn(R * p, t, stage, equations);
+// Newton's method on what is the same from wherever it begins. A step after which less of the scan
+// lies in occupied segments is halved.
+Alignment AlignReturns(const MapWindow& map,
+                       const ScanFeatures& scan,
+                       const FeatureFit& features,
+                       const Pose& start,
+                       const Known& known,
+                       const RegistrationOptions& options) {
+  constexpr double kTolerated = 1e-4;  // of the likelihood: the ground may have its share
+  const Presence presence(options.presence);
+  const FeatureReach reach{options.fine_radius_m, options.fine_reach_m};
+  // All returns count as much as all columns: neighbours err together.
+  const double share = scan.returns.empty() ? 0.0
+                                            : static_cast<double>(scan.columns.size()) /
+                                                  static_cast<double>(scan.returns.size());
+  Alignment result{start, {}, false};
+  Pose before = start;
+  double best = 0.0;
+  NormalEquations::Vector6 step = NormalEquations::Vector6::Zero();
+  for (int iteration = 0; iteration <= options.max_iterations; ++iteration) {
+    PresenceSum sum = presence.Sum(map, scan.returns, result.pose);
+    if (sum.log_likelihood < (1.0 - kTolerated) * best && !result.is_converged) {
+      step *= 0.5;
+      result.pose = Moved(before, step);
+      continue;
     }
-    for (const Eigen::Vector3f& p : features_.ground) {
-      AddGround(R * p, t, stage, equations);
+    best = sum.log_likelihood;
+    sum.equations.H *= share;
+    sum.equations.g *= share;
+    sum.equations += features.OfGround(result.pose, reach).equations;
+    result.equations = sum.equations;
+    if (result.is_converged || iteration == options.max_iterations) {
+      break;
     }
-    return equations;
+    known.AddTo(result.pose, sum.equations);
+    step = sum.equations.Solve();
+    before = result.pose;
+    result.pose = Moved(before, step);
+    result.is_converged = step.head<3>().norm() < options.converged_m &&
+                          step.tail<3>().norm() < options.converged_rad;
   }
-
- private:
-  void AddColumn(const Eigen::Vector3f& arm,
-                 const Eigen::Vector3f& t,
-                 const Stage& stage,
-                 NormalEquations& equations) const {
-    const Eigen::Vector3f p = arm + t;
-    const ColumnLine* line = map_.NearestLine(p, stage.radius_m);
-    if (line != nullptr && !line->CanBeSeenFrom(t.head<2>())) {
-      line = nullptr;
-    }
-    equations.mapped_columns += line != nullptr || map_.IsFree(p) ? 1 : 0;
-    if (line == nullptr) {
-      return;
-    }
-    const Eigen::Vector2f offset = p.head<2>() - line->center;
-    const double along_normal = line->normal.dot(offset);
-    const Eigen::Vector2f tangent(-line->normal.y(), line->normal.x());
-    const double along_tangent = line->is_wall ? 0.0 : tangent.dot(offset);
-    const double scale = 0.4 * stage.radius_m;
-    const double robust = RobustWeight(std::hypot(along_normal, along_tangent), scale);
-    const double weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
-    ++equations.columns;
-    equations.column_fit += robust;
-    equations.Add({line->normal.x(), line->normal.y(), 0.0}, arm.cast<double>(), along_normal,
-                  weight);
-    if (!line->is_wall) {
-      equations.Add({tangent.x(), tangent.y(), 0.0}, arm.cast<double>(), along_tangent, weight);
-    }
-  }
-
-  void AddGround(const Eigen::Vector3f& arm,
-                 const Eigen::Vector3f& t,
-                 const Stage& stage,
-                 NormalEquations& equations) const {
-    float height_m = 0.0F;
-    equations.mapped_ground += map_.IsMapped(arm + t) ? 1 : 0;
-    const SurfacePlane* plane = map_.NearestSurface(arm + t, stage.reach_m, &height_m);
-    if (plane == nullptr) {
-      return;
-    }
-    const bool is_slope = plane->gradient.norm() >= options_.min_gradient;
-    const Eigen::Vector3d normal =
-        is_slope ? Eigen::Vector3d(-plane->gradient.x(), -plane->gradient.y(), 1.0).normalized()
-                 : Eigen::Vector3d::UnitZ();
-    const double residual = height_m * normal.z();
-    const double robust = RobustWeight(residual, 0.4 * stage.reach_m);
-    const double weight = robust / (options_.ground_sigma_m * options_.ground_sigma_m);
-    ++equations.ground;
-    equations.ground_fit += robust;
-    equations.Add(normal, arm.cast<double>(), residual, weight);
-  }
-
-  const MapWindow& map_;
-  const ScanFeatures& features_;
-  const RegistrationOptions& options_;
-};
-
-// The levelled frame is upright within the IMU's error: roll and pitch stay near 0.
-void AddTiltPrior(const Pose& pose, double sigma_rad, NormalEquations& equations) {
-  const Eigen::Vector3d up = pose.linear().col(2);
-  const double weight = 1.0 / (sigma_rad * sigma_rad);
-  for (int axis = 3; axis < 5; ++axis) {
-    // A rotation w turns the vertical by w x up: about x it moves y by -w.
-    const double tilt = axis == 3 ? -up.y() : up.x();
-    equations.H(axis, axis) += weight;
-    equations.g(axis) += weight * tilt;
-  }
-}
-
-// Of a pose's (x, y, z, yaw) among the six unknowns.
-constexpr std::array<int, 4> kPriorAxes{0, 1, 2, 5};
-
-void AddPrior(const Pose& pose,
-              const Pose& expected,
-              const Eigen::Matrix4d& information,
-              NormalEquations& equations) {
-  equations.g(kPriorAxes) += information * PoseDifference(expected, pose);
-  equations.H(kPriorAxes, kPriorAxes) += information;
-}
-
-Pose Moved(const Pose& pose, const Vector6d& step) {
-  Pose moved = pose;
-  moved.translation() += step.head<3>();
-  const double angle = step.tail<3>().norm();
-  if (angle > 0.0) {
-    moved.linear() =
-        Eigen::AngleAxisd(angle, step.tail<3>() / angle).toRotationMatrix() * pose.linear();
-  }
-  return moved;
+  return result;
 }
 
 // Mapped features that a fit needs.
@@ -168,34 +98,21 @@ double Share(int part, std::size_t whole) {
 }  // namespace
 
 RegistrationResult Register(const MapWindow& map,
-                            const ScanFeatures& features,
+                            const ScanFeatures& scan,
                             const Pose& T_world_level_start,
                             const PosePrior& prior,
                             const RegistrationOptions& options) {
-  const Eigen::Matrix4d prior_information = prior.covariance.inverse();
-  const Problem problem(map, features, options);
-  const Stage fine{options.fine_radius_m, options.fine_reach_m};
+  const Known known{prior, prior.covariance.inverse(), options.tilt_sigma_rad};
+  const FeatureFit features(map, scan, options.features);
+  const Alignment found =
+      AlignReturns(map, scan, features,
+                   AlignFeatures(features, T_world_level_start, known, options), known, options);
+  const FeatureEvidence last =
+      features.At(found.pose, {options.fine_radius_m, options.fine_reach_m});
   RegistrationResult result;
-  result.T_world_level = T_world_level_start;
-  for (int iteration = 0; iteration < options.max_iterations && !result.is_converged; ++iteration) {
-    const bool is_coarse = iteration < options.coarse_iterations;
-    const float left = is_coarse ? 1.0F - static_cast<float>(iteration) /
-                                              static_cast<float>(options.coarse_iterations)
-                                 : 0.0F;
-    const Stage stage{
-        options.fine_radius_m + left * (options.coarse_radius_m - options.fine_radius_m),
-        options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m)};
-    NormalEquations equations = problem.Linearize(result.T_world_level, stage);
-    AddTiltPrior(result.T_world_level, options.tilt_sigma_rad, equations);
-    AddPrior(result.T_world_level, prior.T_world_level, prior_information, equations);
-    const Matrix6d H = equations.H.selfadjointView<Eigen::Lower>();
-    const Vector6d step = H.ldlt().solve(-equations.g);
-    result.T_world_level = Moved(result.T_world_level, step);
-    result.is_converged = !is_coarse && step.head<3>().norm() < options.converged_m &&
-                          step.tail<3>().norm() < options.converged_rad;
-  }
-  const NormalEquations last = problem.Linearize(result.T_world_level, fine);
-  result.information = last.H.selfadjointView<Eigen::Lower>();
+  result.T_world_level = found.pose;
+  result.is_converged = found.is_converged;
+  result.information = last.equations.H.selfadjointView<Eigen::Lower>();
   result.matched_columns = last.columns;
   const int mapped = last.mapped_columns + last.mapped_ground;
   const double fit = last.column_fit + last.ground_fit;
@@ -203,8 +120,8 @@ RegistrationResult Register(const MapWindow& map,
   result.column_fit = last.mapped_columns < kEnough ? 1.0 : last.column_fit / last.mapped_columns;
   constexpr double kContradicted = 0.5;
   result.evidence = last.column_fit - kContradicted * (mapped - fit);
-  result.column_inliers = Share(last.columns, features.columns.size());
-  result.ground_inliers = Share(last.ground, features.ground.size());
+  result.column_inliers = Share(last.columns, scan.columns.size());
+  result.ground_inliers = Share(last.ground, scan.ground.size());
   return result;
 }
 

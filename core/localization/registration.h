@@ -1,10 +1,14 @@
-// Fits a scan into a map window: Gauss-Newton on SE(3) with a robust kernel, coarse to fine.
+// Fits a scan into a map window on SE(3), coarse to fine: by lines and planes, which reach far
+// (Gauss-Newton with a robust kernel), then so that its returns lie in occupied segments (decision
+// 0602).
 #pragma once
 
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
+#include "core/localization/feature_fit.h"
 #include "core/localization/pose_prior.h"
+#include "core/localization/presence.h"
 #include "core/localization/scan_features.h"
 #include "core/localization/window/map_window.h"
 
@@ -15,18 +19,16 @@ struct RegistrationOptions {
   float fine_radius_m = 0.4F;    // ... and in the end
   float coarse_reach_m = 0.6F;   // the same for the ground's height
   float fine_reach_m = 0.2F;
-  float column_sigma_m = 0.12F;
-  float ground_sigma_m = 0.05F;
+  FeatureFitOptions features;
+  PresenceOptions presence;
   double tilt_sigma_rad = 0.0087;  // the IMU's: 0.5 degrees
   // How well the start is known: where nothing seen holds the vehicle, it stays there.
   double start_sigma_m = 0.5;
   double start_sigma_rad = 0.03;
-  // Gentler slopes do not hold a vehicle in the horizontal: their gradient is mostly noise.
-  float min_gradient = 0.06F;
   int coarse_iterations = 8;
-  int max_iterations = 30;
-  double converged_m = 2e-4;
-  double converged_rad = 2e-5;
+  int max_iterations = 15;  // of the last stage
+  double converged_m = 1e-3;
+  double converged_rad = 1e-4;
 };
 
 struct RegistrationResult {

@@ -46,19 +46,38 @@ class VoxelAverager {
   std::vector<std::pair<std::uint64_t, Eigen::Vector3f>> points_;
 };
 
+// Evenly through the scan.
+std::vector<Eigen::Vector3f> Thinned(std::vector<Eigen::Vector3f> points, std::size_t most) {
+  if (points.size() <= most) {
+    return points;
+  }
+  for (std::size_t i = 0; i < most; ++i) {
+    points[i] = points[i * points.size() / most];
+  }
+  points.resize(most);
+  return points;
+}
+
 }  // namespace
 
 ScanFeatures ExtractFeatures(const LeveledScan& scan, const FeatureOptions& options) {
   constexpr float kAnyHeight_m = 1e4F;
   VoxelAverager columns(options.column_voxel_m, options.column_height_m);
   VoxelAverager ground(options.ground_voxel_m, kAnyHeight_m);
+  std::vector<Eigen::Vector3f> returns;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     if (scan.range_m[i] > options.max_range_m) {
       continue;
     }
-    (scan.is_ground[i] != 0 ? ground : columns).Add({scan.x[i], scan.y[i], scan.z[i]});
+    const Eigen::Vector3f p(scan.x[i], scan.y[i], scan.z[i]);
+    if (scan.is_ground[i] != 0) {
+      ground.Add(p);
+    } else {
+      columns.Add(p);
+      returns.push_back(p);
+    }
   }
-  return {columns.Means(), ground.Means()};
+  return {columns.Means(), ground.Means(), Thinned(std::move(returns), options.max_returns)};
 }
 
 }  // namespace atlas

@@ -1,6 +1,7 @@
 // A scan thinned out for matching: a few thousand points that say where the vehicle is.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,15 +12,17 @@ namespace atlas {
 
 struct FeatureOptions {
   float max_range_m = 40.0F;
-  float column_voxel_m = 0.25F;  // obstacle returns are averaged per voxel ...
-  float column_height_m = 0.5F;  // ... of this height
-  float ground_voxel_m = 1.0F;   // ground returns per square
+  float column_voxel_m = 0.25F;     // obstacle returns are averaged per voxel ...
+  float column_height_m = 0.5F;     // ... of this height
+  float ground_voxel_m = 1.0F;      // ground returns per square
+  std::size_t max_returns = 8'192;  // obstacle returns that are kept as they are, evenly chosen
 };
 
 // Levelled frame, origin at the sensor, metres.
 struct ScanFeatures {
   std::vector<Eigen::Vector3f> columns;
   std::vector<Eigen::Vector3f> ground;
+  std::vector<Eigen::Vector3f> returns;  // from obstacles
 };
 
 ScanFeatures ExtractFeatures(const LeveledScan& scan, const FeatureOptions& options);

@@ -143,4 +143,44 @@ bool MapWindow::IsOccupied(const Eigen::Vector3f& p) const {
   return segment >= 0 && grid_.Contains(cell) && columns_.IsOccupied(grid_.Index(cell), segment);
 }
 
+PointPresence MapWindow::PresenceAt(const Eigen::Vector3f& p, const CellKernel& kernel) const {
+  PointPresence presence;
+  const int segment = grid_.SegmentAt(p.z());
+  const float cells_a_m = 1.0F / grid_.cell_size_m();
+  const Eigen::Vector2f place = p.head<2>() * cells_a_m;
+  const Eigen::Vector2f corner = place.array().floor();
+  const WindowCell cell{static_cast<std::int32_t>(corner.x()),
+                        static_cast<std::int32_t>(corner.y())};
+  const bool is_within =
+      cell.x > 0 && cell.y > 0 && cell.x < grid_.side() - 1 && cell.y < grid_.side() - 1;
+  if (segment < 0 || !is_within) {
+    return presence;
+  }
+  const CellKernel::Shares& x = kernel.At(place.x() - corner.x());
+  const CellKernel::Shares& y = kernel.At(place.y() - corner.y());
+  for (std::size_t j = 0; j < 3; ++j) {
+    const std::size_t row = grid_.Index({cell.x - 1, cell.y - 1 + static_cast<std::int32_t>(j)});
+    float value = 0.0F;
+    float slope = 0.0F;
+    float curve = 0.0F;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const float part = columns_.IsOccupied(row + i, segment) ? 1.0F : 0.0F;
+      value += part * x.value[i];
+      slope += part * x.slope[i];
+      curve += part * x.curve[i];
+    }
+    presence.value += value * y.value[j];
+    presence.gradient.x() += slope * y.value[j];
+    presence.gradient.y() += value * y.slope[j];
+    presence.curve_xx += curve * y.value[j];
+    presence.curve_xy += slope * y.slope[j];
+    presence.curve_yy += value * y.curve[j];
+  }
+  presence.gradient *= cells_a_m;
+  presence.curve_xx *= cells_a_m * cells_a_m;
+  presence.curve_xy *= cells_a_m * cells_a_m;
+  presence.curve_yy *= cells_a_m * cells_a_m;
+  return presence;
+}
+
 }  // namespace atlas

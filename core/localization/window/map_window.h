@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/geometry/map_profile.h"
+#include "core/localization/window/cell_kernel.h"
 #include "core/localization/window/window_columns.h"
 #include "core/localization/window/window_grid.h"
 #include "core/localization/window/window_surfaces.h"
@@ -20,6 +21,16 @@ struct MapWindowOptions {
   std::uint8_t free_nibble = 6;       // p <= 0.39: rays passed and none returned
   ColumnLineOptions lines;
   float slope_baseline_m = 1.0F;  // either way, over which the ground's gradient is taken
+};
+
+// How much of a point whose place in the plane is uncertain lies in occupied segments, 0 to 1, and
+// its derivatives, per metre.
+struct PointPresence {
+  float value = 0.0F;
+  Eigen::Vector2f gradient = Eigen::Vector2f::Zero();
+  float curve_xx = 0.0F;
+  float curve_xy = 0.0F;
+  float curve_yy = 0.0F;
 };
 
 // Points are given in the window frame (WindowGrid).
@@ -55,6 +66,9 @@ class MapWindow {
   bool IsFree(const Eigen::Vector3f& p) const;
   // Whether an occupied segment stands at `p`.
   bool IsOccupied(const Eigen::Vector3f& p) const;
+  // Of a point as uncertain as `kernel` says, among the segments at its height; none at the
+  // window's edge.
+  PointPresence PresenceAt(const Eigen::Vector3f& p, const CellKernel& kernel) const;
 
   // Calls visit(cell centre, mask) for every cell with occupied segments: bit k is the one at
   // heights [k, k + 1) segment_height_m().

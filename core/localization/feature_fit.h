@@ -1,0 +1,64 @@
+// How a scan's features fit a map window: columns on vertical lines, ground on planes (robust
+// residuals, point to line and point to plane).
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+#include "core/localization/normal_equations.h"
+#include "core/localization/scan_features.h"
+#include "core/localization/window/map_window.h"
+
+namespace atlas {
+
+struct FeatureFitOptions {
+  float column_sigma_m = 0.12F;
+  float ground_sigma_m = 0.05F;
+  // Gentler slopes do not hold a vehicle in the horizontal: their gradient is mostly noise.
+  float min_gradient = 0.06F;
+};
+
+// How far a feature's place in the map is looked for.
+struct FeatureReach {
+  float column_m = 0.4F;
+  float ground_m = 0.2F;
+};
+
+// What the features say about a pose, and how many of them.
+struct FeatureEvidence {
+  NormalEquations equations;
+  int columns = 0;
+  int ground = 0;
+  // Of features where the map says something: how many, and the sum of their robust weights.
+  int mapped_columns = 0;
+  int mapped_ground = 0;
+  double column_fit = 0.0;
+  double ground_fit = 0.0;
+};
+
+class FeatureFit {
+ public:
+  // All outlive it.
+  FeatureFit(const MapWindow& map, const ScanFeatures& features, const FeatureFitOptions& options)
+      : map_(map), features_(features), options_(options) {}
+
+  FeatureEvidence At(const Pose& T_world_level, const FeatureReach& reach) const;
+  // The ground's part of it.
+  FeatureEvidence OfGround(const Pose& T_world_level, const FeatureReach& reach) const;
+
+ private:
+  void AddColumn(const Eigen::Vector3f& arm,
+                 const Eigen::Vector3f& t,
+                 float radius_m,
+                 FeatureEvidence& evidence) const;
+  void AddGround(const Eigen::Vector3f& arm,
+                 const Eigen::Vector3f& t,
+                 float reach_m,
+                 FeatureEvidence& evidence) const;
+
+  const MapWindow& map_;
+  const ScanFeatures& features_;
+  const FeatureFitOptions& options_;
+};
+
+}  // namespace atlas

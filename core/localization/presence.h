@@ -1,0 +1,44 @@
+// How well a scan's returns lie in occupied segments: the sum over all returns of the logarithm of
+// how much of each, uncertain as its place is, lies in them, or is an outlier. Unlike lines through
+// cells it has no ties between neighbours, and ends at the same place from wherever it began.
+#pragma once
+
+#include <span>
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+#include "core/localization/normal_equations.h"
+#include "core/localization/window/map_window.h"
+
+namespace atlas {
+
+struct PresenceOptions {
+  float sigma_cells =
+      0.4F;              // of a return's place; wide enough that within a wall its middle counts
+  float outlier = 0.1F;  // as likely as a return of which so much lies in occupied segments
+};
+
+struct PresenceSum {
+  double log_likelihood = 0.0;  // up to a constant
+  // Of its change with the pose (Newton: the curvature of each return, where it is one of a
+  // maximum).
+  NormalEquations equations;
+};
+
+// `returns`: levelled frame, metres, from obstacles.
+class Presence {
+ public:
+  explicit Presence(const PresenceOptions& options)
+      : options_(options), kernel_(options.sigma_cells) {}
+
+  PresenceSum Sum(const MapWindow& map,
+                  std::span<const Eigen::Vector3f> returns,
+                  const Pose& T_world_level) const;
+
+ private:
+  PresenceOptions options_;
+  CellKernel kernel_;
+};
+
+}  // namespace atlas
