@@ -6,21 +6,25 @@ namespace atlas {
 namespace {
 
 // Geman-McClure: a residual of several scales has no say.
-double RobustWeight(double residual, double scale) {
-  const double ratio = residual / scale;
-  const double denominator = 1.0 + ratio * ratio;
-  return 1.0 / (denominator * denominator);
+float RobustWeight(float residual, float scale) {
+  const float ratio = residual / scale;
+  const float denominator = 1.0F + ratio * ratio;
+  return 1.0F / (denominator * denominator);
 }
+
+constexpr float kScale = 0.4F;  // of a residual, by how far it is looked for
 
 }  // namespace
 
 FeatureEvidence FeatureFit::At(const Pose& T_world_level, const FeatureReach& reach) const {
   FeatureEvidence evidence = OfGround(T_world_level, reach);
+  PlanarSums sums;
   const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_level.translation() - map_.origin()).cast<float>();
   for (const Eigen::Vector3f& p : features_.columns) {
-    AddColumn(R * p, t, reach.column_m, evidence);
+    AddColumn(R * p, t, reach.column_m, evidence, sums);
   }
+  evidence.equations += sums.Equations();
   return evidence;
 }
 
@@ -37,7 +41,8 @@ FeatureEvidence FeatureFit::OfGround(const Pose& T_world_level, const FeatureRea
 void FeatureFit::AddColumn(const Eigen::Vector3f& arm,
                            const Eigen::Vector3f& t,
                            float radius_m,
-                           FeatureEvidence& evidence) const {
+                           FeatureEvidence& evidence,
+                           PlanarSums& sums) const {
   const Eigen::Vector3f p = arm + t;
   const ColumnLine* line = map_.NearestLine(p, radius_m);
   if (line != nullptr && !line->CanBeSeenFrom(t.head<2>())) {
@@ -48,20 +53,17 @@ void FeatureFit::AddColumn(const Eigen::Vector3f& arm,
     return;
   }
   const Eigen::Vector2f offset = p.head<2>() - line->center;
-  const double along_normal = line->normal.dot(offset);
-  const Eigen::Vector2f tangent(-line->normal.y(), line->normal.x());
-  const double along_tangent = line->is_wall ? 0.0 : tangent.dot(offset);
-  const double scale = 0.4 * radius_m;
-  const double robust = RobustWeight(std::hypot(along_normal, along_tangent), scale);
-  const double weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
+  const Eigen::Vector2f& n = line->normal;
+  const Eigen::Vector2f residual = line->is_wall ? Eigen::Vector2f(n.dot(offset) * n) : offset;
+  const float robust = RobustWeight(residual.norm(), kScale * radius_m);
+  const float weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
   ++evidence.columns;
-  evidence.column_fit += robust;
-  evidence.equations.Add({line->normal.x(), line->normal.y(), 0.0}, arm.cast<double>(),
-                         along_normal, weight);
-  if (!line->is_wall) {
-    evidence.equations.Add({tangent.x(), tangent.y(), 0.0}, arm.cast<double>(), along_tangent,
-                           weight);
-  }
+  evidence.column_fit += static_cast<double>(robust);
+  const PlanarMatrix metric =
+      line->is_wall
+          ? PlanarMatrix{weight * n.x() * n.x(), weight * n.x() * n.y(), weight * n.y() * n.y()}
+          : PlanarMatrix{weight, 0.0F, weight};
+  sums.Add(arm, weight * residual, metric);
 }
 
 void FeatureFit::AddGround(const Eigen::Vector3f& arm,
@@ -79,7 +81,8 @@ void FeatureFit::AddGround(const Eigen::Vector3f& arm,
       is_slope ? Eigen::Vector3d(-plane->gradient.x(), -plane->gradient.y(), 1.0).normalized()
                : Eigen::Vector3d::UnitZ();
   const double residual = height_m * normal.z();
-  const double robust = RobustWeight(residual, 0.4 * reach_m);
+  const auto robust = static_cast<double>(
+      RobustWeight(static_cast<float>(residual), kScale * reach_m));
   const double weight = robust / (options_.ground_sigma_m * options_.ground_sigma_m);
   ++evidence.ground;
   evidence.ground_fit += robust;

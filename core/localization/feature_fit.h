@@ -6,6 +6,7 @@
 
 #include "core/geometry/pose.h"
 #include "core/localization/normal_equations.h"
+#include "core/localization/planar_sums.h"
 #include "core/localization/scan_features.h"
 #include "core/localization/window/map_window.h"
 
@@ -50,7 +51,8 @@ class FeatureFit {
   void AddColumn(const Eigen::Vector3f& arm,
                  const Eigen::Vector3f& t,
                  float radius_m,
-                 FeatureEvidence& evidence) const;
+                 FeatureEvidence& evidence,
+                 PlanarSums& sums) const;
   void AddGround(const Eigen::Vector3f& arm,
                  const Eigen::Vector3f& t,
                  float reach_m,

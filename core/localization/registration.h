@@ -25,7 +25,7 @@ struct RegistrationOptions {
   // How well the start is known: where nothing seen holds the vehicle, it stays there.
   double start_sigma_m = 0.5;
   double start_sigma_rad = 0.03;
-  int coarse_iterations = 8;
+  int coarse_iterations = 5;
   int max_iterations = 15;  // of the last stage
   double converged_m = 1e-3;
   double converged_rad = 1e-4;

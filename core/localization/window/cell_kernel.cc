@@ -20,13 +20,19 @@ CellKernel::CellKernel(float sigma_cells) {
   };
   for (std::size_t step = 0; step <= kSteps; ++step) {
     const double offset = (static_cast<double>(step) + 0.5) / static_cast<double>(kSteps);
-    for (std::size_t cell = 0; cell < 3; ++cell) {
-      const double low = static_cast<double>(cell) - 1.0 - offset;
-      const double high = low + 1.0;
-      shares_[step].value[cell] = static_cast<float>(below(high) - below(low));
-      // As the point moves on, both edges come nearer to it.
-      shares_[step].slope[cell] = static_cast<float>(density(low) - density(high));
-      shares_[step].curve[cell] = static_cast<float>(density_slope(high) - density_slope(low));
+    for (std::size_t cells = 0; cells < shares_[step].size(); ++cells) {
+      Share& share = shares_[step][cells];
+      for (std::size_t cell = 0; cell < 3; ++cell) {
+        if (((cells >> cell) & 1U) == 0) {
+          continue;
+        }
+        const double low = static_cast<double>(cell) - 1.0 - offset;
+        const double high = low + 1.0;
+        share.value += static_cast<float>(below(high) - below(low));
+        // As the point moves on, both edges come nearer to it.
+        share.slope += static_cast<float>(density(low) - density(high));
+        share.curve += static_cast<float>(density_slope(high) - density_slope(low));
+      }
     }
   }
 }

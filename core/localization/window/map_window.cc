@@ -158,23 +158,17 @@ PointPresence MapWindow::PresenceAt(const Eigen::Vector3f& p, const CellKernel& 
   }
   const CellKernel::Shares& x = kernel.At(place.x() - corner.x());
   const CellKernel::Shares& y = kernel.At(place.y() - corner.y());
-  for (std::size_t j = 0; j < 3; ++j) {
-    const std::size_t row = grid_.Index({cell.x - 1, cell.y - 1 + static_cast<std::int32_t>(j)});
-    float value = 0.0F;
-    float slope = 0.0F;
-    float curve = 0.0F;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const float part = columns_.IsOccupied(row + i, segment) ? 1.0F : 0.0F;
-      value += part * x.value[i];
-      slope += part * x.slope[i];
-      curve += part * x.curve[i];
-    }
-    presence.value += value * y.value[j];
-    presence.gradient.x() += slope * y.value[j];
-    presence.gradient.y() += value * y.slope[j];
-    presence.curve_xx += curve * y.value[j];
-    presence.curve_xy += slope * y.slope[j];
-    presence.curve_yy += value * y.curve[j];
+  for (std::size_t row = 0; row < 3; ++row) {
+    const unsigned cells =
+        columns_.rows().Three({cell.x - 1, cell.y - 1 + static_cast<std::int32_t>(row)}, segment);
+    const CellKernel::Share& along = x[cells];
+    const CellKernel::Share& across = y[std::size_t{1} << row];
+    presence.value += along.value * across.value;
+    presence.gradient.x() += along.slope * across.value;
+    presence.gradient.y() += along.value * across.slope;
+    presence.curve_xx += along.curve * across.value;
+    presence.curve_xy += along.slope * across.slope;
+    presence.curve_yy += along.value * across.curve;
   }
   presence.gradient *= cells_a_m;
   presence.curve_xx *= cells_a_m * cells_a_m;

@@ -1,22 +1,16 @@
 #include "core/localization/window/window_columns.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace atlas {
-namespace {
-
-constexpr std::int32_t kBlockCells = 16;
-
-}  // namespace
 
 WindowColumns::WindowColumns(const WindowGrid& grid,
                              SegmentMasks masks,
                              const ColumnLineOptions& options)
-    : masks_(std::move(masks)) {
-  IndexBlocks(grid);
+    : masks_(std::move(masks)), rows_(grid, masks_.occupied) {
   FitLines(grid, options);
 }
 
@@ -27,49 +21,8 @@ const ColumnLine* WindowColumns::NearestLine(const WindowGrid& grid,
   if (segment < 0) {
     return nullptr;
   }
-  const WindowCell cell = grid.CellAt(p.head<2>());
-  const auto reach = static_cast<std::int32_t>(std::ceil(radius_m / grid.cell_size_m()));
-  const std::uint64_t bit = std::uint64_t{1} << segment;
-  if (reach <= kBlockCells && grid.Contains(cell) && (NearMask(cell) & bit) == 0) {
-    return nullptr;
-  }
-  const std::int32_t last = grid.side() - 1;
-  float best = radius_m * radius_m;
-  std::size_t best_cell = grid.size();
-  for (std::int32_t y = std::max(0, cell.y - reach); y <= std::min(last, cell.y + reach); ++y) {
-    for (std::int32_t x = std::max(0, cell.x - reach); x <= std::min(last, cell.x + reach); ++x) {
-      const std::size_t index = grid.Index({x, y});
-      if ((masks_.occupied[index] & bit) == 0) {
-        continue;
-      }
-      const float distance = (grid.Center({x, y}) - p.head<2>()).squaredNorm();
-      if (distance < best) {
-        best = distance;
-        best_cell = index;
-      }
-    }
-  }
-  return best_cell == grid.size() ? nullptr : &LineAt(best_cell, segment);
-}
-
-void WindowColumns::IndexBlocks(const WindowGrid& grid) {
-  side_blocks_ = grid.side() / kBlockCells + 1;
-  near_masks_.assign(
-      static_cast<std::size_t>(side_blocks_) * static_cast<std::size_t>(side_blocks_), 0);
-  const auto add = [this](std::int32_t x, std::int32_t y, std::uint64_t mask) {
-    for (std::int32_t j = std::max(0, y - 1); j <= std::min(side_blocks_ - 1, y + 1); ++j) {
-      for (std::int32_t i = std::max(0, x - 1); i <= std::min(side_blocks_ - 1, x + 1); ++i) {
-        near_masks_[static_cast<std::size_t>(j * side_blocks_ + i)] |= mask;
-      }
-    }
-  };
-  for (std::int32_t y = 0; y < grid.side(); ++y) {
-    for (std::int32_t x = 0; x < grid.side(); ++x) {
-      if (const std::uint64_t mask = masks_.occupied[grid.Index({x, y})]; mask != 0) {
-        add(x / kBlockCells, y / kBlockCells, mask);
-      }
-    }
-  }
+  const std::optional<WindowCell> nearest = rows_.Nearest(grid, p.head<2>(), segment, radius_m);
+  return nearest ? &LineAt(grid.Index(*nearest), segment) : nullptr;
 }
 
 void WindowColumns::FitLines(const WindowGrid& grid, const ColumnLineOptions& options) {
@@ -138,11 +91,6 @@ void WindowColumns::FindFreeSide(const WindowGrid& grid,
   if (line.is_one_sided && is_free_behind) {
     line.normal = -line.normal;
   }
-}
-
-std::uint64_t WindowColumns::NearMask(WindowCell cell) const {
-  return near_masks_[static_cast<std::size_t>((cell.y / kBlockCells) * side_blocks_ +
-                                              cell.x / kBlockCells)];
 }
 
 const ColumnLine& WindowColumns::LineAt(std::size_t cell, int segment) const {

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "core/localization/window/occupied_rows.h"
 #include "core/localization/window/window_grid.h"
 
 namespace atlas {
@@ -43,33 +44,30 @@ class WindowColumns {
 
   std::size_t lines() const { return lines_.size(); }
   const std::vector<std::uint64_t>& occupied() const { return masks_.occupied; }
+  const OccupiedRows& rows() const { return rows_; }
   bool IsOccupied(std::size_t cell, int segment) const {
     return ((masks_.occupied[cell] >> segment) & 1) != 0;
   }
   bool IsFree(std::size_t cell, int segment) const {
     return ((masks_.free[cell] >> segment) & 1) != 0;
   }
-  // The line nearest to `p` (window frame) at its height, within `radius_m`; null without one.
+  // The line nearest to `p` (window frame) at its height, within `radius_m` (OccupiedRows);
+  // null without one.
   const ColumnLine* NearestLine(const WindowGrid& grid,
                                 const Eigen::Vector3f& p,
                                 float radius_m) const;
 
  private:
-  void IndexBlocks(const WindowGrid& grid);
   void FitLines(const WindowGrid& grid, const ColumnLineOptions& options);
   ColumnLine FitLine(const WindowGrid& grid,
                      WindowCell cell,
                      int segment,
                      const ColumnLineOptions& options) const;
   void FindFreeSide(const WindowGrid& grid, int segment, float away_m, ColumnLine& line) const;
-  std::uint64_t NearMask(WindowCell cell) const;
   const ColumnLine& LineAt(std::size_t cell, int segment) const;
 
   SegmentMasks masks_;
-  // Occupied segments of a block of cells and its eight neighbours: most of what is looked for
-  // stands nowhere near.
-  std::vector<std::uint64_t> near_masks_;
-  std::int32_t side_blocks_ = 0;
+  OccupiedRows rows_;
   std::vector<std::uint32_t> first_line_;  // by cell: index of its lowest occupied segment's line
   std::vector<ColumnLine> lines_;
 };
