@@ -21,8 +21,8 @@ FeatureEvidence FeatureFit::At(const Pose& T_world_level, const FeatureReach& re
   PlanarSums sums;
   const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_level.translation() - map_.origin()).cast<float>();
-  for (const Eigen::Vector3f& p : features_.columns) {
-    AddColumn(R * p, t, reach.column_m, evidence, sums);
+  for (std::size_t i = 0; i < features_.columns.size(); i += reach.stride) {
+    AddColumn(R * features_.columns[i], t, reach.column_m, evidence, sums);
   }
   evidence.equations += sums.Equations();
   return evidence;
@@ -32,8 +32,8 @@ FeatureEvidence FeatureFit::OfGround(const Pose& T_world_level, const FeatureRea
   FeatureEvidence evidence;
   const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_level.translation() - map_.origin()).cast<float>();
-  for (const Eigen::Vector3f& p : features_.ground) {
-    AddGround(R * p, t, reach.ground_m, evidence);
+  for (std::size_t i = 0; i < features_.ground.size(); i += reach.stride) {
+    AddGround(R * features_.ground[i], t, reach.ground_m, evidence);
   }
   return evidence;
 }
@@ -81,8 +81,8 @@ void FeatureFit::AddGround(const Eigen::Vector3f& arm,
       is_slope ? Eigen::Vector3d(-plane->gradient.x(), -plane->gradient.y(), 1.0).normalized()
                : Eigen::Vector3d::UnitZ();
   const double residual = height_m * normal.z();
-  const auto robust = static_cast<double>(
-      RobustWeight(static_cast<float>(residual), kScale * reach_m));
+  const auto robust =
+      static_cast<double>(RobustWeight(static_cast<float>(residual), kScale * reach_m));
   const double weight = robust / (options_.ground_sigma_m * options_.ground_sigma_m);
   ++evidence.ground;
   evidence.ground_fit += robust;

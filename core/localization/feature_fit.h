@@ -2,6 +2,8 @@
 // residuals, point to line and point to plane).
 #pragma once
 
+#include <cstddef>
+
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
@@ -19,10 +21,11 @@ struct FeatureFitOptions {
   float min_gradient = 0.06F;
 };
 
-// How far a feature's place in the map is looked for.
+// How far a feature's place in the map is looked for, and of which features.
 struct FeatureReach {
   float column_m = 0.4F;
   float ground_m = 0.2F;
+  std::size_t stride = 1;  // every so many-th of them
 };
 
 // What the features say about a pose, and how many of them.

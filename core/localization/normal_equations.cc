@@ -41,6 +41,12 @@ void NormalEquations::AddPrior(const Pose& pose,
   H(kPriorAxes, kPriorAxes) += information;
 }
 
+NormalEquations& NormalEquations::operator*=(double weight) {
+  H *= weight;
+  g *= weight;
+  return *this;
+}
+
 NormalEquations& NormalEquations::operator+=(const NormalEquations& other) {
   H += other.H;
   g += other.g;

@@ -26,6 +26,7 @@ struct NormalEquations {
   // `information`: of `expected`, the inverse of its covariance (PosePrior).
   void AddPrior(const Pose& pose, const Pose& expected, const Eigen::Matrix4d& information);
 
+  NormalEquations& operator*=(double weight);
   NormalEquations& operator+=(const NormalEquations& other);
   // What brings the gradient to zero.
   Vector6 Solve() const;

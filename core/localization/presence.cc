@@ -7,6 +7,16 @@
 namespace atlas {
 namespace {
 
+// As likely as a return of which so much lies in occupied segments is an outlier.
+constexpr float kOutlier = 0.1F;
+
+// Wide enough that within a wall of one cell its middle counts.
+const CellKernel& Kernel() {
+  constexpr float kSigma_cells = 0.4F;
+  static const CellKernel kKernel(kSigma_cells);
+  return kKernel;
+}
+
 // Without its negative part: a return between two places pulls to neither.
 PlanarMatrix Positive(const PlanarMatrix& c) {
   const float mean = 0.5F * (c.xx + c.yy);
@@ -24,23 +34,24 @@ PlanarMatrix Positive(const PlanarMatrix& c) {
 
 }  // namespace
 
-PresenceSum Presence::Sum(const MapWindow& map,
-                          std::span<const Eigen::Vector3f> returns,
-                          const Pose& T_world_level) const {
+PresenceSum SumPresence(const MapWindow& map,
+                        std::span<const Eigen::Vector3f> returns,
+                        const Pose& T_world_level) {
   constexpr double kMuch = 1e100;
   const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_level.translation() - map.origin()).cast<float>();
+  const CellKernel& kernel = Kernel();
   PlanarSums sums;
   PresenceSum result;
   double likelihood = 1.0;  // since the last logarithm
   for (const Eigen::Vector3f& p : returns) {
     const Eigen::Vector3f arm = R * p;
-    const PointPresence at = map.PresenceAt(arm + t, kernel_);
+    const PointPresence at = map.PresenceAt(arm + t, kernel);
     if (at.value <= 0.0F) {
       continue;  // one of an outlier: log(1)
     }
-    const float scale = 1.0F / (at.value + options_.outlier);
-    likelihood *= static_cast<double>(1.0F + at.value / options_.outlier);
+    const float scale = 1.0F / (at.value + kOutlier);
+    likelihood *= static_cast<double>(1.0F + at.value / kOutlier);
     if (likelihood > kMuch) {
       result.log_likelihood += std::log(likelihood);
       likelihood = 1.0;

@@ -13,12 +13,6 @@
 
 namespace atlas {
 
-struct PresenceOptions {
-  float sigma_cells =
-      0.4F;              // of a return's place; wide enough that within a wall its middle counts
-  float outlier = 0.1F;  // as likely as a return of which so much lies in occupied segments
-};
-
 struct PresenceSum {
   double log_likelihood = 0.0;  // up to a constant
   // Of its change with the pose (Newton: the curvature of each return, where it is one of a
@@ -27,18 +21,8 @@ struct PresenceSum {
 };
 
 // `returns`: levelled frame, metres, from obstacles.
-class Presence {
- public:
-  explicit Presence(const PresenceOptions& options)
-      : options_(options), kernel_(options.sigma_cells) {}
-
-  PresenceSum Sum(const MapWindow& map,
-                  std::span<const Eigen::Vector3f> returns,
-                  const Pose& T_world_level) const;
-
- private:
-  PresenceOptions options_;
-  CellKernel kernel_;
-};
+PresenceSum SumPresence(const MapWindow& map,
+                        std::span<const Eigen::Vector3f> returns,
+                        const Pose& T_world_level);
 
 }  // namespace atlas

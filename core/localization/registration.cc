@@ -1,5 +1,9 @@
 #include "core/localization/registration.h"
 
+#include <algorithm>
+#include <span>
+#include <utility>
+
 #include <Eigen/LU>
 
 #include "core/localization/normal_equations.h"
@@ -30,7 +34,8 @@ Pose AlignFeatures(const FeatureFit& features,
         1.0F - static_cast<float>(iteration) / static_cast<float>(options.coarse_iterations);
     const FeatureReach reach{
         options.fine_radius_m + left * (options.coarse_radius_m - options.fine_radius_m),
-        options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m)};
+        options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m),
+        options.coarse_stride};
     NormalEquations equations = features.At(pose, reach).equations;
     known.AddTo(pose, equations);
     pose = Moved(pose, equations.Solve());
@@ -40,53 +45,78 @@ Pose AlignFeatures(const FeatureFit& features,
 
 struct Alignment {
   Pose pose;
-  NormalEquations equations;  // of the scan alone
   bool is_converged = false;
 };
 
 // Newton's method on what is the same from wherever it begins. A step after which less of the scan
-// lies in occupied segments is halved.
-Alignment AlignReturns(const MapWindow& map,
-                       const ScanFeatures& scan,
-                       const FeatureFit& features,
-                       const Pose& start,
-                       const Known& known,
-                       const RegistrationOptions& options) {
-  constexpr double kTolerated = 1e-4;  // of the likelihood: the ground may have its share
-  const Presence presence(options.presence);
-  const FeatureReach reach{options.fine_radius_m, options.fine_reach_m};
-  // All returns count as much as all columns: neighbours err together.
-  const double share = scan.returns.empty() ? 0.0
-                                            : static_cast<double>(scan.columns.size()) /
-                                                  static_cast<double>(scan.returns.size());
-  Alignment result{start, {}, false};
-  Pose before = start;
-  double best = 0.0;
-  NormalEquations::Vector6 step = NormalEquations::Vector6::Zero();
-  for (int iteration = 0; iteration <= options.max_iterations; ++iteration) {
-    PresenceSum sum = presence.Sum(map, scan.returns, result.pose);
-    if (sum.log_likelihood < (1.0 - kTolerated) * best && !result.is_converged) {
-      step *= 0.5;
-      result.pose = Moved(before, step);
-      continue;
-    }
-    best = sum.log_likelihood;
-    sum.equations.H *= share;
-    sum.equations.g *= share;
-    sum.equations += features.OfGround(result.pose, reach).equations;
-    result.equations = sum.equations;
-    if (result.is_converged || iteration == options.max_iterations) {
-      break;
-    }
-    known.AddTo(result.pose, sum.equations);
-    step = sum.equations.Solve();
-    before = result.pose;
-    result.pose = Moved(before, step);
-    result.is_converged = step.head<3>().norm() < options.converged_m &&
-                          step.tail<3>().norm() < options.converged_rad;
+// lies in occupied segments is halved. Some returns find the place, all of them what is left of the
+// way.
+class ReturnAlignment {
+ public:
+  ReturnAlignment(const MapWindow& map,
+                  const ScanFeatures& scan,
+                  const FeatureFit& features,
+                  const Known& known,
+                  const RegistrationOptions& options)
+      : map_(map), scan_(scan), features_(features), known_(known), options_(options) {}
+
+  Alignment From(const Pose& start) const {
+    const std::span all(scan_.returns);
+    const Alignment near = Descend(start, all.first(all.size() / kFew), kNear);
+    return Descend(near.pose, all, {options_.converged_m, options_.converged_rad});
   }
-  return result;
-}
+
+ private:
+  static constexpr std::size_t kFew = 4;  // of so many returns one, until the steps are small
+  struct Small {
+    double translation_m;
+    double rotation_rad;
+  };
+  static constexpr Small kNear{0.01, 0.001};
+
+  Alignment Descend(const Pose& start,
+                    std::span<const Eigen::Vector3f> returns,
+                    const Small& small) const {
+    constexpr double kTolerated = 1e-4;  // of the likelihood: the ground may have its share
+    Alignment result{start, false};
+    Pose before = start;
+    double best = 0.0;
+    NormalEquations::Vector6 step = NormalEquations::Vector6::Zero();
+    for (int iteration = 0; iteration < options_.max_iterations && !result.is_converged;
+         ++iteration) {
+      PresenceSum sum = SumPresence(map_, returns, result.pose);
+      if (sum.log_likelihood < (1.0 - kTolerated) * best) {
+        step *= 0.5;
+      } else {
+        best = sum.log_likelihood;
+        before = result.pose;
+        step = Step(std::move(sum.equations), result.pose, returns.size());
+      }
+      result.pose = Moved(before, step);
+      result.is_converged =
+          step.head<3>().norm() < small.translation_m && step.tail<3>().norm() < small.rotation_rad;
+    }
+    return result;
+  }
+
+  NormalEquations::Vector6 Step(NormalEquations equations,
+                                const Pose& pose,
+                                std::size_t returns) const {
+    // All returns count as much as all columns: neighbours err together.
+    equations *= static_cast<double>(scan_.columns.size()) /
+                 static_cast<double>(std::max<std::size_t>(returns, 1));
+    equations +=
+        features_.OfGround(pose, {options_.fine_radius_m, options_.fine_reach_m}).equations;
+    known_.AddTo(pose, equations);
+    return equations.Solve();
+  }
+
+  const MapWindow& map_;
+  const ScanFeatures& scan_;
+  const FeatureFit& features_;
+  const Known& known_;
+  const RegistrationOptions& options_;
+};
 
 // Mapped features that a fit needs.
 constexpr int kEnough = 30;
@@ -104,9 +134,8 @@ RegistrationResult Register(const MapWindow& map,
                             const RegistrationOptions& options) {
   const Known known{prior, prior.covariance.inverse(), options.tilt_sigma_rad};
   const FeatureFit features(map, scan, options.features);
-  const Alignment found =
-      AlignReturns(map, scan, features,
-                   AlignFeatures(features, T_world_level_start, known, options), known, options);
+  const Alignment found = ReturnAlignment(map, scan, features, known, options)
+                              .From(AlignFeatures(features, T_world_level_start, known, options));
   const FeatureEvidence last =
       features.At(found.pose, {options.fine_radius_m, options.fine_reach_m});
   RegistrationResult result;

@@ -20,13 +20,13 @@ struct RegistrationOptions {
   float coarse_reach_m = 0.6F;   // the same for the ground's height
   float fine_reach_m = 0.2F;
   FeatureFitOptions features;
-  PresenceOptions presence;
   double tilt_sigma_rad = 0.0087;  // the IMU's: 0.5 degrees
   // How well the start is known: where nothing seen holds the vehicle, it stays there.
   double start_sigma_m = 0.5;
   double start_sigma_rad = 0.03;
   int coarse_iterations = 5;
-  int max_iterations = 15;  // of the last stage
+  std::size_t coarse_stride = 3;  // of the features looked at until then
+  int max_iterations = 15;        // of the last stage
   double converged_m = 1e-3;
   double converged_rad = 1e-4;
 };

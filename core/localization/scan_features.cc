@@ -1,6 +1,7 @@
 #include "core/localization/scan_features.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -46,16 +47,20 @@ class VoxelAverager {
   std::vector<std::pair<std::uint64_t, Eigen::Vector3f>> points_;
 };
 
-// Evenly through the scan.
-std::vector<Eigen::Vector3f> Thinned(std::vector<Eigen::Vector3f> points, std::size_t most) {
-  if (points.size() <= most) {
-    return points;
+// At most so many, evenly through the scan.
+std::vector<Eigen::Vector3f> Interleaved(const std::vector<Eigen::Vector3f>& points,
+                                         std::size_t most) {
+  constexpr std::size_t kStride = 4;
+  constexpr std::array<std::size_t, kStride> kFirst{0, 2, 1, 3};
+  const std::size_t count = std::min(points.size(), most);
+  std::vector<Eigen::Vector3f> interleaved;
+  interleaved.reserve(count);
+  for (const std::size_t first : kFirst) {
+    for (std::size_t i = first; i < count; i += kStride) {
+      interleaved.push_back(points[i * points.size() / count]);
+    }
   }
-  for (std::size_t i = 0; i < most; ++i) {
-    points[i] = points[i * points.size() / most];
-  }
-  points.resize(most);
-  return points;
+  return interleaved;
 }
 
 }  // namespace
@@ -77,7 +82,7 @@ ScanFeatures ExtractFeatures(const LeveledScan& scan, const FeatureOptions& opti
       returns.push_back(p);
     }
   }
-  return {columns.Means(), ground.Means(), Thinned(std::move(returns), options.max_returns)};
+  return {columns.Means(), ground.Means(), Interleaved(returns, options.max_returns)};
 }
 
 }  // namespace atlas

@@ -22,7 +22,9 @@ struct FeatureOptions {
 struct ScanFeatures {
   std::vector<Eigen::Vector3f> columns;
   std::vector<Eigen::Vector3f> ground;
-  std::vector<Eigen::Vector3f> returns;  // from obstacles
+  // From obstacles; every fourth first, then every second of the others: whoever takes as many as
+  // he likes from the front has some of everywhere.
+  std::vector<Eigen::Vector3f> returns;
 };
 
 ScanFeatures ExtractFeatures(const LeveledScan& scan, const FeatureOptions& options);
