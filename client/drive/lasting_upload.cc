@@ -25,7 +25,8 @@ Status LastingUpload::Run(AtlasLink& link) {
   while (client) {
     const std::uint64_t acked_before = report_.totals.acked;
     const Status status = RunOn(**client);
-    if (status.ok() || !(*client)->is_broken()) return status;
+    if (status.ok()) return ReadSessions(**client);
+    if (!(*client)->is_broken()) return Refused(status);
     if (report_.totals.acked > acked_before) {
       link.Report({});  // it worked: the next attempt is a first one
     }
@@ -33,6 +34,32 @@ Status LastingUpload::Run(AtlasLink& link) {
     client = Reconnect(link, status);
   }
   return client.error();
+}
+
+// The sessions as they are afterwards: what is in them besides, and whether they are in the map.
+Status LastingUpload::ReadSessions(AtlasClient& client) {
+  if (planned_.empty()) return {};
+  auto sessions = client.ListSessions(planned_.front().key.session.vehicle);
+  if (!sessions) return sessions.error();
+  std::map<SessionKey, std::uint64_t> planned;
+  for (const PlannedKeyframe& keyframe : planned_) {
+    ++planned[keyframe.key.session];
+  }
+  for (SessionSummary& session : *sessions) {
+    const auto ours = planned.find(session.key);
+    if (ours == planned.end()) continue;
+    const std::uint64_t there = session.keyframes + session.compacted;
+    const std::uint64_t others = there - std::min(there, ours->second);
+    report_.sessions.push_back({std::move(session), others});
+  }
+  return {};
+}
+
+Status LastingUpload::Refused(const Status& status) const {
+  const std::uint64_t stored = report_.totals.acked - report_.totals.duplicates;
+  if (stored == 0) return status;
+  return {status.code(),
+          StrCat(status.message(), "; before it ", stored, " keyframes of this run were stored")};
 }
 
 Result<AtlasClient*> LastingUpload::Reconnect(AtlasLink& link, const Status& why) {
@@ -51,7 +78,9 @@ Status LastingUpload::GivenUp(const Status& broke, const Status& failure) const 
   return {
       failure.code(),
       StrCat("keyframe ", planned_[next_].key, ": the connection broke (", broke.message(),
-             "), and ", lost_for.count(), " s after the last acknowledgement: ", failure.message(),
+             "), and ", lost_for.count(), " s after the ",
+             report_.totals.acked > 0 ? "last acknowledgement" : "beginning", ": ",
+             failure.message(),
              may_pass ? "; the same command goes on there once the daemon can be reached" : "")};
 }
 
@@ -98,9 +127,12 @@ Status LastingUpload::SendAll(KeyframeUploader& uploader) {
   std::map<SessionKey, std::size_t> sent;
   for (std::size_t i = next_; i < planned_.size(); ++i) {
     // Those that are there, and the first ones of each session, say whether it is ours at all: new
-    // ones follow when they are known to be.
+    // ones follow when they are known to be. The very first alone: of two drives that are sent at
+    // the same time under one name it is one's.
     std::size_t& of_session = sent[planned_[i].key.session];
-    if (i == there_ || of_session == kSentTwice) ATLAS_RETURN_IF_ERROR(uploader.Finish());
+    if (i == there_ || of_session == 1 || of_session == kSentTwice) {
+      ATLAS_RETURN_IF_ERROR(uploader.Finish());
+    }
     ++of_session;
     ATLAS_RETURN_IF_ERROR(send_(i, uploader));
     if (progress_) progress_(i + 1, planned_.size());

@@ -16,10 +16,17 @@
 
 namespace atlas {
 
+// A session that was uploaded to, as it is afterwards.
+struct UploadedSession {
+  SessionSummary summary;
+  std::uint64_t others = 0;  // its keyframes beyond as many as were planned
+};
+
 struct LastingUploadReport {
   UploadTotals totals;
   std::uint64_t sent_before = 0;  // by an earlier run, and not again
   std::uint64_t reconnections = 0;
+  std::vector<UploadedSession> sessions;
 };
 
 class LastingUpload {
@@ -40,12 +47,15 @@ class LastingUpload {
   // made again, and what was not acknowledged is sent again, until nothing was acknowledged for as
   // long as the patience. Fails at the first keyframe that the daemon refuses, naming it, with what
   // was on its way waited for; of a session that has other content under the last of its keys, or
-  // under the first ones that are sent (kSentTwice), nothing else is on its way then.
+  // under the first ones that are sent (kSentTwice), nothing else is on its way then, and under the
+  // very first, nothing at all.
   Status Run(AtlasLink& link);
   const LastingUploadReport& report() const { return report_; }
 
  private:
   Status RunOn(AtlasClient& client);
+  Status ReadSessions(AtlasClient& client);
+  Status Refused(const Status& status) const;
   // Where to go on with this atlas: again, too, when it was restored from a backup meanwhile.
   Status FindStart(AtlasClient& client);
   // Sends those of which the daemon has the keys for certain: where it has other content under one,

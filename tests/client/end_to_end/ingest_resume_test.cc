@@ -129,6 +129,34 @@ TEST_F(IngestResumeTest, AnotherDriveUnderTheSameNameStoresNothing) {
   EXPECT_EQ(Ingest(daemon).exit_code, 0) << "the right command goes on";
 }
 
+TEST_F(IngestResumeTest, NorDoesOneOfOtherNumbers) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--scans", "even", "--range", "0:31"}).exit_code, 0);
+  const std::string first = Digest(daemon);
+  // It has no keyframe 30; before that there is room for its odd ones.
+  const CommandRun other = Ingest(daemon, {"--rings", "8", "--range", "0:30"});
+  EXPECT_EQ(other.exit_code, static_cast<int>(ExitCode::kConflict)) << other.err;
+  EXPECT_EQ(Connect(daemon).ReadStatus()->keyframes, 16U);
+  EXPECT_EQ(Digest(daemon), first);
+}
+
+TEST_F(IngestResumeTest, WhatIsThereBesidesAndWhatIsNotInTheMapIsTold) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--scans", "odd", "--range", "0:10"}).exit_code, 0);
+  // Another drive whose numbers lie between: nobody can know until one is met.
+  const CommandRun other = Ingest(daemon, {"--rings", "8", "--range", "0:4"});
+  EXPECT_EQ(other.exit_code, static_cast<int>(ExitCode::kConflict)) << other.err;
+  EXPECT_NE(other.err.find("before it 2 keyframes of this run"), std::string::npos) << other.err;
+  const CommandRun right = Ingest(daemon, {"--scans", "odd", "--range", "0:10"});
+  EXPECT_EQ(right.exit_code, 0) << right.err;
+  EXPECT_NE(right.err.find("vehicle/overpass has 2 keyframes more"), std::string::npos)
+      << right.err;
+  ASSERT_EQ(RunAtlas(daemon.address(), {"session", "retract", "vehicle/overpass"}).exit_code, 0);
+  const CommandRun again = Ingest(daemon, {"--scans", "odd", "--range", "0:10"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NE(again.err.find("is retracted, not in the map"), std::string::npos) << again.err;
+}
+
 TEST_F(IngestResumeTest, NorDoesOneThatBeginsBeforeWhatIsThere) {
   for (const char* const order : {"0", "3"}) {
     const DaemonProcess daemon(NewData(), kSmall);

@@ -59,6 +59,20 @@ void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
   facts.Print(out);
 }
 
+// What the upload alone would not have left.
+void TellOf(const UploadedSession& session, std::ostream& err) {
+  const SessionSummary& summary = session.summary;
+  if (summary.state != "live") {
+    err << "note: session " << StrCat(summary.key) << " is " << summary.state << ", not in the map"
+        << (summary.reason.empty() ? "" : ": " + summary.reason) << '\n';
+  }
+  if (session.others > 0) {
+    err << "note: session " << StrCat(summary.key) << " has " << session.others
+        << " keyframes more than were selected here: of another selection of the same drive, or of "
+           "another drive\n";
+  }
+}
+
 class IngestCommand : public Command {
  public:
   std::string Name() const override { return "ingest"; }
@@ -103,6 +117,9 @@ class IngestCommand : public Command {
                   << report->impossible_steps.front()
                   << "): the daemon keeps their session out of the map unless it is released "
                      "(atlas session release)\n";
+    }
+    for (const UploadedSession& session : report->upload.sessions) {
+      TellOf(session, context.err);
     }
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     if (context.is_json) {
