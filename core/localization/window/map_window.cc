@@ -24,6 +24,40 @@ bool IsMeasured(const TileLayer& layer) {
   return (layer.flags & TileLayer::kMeasured) != 0;
 }
 
+// A cell has one layer for each ground, and what stands on another ground than its own may be left
+// out of it: a wall between two ramps has holes. A gap of kGap_m across which structure stands on
+// both sides is structure, unless rays crossed it.
+void CloseGaps(const WindowGrid& grid, SegmentMasks& masks) {
+  constexpr float kGap_m = 0.25F;
+  const std::ptrdiff_t side = grid.side();
+  const auto reach =
+      static_cast<std::ptrdiff_t>(std::clamp(kGap_m / grid.cell_size_m(), 1.0F, 4.0F));
+  const std::vector<std::uint64_t> occupied = masks.occupied;
+  const auto fill = [&](std::ptrdiff_t cell, std::ptrdiff_t step) {
+    for (std::ptrdiff_t length = 2; length <= 2 * reach; ++length) {
+      const std::uint64_t both = occupied[static_cast<std::size_t>(cell)] &
+                                 occupied[static_cast<std::size_t>(cell + length * step)];
+      for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(1, length - reach);
+           both != 0 && k <= std::min(reach, length - 1); ++k) {
+        const auto between = static_cast<std::size_t>(cell + k * step);
+        masks.occupied[between] |= both & ~masks.free[between];
+      }
+    }
+  };
+  const std::ptrdiff_t margin = 2 * reach;
+  for (std::ptrdiff_t y = 0; y < side - margin; ++y) {
+    for (std::ptrdiff_t x = margin; x < side - margin; ++x) {
+      const std::ptrdiff_t cell = y * side + x;
+      if (occupied[static_cast<std::size_t>(cell)] == 0) {
+        continue;
+      }
+      for (const std::ptrdiff_t step : {std::ptrdiff_t{1}, side, side + 1, side - 1}) {
+        fill(cell, step);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 // What the tiles hold of a window.
@@ -94,6 +128,7 @@ MapWindow::Content MapWindow::Collect(const WindowGrid& grid,
       }
     }
   }
+  CloseGaps(grid, content.masks);
   return content;
 }
 

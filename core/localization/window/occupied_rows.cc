@@ -8,6 +8,7 @@ namespace atlas {
 
 OccupiedRows::OccupiedRows(const WindowGrid& grid, std::span<const std::uint64_t> masks) {
   const auto side = static_cast<std::size_t>(grid.side());
+  rows_ = grid.side();
   row_words_ = (side + 2 * kPadding + 63) / 64 + 1;
   std::uint64_t any = 0;
   for (const std::uint64_t mask : masks) {

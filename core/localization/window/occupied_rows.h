@@ -28,6 +28,16 @@ class OccupiedRows {
                                     int segment,
                                     float radius_m) const;
 
+  // The cells up to `width` before and behind `middle` in its row, lowest first; a row outside the
+  // window has none. `middle.x` must be in the window.
+  std::uint64_t Around(WindowCell middle, int segment, std::int32_t width) const {
+    const std::uint32_t plane = plane_[static_cast<std::size_t>(segment)];
+    if (plane == kNone || middle.y < 0 || middle.y >= rows_) {
+      return 0;
+    }
+    return Bits(plane + static_cast<std::size_t>(middle.y) * row_words_, middle.x - width) &
+           ((std::uint64_t{2} << (2 * width)) - 1);
+  }
   // Whether `first`, which must be in the window, and the two cells behind it are occupied: bits 0
   // to 2.
   unsigned Three(WindowCell first, int segment) const {
@@ -53,6 +63,7 @@ class OccupiedRows {
 
   static constexpr std::int32_t kPadding = kMaxReach + 1;  // bits before the first cell
 
+  std::int32_t rows_ = 0;
   std::size_t row_words_ = 0;
   std::array<std::uint32_t, WindowGrid::kSegments> plane_{};  // by segment: its first word
   std::vector<std::uint64_t> words_;                          // of segments with anything, by row

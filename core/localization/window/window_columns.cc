@@ -1,11 +1,20 @@
 #include "core/localization/window/window_columns.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <optional>
 #include <utility>
 
 namespace atlas {
+namespace {
+
+// Of a disc of cells, at `dy` from its middle.
+std::int32_t HalfChord(std::int32_t reach, std::int32_t dy) {
+  return static_cast<std::int32_t>(std::sqrt(static_cast<float>(reach * reach - dy * dy)));
+}
+
+}  // namespace
 
 WindowColumns::WindowColumns(const WindowGrid& grid,
                              SegmentMasks masks,
@@ -42,20 +51,21 @@ ColumnLine WindowColumns::FitLine(const WindowGrid& grid,
                                   WindowCell cell,
                                   int segment,
                                   const ColumnLineOptions& options) const {
-  const auto reach = static_cast<std::int32_t>(std::lround(options.radius_m / grid.cell_size_m()));
+  const auto reach =
+      std::min(static_cast<std::int32_t>(std::lround(options.radius_m / grid.cell_size_m())),
+               OccupiedRows::kMaxReach);
   float count = 0.0F;
   Eigen::Vector2f sum = Eigen::Vector2f::Zero();
   Eigen::Matrix2f squares = Eigen::Matrix2f::Zero();
   for (std::int32_t dy = -reach; dy <= reach; ++dy) {
-    for (std::int32_t dx = -reach; dx <= reach; ++dx) {
-      const WindowCell other{cell.x + dx, cell.y + dy};
-      if (dx * dx + dy * dy <= reach * reach && grid.Contains(other) &&
-          IsOccupied(grid.Index(other), segment)) {
-        const Eigen::Vector2f offset(static_cast<float>(dx), static_cast<float>(dy));
-        count += 1.0F;
-        sum += offset;
-        squares += offset * offset.transpose();
-      }
+    const std::int32_t width = HalfChord(reach, dy);
+    std::uint64_t row = rows_.Around({cell.x, cell.y + dy}, segment, width);
+    for (; row != 0; row &= row - 1) {
+      const Eigen::Vector2f offset(static_cast<float>(std::countr_zero(row) - width),
+                                   static_cast<float>(dy));
+      count += 1.0F;
+      sum += offset;
+      squares += offset * offset.transpose();
     }
   }
   const Eigen::Vector2f mean = sum / count;

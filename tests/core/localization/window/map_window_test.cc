@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/geometry/nibble.h"
 #include "tests/core/localization/painted_map.h"
 
 namespace atlas {
@@ -108,8 +109,9 @@ TEST(MapWindowTest, TheNearestLineIsTheNearest) {
   std::vector<Eigen::Vector3d> segments;  // middles
   std::set<std::pair<int, int>> taken;
   for (int i = 0; i < 150; ++i) {
-    const int x = static_cast<int>(random() % 200) - 100;
-    const int y = static_cast<int>(random() % 200) - 100;
+    // Further apart than what is taken for one structure.
+    const int x = 5 * (static_cast<int>(random() % 40) - 20);
+    const int y = 5 * (static_cast<int>(random() % 40) - 20);
     if (taken.emplace(x, y).second) {
       const std::uint32_t bits = random() % 16;
       map.Put(x, y, ColumnLayer(0.0, bits));
@@ -141,6 +143,28 @@ TEST(MapWindowTest, TheNearestLineIsTheNearest) {
     }
   }
   EXPECT_GT(found, 500);
+}
+
+TEST(MapWindowTest, AHoleInStructureIsStructureUnlessRaysCrossedIt) {
+  PaintedMap map;
+  const std::uint32_t wall = 0b0010;  // the segment from 1 to 2 m
+  for (int x = -20; x <= 20; ++x) {
+    if (x != 0 && x != 10 && x != 11) map.Put(x, 0, ColumnLayer(0.0, wall));
+  }
+  map.Put(10, 0, ColumnLayer(0.0, 0));
+  TileLayer crossed = ColumnLayer(0.0, 0);
+  crossed.column = std::uint64_t{kNibbleFree} << 4;
+  map.Put(11, 0, crossed);
+  const MapWindow window = map.Window(kOrigin, 12.0);
+  const auto is_occupied = [&](int x, int y) {
+    return window.IsOccupied(InWindow(window, 0.1 * x + 0.05, 0.1 * y + 0.05, 1.5));
+  };
+  EXPECT_TRUE(is_occupied(1, 0));
+  EXPECT_TRUE(is_occupied(0, 0)) << "nothing is known of it";
+  EXPECT_TRUE(is_occupied(10, 0)) << "nothing is known of it, either";
+  EXPECT_FALSE(is_occupied(11, 0)) << "rays crossed it";
+  EXPECT_FALSE(is_occupied(21, 0)) << "behind the end";
+  EXPECT_FALSE(is_occupied(5, 1)) << "beside it";
 }
 
 TEST(MapWindowTest, OfTwoDecksTheNearerOneIsTheSurface) {
