@@ -1,6 +1,7 @@
 #include "core/localization/feature_fit.h"
 
 #include <cmath>
+#include <optional>
 
 namespace atlas {
 namespace {
@@ -70,17 +71,17 @@ void FeatureFit::AddGround(const Eigen::Vector3f& arm,
                            const Eigen::Vector3f& t,
                            float reach_m,
                            FeatureEvidence& evidence) const {
-  float height_m = 0.0F;
   evidence.mapped_ground += map_.IsMapped(arm + t) ? 1 : 0;
-  const SurfacePlane* plane = map_.NearestSurface(arm + t, reach_m, &height_m);
-  if (plane == nullptr) {
+  const std::optional<SurfaceBelow> below = map_.NearestSurface(arm + t, reach_m);
+  if (!below) {
     return;
   }
-  const bool is_slope = plane->gradient.norm() >= options_.min_gradient;
+  const Eigen::Vector2f& gradient = below->plane.gradient;
+  const bool is_slope = gradient.norm() >= options_.min_gradient;
   const Eigen::Vector3d normal =
-      is_slope ? Eigen::Vector3d(-plane->gradient.x(), -plane->gradient.y(), 1.0).normalized()
+      is_slope ? Eigen::Vector3d(-gradient.x(), -gradient.y(), 1.0).normalized()
                : Eigen::Vector3d::UnitZ();
-  const double residual = height_m * normal.z();
+  const double residual = below->height_m * normal.z();
   const auto robust =
       static_cast<double>(RobustWeight(static_cast<float>(residual), kScale * reach_m));
   const double weight = robust / (options_.ground_sigma_m * options_.ground_sigma_m);

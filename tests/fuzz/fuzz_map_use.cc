@@ -76,12 +76,11 @@ void Plan(const Tile& tile) {
 void Match(const Tile& tile) {
   const Tile* const tiles[] = {&tile};
   const MapWindow window(TileProfile(), tiles, MiddleOf(tile), 4.0, {});
-  float height_m = 0.0F;
   for (const float x : {-1.0F, 0.0F, 1.5F}) {
     const Eigen::Vector3f p(x, 0.5F, 0.0F);
     static_cast<void>(window.NearestLine(p, 1.0F));
-    static_cast<void>(window.NearestSurface(p, 1.0F, &height_m));
-    Require(std::isfinite(height_m), "a surface has a height");
+    const auto below = window.NearestSurface(p, 1.0F);
+    Require(!below || std::isfinite(below->height_m), "a surface has a height");
     Require(!(window.IsFree(p) && window.IsOccupied(p)), "a place is free or not");
     static_cast<void>(window.IsMapped(p));
   }

@@ -149,7 +149,7 @@ MapWindow::MapWindow(const MapProfile& profile,
     : grid_(grid),
       slab_m_(static_cast<float>(profile.slab_margin_mm) * 1e-3F),
       columns_(grid_, std::move(content.masks), options.lines),
-      surfaces_(grid_, std::move(content.surfaces), options.slope_baseline_m) {}
+      surfaces_(grid_, content.surfaces, options.slope_baseline_m) {}
 
 bool MapWindow::IsMapped(const Eigen::Vector3f& p) const {
   const WindowCell cell = grid_.CellAt(p.head<2>());
@@ -167,8 +167,8 @@ bool MapWindow::IsFree(const Eigen::Vector3f& p) const {
   const std::size_t index = grid_.Index(cell);
   const auto surfaces = surfaces_.Of(index);
   return columns_.IsFree(index, lower) && columns_.IsFree(index, upper) &&
-         std::none_of(surfaces.begin(), surfaces.end(), [&](const SurfacePlane& surface) {
-           return p.z() < surface.z_m && p.z() > surface.z_m - slab_m_;
+         std::none_of(surfaces.begin(), surfaces.end(), [&](float surface_z_m) {
+           return p.z() < surface_z_m && p.z() > surface_z_m - slab_m_;
          });
 }
 

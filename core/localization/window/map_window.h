@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <Eigen/Core>
@@ -33,7 +34,7 @@ struct PointPresence {
   float curve_yy = 0.0F;
 };
 
-// Points are given in the window frame (WindowGrid).
+// Points are given in the window frame (WindowGrid). For one thread at a time (WindowColumns).
 class MapWindow {
  public:
   // `tiles`: level-0 tiles that touch the square of `radius_m` around `center`; others are ignored.
@@ -54,11 +55,9 @@ class MapWindow {
   const ColumnLine* NearestLine(const Eigen::Vector3f& p, float radius_m) const {
     return columns_.NearestLine(grid_, p, radius_m);
   }
-  // Height above the surface layer nearest to `p`, if one is within `reach_m`, and its plane.
-  const SurfacePlane* NearestSurface(const Eigen::Vector3f& p,
-                                     float reach_m,
-                                     float* height_m) const {
-    return surfaces_.Nearest(grid_, p, reach_m, height_m);
+  // The surface layer nearest to `p`, if one is within `reach_m`.
+  std::optional<SurfaceBelow> NearestSurface(const Eigen::Vector3f& p, float reach_m) const {
+    return surfaces_.Nearest(grid_, p, reach_m);
   }
   // Whether a surface was mapped in the cell of `p`, at any height.
   bool IsMapped(const Eigen::Vector3f& p) const;

@@ -19,8 +19,14 @@ std::int32_t HalfChord(std::int32_t reach, std::int32_t dy) {
 WindowColumns::WindowColumns(const WindowGrid& grid,
                              SegmentMasks masks,
                              const ColumnLineOptions& options)
-    : masks_(std::move(masks)), rows_(grid, masks_.occupied) {
-  FitLines(grid, options);
+    : masks_(std::move(masks)), rows_(grid, masks_.occupied), options_(options) {
+  first_line_.reserve(grid.size());
+  std::uint32_t lines = 0;
+  for (const std::uint64_t mask : masks_.occupied) {
+    first_line_.push_back(lines);
+    lines += static_cast<std::uint32_t>(std::popcount(mask));
+  }
+  lines_.resize(lines);
 }
 
 const ColumnLine* WindowColumns::NearestLine(const WindowGrid& grid,
@@ -31,28 +37,12 @@ const ColumnLine* WindowColumns::NearestLine(const WindowGrid& grid,
     return nullptr;
   }
   const std::optional<WindowCell> nearest = rows_.Nearest(grid, p.head<2>(), segment, radius_m);
-  return nearest ? &LineAt(grid.Index(*nearest), segment) : nullptr;
+  return nearest ? &LineAt(grid, *nearest, segment) : nullptr;
 }
 
-void WindowColumns::FitLines(const WindowGrid& grid, const ColumnLineOptions& options) {
-  first_line_.assign(grid.size(), 0);
-  for (std::int32_t y = 0; y < grid.side(); ++y) {
-    for (std::int32_t x = 0; x < grid.side(); ++x) {
-      const std::size_t index = grid.Index({x, y});
-      first_line_[index] = static_cast<std::uint32_t>(lines_.size());
-      for (std::uint64_t mask = masks_.occupied[index]; mask != 0; mask &= mask - 1) {
-        lines_.push_back(FitLine(grid, {x, y}, std::countr_zero(mask), options));
-      }
-    }
-  }
-}
-
-ColumnLine WindowColumns::FitLine(const WindowGrid& grid,
-                                  WindowCell cell,
-                                  int segment,
-                                  const ColumnLineOptions& options) const {
+ColumnLine WindowColumns::FitLine(const WindowGrid& grid, WindowCell cell, int segment) const {
   const auto reach =
-      std::min(static_cast<std::int32_t>(std::lround(options.radius_m / grid.cell_size_m())),
+      std::min(static_cast<std::int32_t>(std::lround(options_.radius_m / grid.cell_size_m())),
                OccupiedRows::kMaxReach);
   float count = 0.0F;
   Eigen::Vector2f sum = Eigen::Vector2f::Zero();
@@ -77,24 +67,21 @@ ColumnLine WindowColumns::FitLine(const WindowGrid& grid,
   const float angle = 0.5F * std::atan2(2.0F * spread(0, 1), difference);
   ColumnLine line;
   line.normal = {-std::sin(angle), std::cos(angle)};
-  line.is_wall = count >= 3.0F && (trace - root) < options.max_ratio * (trace + root);
+  line.is_wall = count >= 3.0F && (trace - root) < options_.max_ratio * (trace + root);
   line.center = grid.Center(cell);
   if (line.is_wall) {
     line.center += grid.cell_size_m() * mean;
-    FindFreeSide(grid, segment, options.free_side_m, line);
+    FindFreeSide(grid, segment, line);
   }
   return line;
 }
 
-void WindowColumns::FindFreeSide(const WindowGrid& grid,
-                                 int segment,
-                                 float away_m,
-                                 ColumnLine& line) const {
+void WindowColumns::FindFreeSide(const WindowGrid& grid, int segment, ColumnLine& line) const {
   const auto is_free_at = [&](const Eigen::Vector2f& p) {
     const WindowCell cell = grid.CellAt(p);
     return grid.Contains(cell) && IsFree(grid.Index(cell), segment);
   };
-  const Eigen::Vector2f arm = away_m * line.normal;
+  const Eigen::Vector2f arm = options_.free_side_m * line.normal;
   const bool is_free_before = is_free_at(line.center + arm);
   const bool is_free_behind = is_free_at(line.center - arm);
   line.is_one_sided = is_free_before != is_free_behind;
@@ -103,9 +90,17 @@ void WindowColumns::FindFreeSide(const WindowGrid& grid,
   }
 }
 
-const ColumnLine& WindowColumns::LineAt(std::size_t cell, int segment) const {
-  const std::uint64_t below = masks_.occupied[cell] & ((std::uint64_t{1} << segment) - 1);
-  return lines_[first_line_[cell] + static_cast<std::size_t>(std::popcount(below))];
+const ColumnLine& WindowColumns::LineAt(const WindowGrid& grid,
+                                        WindowCell cell,
+                                        int segment) const {
+  const std::size_t index = grid.Index(cell);
+  const std::uint64_t below = masks_.occupied[index] & ((std::uint64_t{1} << segment) - 1);
+  std::optional<ColumnLine>& line =
+      lines_[first_line_[index] + static_cast<std::size_t>(std::popcount(below))];
+  if (!line) {
+    line = FitLine(grid, cell, segment);
+  }
+  return *line;
 }
 
 }  // namespace atlas

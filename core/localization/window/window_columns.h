@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -38,6 +39,7 @@ struct SegmentMasks {
   std::vector<std::uint64_t> free;
 };
 
+// For one thread at a time: lines are fitted when they are first asked for.
 class WindowColumns {
  public:
   WindowColumns(const WindowGrid& grid, SegmentMasks masks, const ColumnLineOptions& options);
@@ -58,18 +60,16 @@ class WindowColumns {
                                 float radius_m) const;
 
  private:
-  void FitLines(const WindowGrid& grid, const ColumnLineOptions& options);
-  ColumnLine FitLine(const WindowGrid& grid,
-                     WindowCell cell,
-                     int segment,
-                     const ColumnLineOptions& options) const;
-  void FindFreeSide(const WindowGrid& grid, int segment, float away_m, ColumnLine& line) const;
-  const ColumnLine& LineAt(std::size_t cell, int segment) const;
+  ColumnLine FitLine(const WindowGrid& grid, WindowCell cell, int segment) const;
+  void FindFreeSide(const WindowGrid& grid, int segment, ColumnLine& line) const;
+  const ColumnLine& LineAt(const WindowGrid& grid, WindowCell cell, int segment) const;
 
   SegmentMasks masks_;
   OccupiedRows rows_;
   std::vector<std::uint32_t> first_line_;  // by cell: index of its lowest occupied segment's line
-  std::vector<ColumnLine> lines_;
+  // Fitted when first asked for: a scan sees few of them.
+  mutable std::vector<std::optional<ColumnLine>> lines_;
+  ColumnLineOptions options_;
 };
 
 }  // namespace atlas

@@ -6,61 +6,59 @@
 namespace atlas {
 
 WindowSurfaces::WindowSurfaces(const WindowGrid& grid,
-                               std::vector<std::pair<std::uint32_t, float>> surfaces,
-                               float baseline_m) {
-  std::stable_sort(surfaces.begin(), surfaces.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  begin_.assign(grid.size() + 1, 0);
-  planes_.reserve(surfaces.size());
+                               std::span<const std::pair<std::uint32_t, float>> surfaces,
+                               float baseline_m)
+    : begin_(grid.size() + 1, 0),
+      heights_m_(surfaces.size()),
+      baseline_cells_(
+          std::max(1, static_cast<std::int32_t>(std::lround(baseline_m / grid.cell_size_m())))) {
   for (const auto& [cell, z_m] : surfaces) {
     ++begin_[cell + 1];
-    planes_.push_back({z_m, Eigen::Vector2f::Zero()});
   }
   for (std::size_t i = 1; i < begin_.size(); ++i) {
     begin_[i] += begin_[i - 1];
   }
-  FitGradients(grid, baseline_m);
+  std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+  for (const auto& [cell, z_m] : surfaces) {
+    heights_m_[next[cell]++] = z_m;
+  }
 }
 
-const SurfacePlane* WindowSurfaces::Nearest(const WindowGrid& grid,
-                                            const Eigen::Vector3f& p,
-                                            float reach_m,
-                                            float* height_m) const {
+std::optional<SurfaceBelow> WindowSurfaces::Nearest(const WindowGrid& grid,
+                                                    const Eigen::Vector3f& p,
+                                                    float reach_m) const {
   const WindowCell cell = grid.CellAt(p.head<2>());
   if (!grid.Contains(cell)) {
-    return nullptr;
+    return std::nullopt;
   }
   const Eigen::Vector2f offset = p.head<2>() - grid.Center(cell);
-  const SurfacePlane* best = nullptr;
-  for (const SurfacePlane& plane : Of(grid.Index(cell))) {
-    const float height = p.z() - plane.z_m - plane.gradient.dot(offset);
-    if (std::abs(height) < reach_m) {
-      reach_m = std::abs(height);
-      *height_m = height;
-      best = &plane;
+  std::optional<SurfaceBelow> nearest;
+  for (const float z_m : Of(grid.Index(cell))) {
+    // No slope carries a surface further than this within its cell.
+    if (std::abs(p.z() - z_m) > reach_m + 2.0F * grid.cell_size_m()) {
+      continue;
+    }
+    const SurfacePlane plane{z_m, GradientAt(grid, cell, z_m)};
+    const float height_m = p.z() - z_m - plane.gradient.dot(offset);
+    if (std::abs(height_m) < reach_m) {
+      reach_m = std::abs(height_m);
+      nearest = {plane, height_m};
     }
   }
-  return best;
+  return nearest;
 }
 
-void WindowSurfaces::FitGradients(const WindowGrid& grid, float baseline_m) {
-  const std::int32_t reach =
-      std::max(1, static_cast<std::int32_t>(std::lround(baseline_m / grid.cell_size_m())));
+Eigen::Vector2f WindowSurfaces::GradientAt(const WindowGrid& grid,
+                                           WindowCell cell,
+                                           float z_m) const {
+  const std::int32_t reach = baseline_cells_;
   const float span_m = 2.0F * static_cast<float>(reach) * grid.cell_size_m();
-  for (std::int32_t y = 0; y < grid.side(); ++y) {
-    for (std::int32_t x = 0; x < grid.side(); ++x) {
-      const std::size_t index = grid.Index({x, y});
-      for (std::uint32_t i = begin_[index]; i < begin_[index + 1]; ++i) {
-        SurfacePlane& plane = planes_[i];
-        const auto east = Near(grid, {x + reach, y}, plane.z_m);
-        const auto west = Near(grid, {x - reach, y}, plane.z_m);
-        const auto north = Near(grid, {x, y + reach}, plane.z_m);
-        const auto south = Near(grid, {x, y - reach}, plane.z_m);
-        plane.gradient.x() = east && west ? (*east - *west) / span_m : 0.0F;
-        plane.gradient.y() = north && south ? (*north - *south) / span_m : 0.0F;
-      }
-    }
-  }
+  const auto east = Near(grid, {cell.x + reach, cell.y}, z_m);
+  const auto west = Near(grid, {cell.x - reach, cell.y}, z_m);
+  const auto north = Near(grid, {cell.x, cell.y + reach}, z_m);
+  const auto south = Near(grid, {cell.x, cell.y - reach}, z_m);
+  return {east && west ? (*east - *west) / span_m : 0.0F,
+          north && south ? (*north - *south) / span_m : 0.0F};
 }
 
 // Of a surface of the cell that is about as high.
@@ -71,9 +69,9 @@ std::optional<float> WindowSurfaces::Near(const WindowGrid& grid,
   if (!grid.Contains(cell)) {
     return std::nullopt;
   }
-  for (const SurfacePlane& plane : Of(grid.Index(cell))) {
-    if (std::abs(plane.z_m - z_m) < kReach_m) {
-      return plane.z_m;
+  for (const float other_m : Of(grid.Index(cell))) {
+    if (std::abs(other_m - z_m) < kReach_m) {
+      return other_m;
     }
   }
   return std::nullopt;

@@ -8,6 +8,8 @@
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
 #include "client/drive/drive_localization.h"
+#include "client/drive/drive_relocalization.h"
+#include "client/drive/place_reader.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -65,6 +67,38 @@ void PrintSummary(const DriveLocalizationReport& report,
   facts.Print(out);
 }
 
+boost::json::object RelocalizedJson(const RelocalizedScan& scan) {
+  boost::json::object json{{"type", "scan"}, {"scan", scan.scan}};
+  if (!scan.found.T_world_sensor) json["pose"] = nullptr;
+  boost::json::array places;
+  for (const RelocalizedPlace& place : scan.found.places) {
+    places.push_back(boost::json::object{{"fit", Rounded(place.registration.fit, 3)},
+                                         {"column_fit", Rounded(place.registration.column_fit, 3)},
+                                         {"columns", Rounded(place.registration.column_inliers, 3)},
+                                         {"explained", Rounded(place.explained, 3)},
+                                         {"x", Rounded(place.registration.T_world_level.translation().x(), 2)},
+                                         {"y", Rounded(place.registration.T_world_level.translation().y(), 2)},
+                                         {"z", Rounded(place.registration.T_world_level.translation().z(), 2)}});
+  }
+  json["places"] = std::move(places);
+  json["margin"] = Rounded(scan.found.margin, 3);
+  json["error_m"] = Rounded(scan.error.translation_m, 3);
+  json["error_deg"] = Rounded(scan.error.rotation_deg, 3);
+  return json;
+}
+
+boost::json::object RelocalizationJson(const DriveRelocalizationReport& report) {
+  return {{"type", "summary"},
+          {"scans", report.scans},
+          {"right", report.right},
+          {"wrong", report.wrong},
+          {"unknown", report.unknown},
+          {"places", report.places},
+          {"translation_rmse_m", Rounded(report.score.translation_rmse_m(), 5)},
+          {"cpu_s_per_scan", Rounded(report.cpu_s / static_cast<double>(report.scans), 4)},
+          {"worst_cpu_s", Rounded(report.worst_cpu_s, 4)}};
+}
+
 class LocalizeCommand : public Command {
  public:
   std::string Name() const override { return "localize"; }
@@ -80,6 +114,8 @@ class LocalizeCommand : public Command {
                        "Single shots from starts so far off; else the drive is tracked");
     arguments.Optional("--trials", "N", trials_, "Single shots a scan [10]");
     arguments.Optional("--seed", "K", options_.seed, "Of the disturbances [0]");
+    arguments.Flag("--relocalize", relocalize_, "Find each scan alone, with no start");
+    arguments.Optional("--prior-radius", "M", prior_radius_m_, "... within so far of a position");
     arguments.Choice("--mode", {"atlas"}, mode_, "How scans are matched");
   }
 
@@ -89,6 +125,7 @@ class LocalizeCommand : public Command {
     if (!drive) return drive.error();
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
+    if (relocalize_) return Relocalize(*drive, map->source(), context);
     const auto report = Localize(*drive, map->source(), context);
     if (!report) return report.error();
     if (context.is_json) {
@@ -131,7 +168,28 @@ class LocalizeCommand : public Command {
     });
   }
 
+  Status Relocalize(const DriveFolder& drive, MapSource& source, const CommandContext& context) {
+    DriveRelocalizationOptions options;
+    options.selection = options_.selection;
+    options.rings = options_.rings;
+    options.max_range_m = std::min(options_.max_range_m, 40.0);
+    options.prior_radius_m = prior_radius_m_;
+    options.seed = options_.seed;
+    const auto places = ReadPlaces(source);
+    if (!places) return places.error();
+    MapView view(source);
+    const auto report =
+        RelocalizeDrive(drive, options, *places, view, [&](const RelocalizedScan& scan) {
+          if (context.is_json) context.PrintJson(RelocalizedJson(scan));
+        });
+    if (!report) return report.error();
+    context.PrintJson(RelocalizationJson(*report));
+    return {};
+  }
+
   DriveFlags drive_;
+  bool relocalize_ = false;
+  std::optional<double> prior_radius_m_;
   std::string mode_ = "atlas";
   std::optional<Perturbation> perturbation_;
   std::optional<std::uint32_t> trials_;

@@ -174,13 +174,11 @@ TEST(MapWindowTest, OfTwoDecksTheNearerOneIsTheSurface) {
   const MapWindow window = map.Window(kOrigin, 5.0);
   EXPECT_EQ(window.surfaces(), 2U);
   for (const double z : {-0.5, -0.1, 0.55, 1.3, 1.5, 2.3, 3.3}) {  // both are in reach
-    float height_m = 0.0F;
-    const auto* plane = window.NearestSurface(InWindow(window, 0.35, 0.35, z), 5.0F, &height_m);
-    ASSERT_NE(plane, nullptr) << z;
-    EXPECT_NEAR(height_m, z < 1.4 ? z : z - 2.8, 1e-4) << z;
+    const auto below = window.NearestSurface(InWindow(window, 0.35, 0.35, z), 5.0F);
+    ASSERT_TRUE(below) << z;
+    EXPECT_NEAR(below->height_m, z < 1.4 ? z : z - 2.8, 1e-4) << z;
   }
-  float height_m = 0.0F;
-  EXPECT_EQ(window.NearestSurface(InWindow(window, 0.35, 0.35, 1.4), 0.6F, &height_m), nullptr);
+  EXPECT_FALSE(window.NearestSurface(InWindow(window, 0.35, 0.35, 1.4), 0.6F));
 }
 
 TEST(MapWindowTest, OnlyMeasuredGroundThatCanBeDrivenIsASurface) {
@@ -215,12 +213,11 @@ TEST(MapWindowTest, SlopesHaveTheirGradientAndLevelGroundHasNone) {
     const MapWindow window = map.Window(kOrigin, 10.0);
     for (const Eigen::Vector2d& p : {Eigen::Vector2d(0.03, 0.08), Eigen::Vector2d(-3.2, 2.7)}) {
       const double ground_m = 0.5 + gradient.dot(p);
-      float height_m = 0.0F;
-      const auto* plane =
-          window.NearestSurface(InWindow(window, p.x(), p.y(), ground_m + 0.1), 0.6F, &height_m);
-      ASSERT_NE(plane, nullptr);
-      EXPECT_NEAR(height_m, 0.1, 2e-3);
-      EXPECT_LT((plane->gradient.cast<double>() - gradient).norm(), 2e-3);
+      const auto below =
+          window.NearestSurface(InWindow(window, p.x(), p.y(), ground_m + 0.1), 0.6F);
+      ASSERT_TRUE(below);
+      EXPECT_NEAR(below->height_m, 0.1, 2e-3);
+      EXPECT_LT((below->plane.gradient.cast<double>() - gradient).norm(), 2e-3);
     }
   }
 }

@@ -1,0 +1,103 @@
+#include "client/drive/drive_relocalization.h"
+
+#include <cmath>
+#include <utility>
+
+#include "client/drive/drive_survey.h"
+#include "client/drive/localization_trial.h"
+#include "client/drive/tiles_around.h"
+#include "client/score/cpu_timer.h"
+#include "core/base/str_cat.h"
+#include "core/keyframe/keyframe_builder.h"
+#include "core/scan/scan_reader.h"
+
+namespace atlas {
+namespace {
+
+SurveyOptions SurveyOptionsFor(const DriveRelocalizationOptions& options) {
+  SurveyOptions survey;
+  survey.rings = options.rings;
+  return survey;
+}
+
+RelocalizerOptions RelocalizerOptionsFor(const DriveRelocalizationOptions& options) {
+  RelocalizerOptions result;
+  result.features.max_range_m = static_cast<float>(options.max_range_m);
+  return result;
+}
+
+}  // namespace
+
+Status DriveRelocalizationOptions::Validate() const {
+  ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  if (!(max_range_m >= 1.0 && max_range_m <= 200.0)) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("maximum range ", max_range_m, " m: expected 1 to 200")};
+  }
+  if (prior_radius_m && !(*prior_radius_m > 0.0 && *prior_radius_m <= 1e5)) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("radius ", *prior_radius_m, " m: expected more than 0, at most 100,000")};
+  }
+  return {};
+}
+
+Result<DriveRelocalizationReport> RelocalizeDrive(
+    const DriveFolder& drive,
+    const DriveRelocalizationOptions& options,
+    std::shared_ptr<const PlaceIndex> places,
+    MapView& view,
+    const std::function<void(const RelocalizedScan&)>& on_scan) {
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
+  const Result<DriveSurvey> survey = SurveySensor(drive, SurveyOptionsFor(options));
+  if (!survey) return Error(survey.error());
+  DriveRelocalizationReport report;
+  report.places = places->places();
+  const Relocalizer relocalizer(
+      view.profile(), std::move(places),
+      [&view](const Eigen::Vector3d& center, double radius_m) {
+        return TilesAroundPlace(view, center, radius_m);
+      },
+      RelocalizerOptionsFor(options));
+  for (const SelectedScan& selected : SelectScans(drive, options.selection)) {
+    const DriveScan& scan = drive.scans[selected.index];
+    const Result<PointCloud> cloud = ReadScan(scan.scan);
+    if (!cloud) return Error(cloud.error());
+    const TrialSeed seed{options.seed, scan.number, 0};
+    const Eigen::Quaterniond R_level_sensor =
+        DisturbedLevel(scan.T_world_sensor, options.tilt_error_rad, seed);
+    std::optional<PositionPrior> prior;
+    if (options.prior_radius_m) {
+      // Within the square in the circle.
+      const double reach_m = *options.prior_radius_m / std::numbers::sqrt2;
+      const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
+      prior = PositionPrior{start.translation().head<2>(), *options.prior_radius_m};
+    }
+    const CpuTimer timer;
+    const LeveledScan leveled =
+        SegmentScan(*cloud, survey->layout, survey->ring_step, R_level_sensor, {});
+    auto found = relocalizer.Find(leveled, R_level_sensor, prior);
+    const double cpu_s = timer.elapsed_s();
+    if (!found) return Error(found.error().WithContext(StrCat("scan ", scan.number)));
+    RelocalizedScan result{scan.number, *std::move(found), {}};
+    if (!result.found.places.empty()) {
+      Pose pose = result.found.places[0].registration.T_world_level;
+      pose.linear() *= R_level_sensor.toRotationMatrix();
+      result.error = ErrorOf(pose, scan.T_world_sensor);
+    }
+    report.cpu_s += cpu_s;
+    report.worst_cpu_s = std::max(report.worst_cpu_s, cpu_s);
+    ++report.scans;
+    if (!result.found.T_world_sensor) {
+      ++report.unknown;
+    } else if (result.error.translation_m <= DriveRelocalizationReport::kRight_m) {
+      ++report.right;
+      report.score.Add(result.error, false);
+    } else {
+      ++report.wrong;
+    }
+    on_scan(result);
+  }
+  return report;
+}
+
+}  // namespace atlas

@@ -1,0 +1,59 @@
+// A recorded drive's scans found in an atlas, each alone, with no idea of where it was taken or
+// within the radius of a position such as GNSS gives. The drive's poses go to the scorer, and
+// disturbed into that position.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include "client/drive/drive_selection.h"
+#include "client/map/map_view.h"
+#include "client/score/localization_score.h"
+#include "core/base/status.h"
+#include "core/localization/places/relocalizer.h"
+#include "core/scan/drive_folder.h"
+
+namespace atlas {
+
+struct DriveRelocalizationOptions {
+  SelectionOptions selection;
+  std::optional<std::uint32_t> rings;
+  double max_range_m = 40.0;
+  std::optional<double> prior_radius_m;  // the position is given, off by up to this
+  std::uint64_t seed = 0;                // of how far it is off, and of the IMU's error
+  double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;
+
+  // kInvalidArgument naming the first option out of range.
+  Status Validate() const;
+};
+
+struct RelocalizedScan {
+  std::uint32_t scan = 0;
+  Relocalization found;
+  PoseError error;  // of what was found, or would have been
+};
+
+struct DriveRelocalizationReport {
+  std::uint64_t scans = 0;
+  std::uint64_t right = 0;    // found within kRight_m
+  std::uint64_t wrong = 0;    // found elsewhere
+  std::uint64_t unknown = 0;  // "don't know"
+  std::size_t places = 0;     // of the map
+  double cpu_s = 0.0;         // of all scans, segmentation and tiles included
+  double worst_cpu_s = 0.0;   // of one
+  LocalizationScore score;    // of those found
+
+  static constexpr double kRight_m = 0.5;
+};
+
+Result<DriveRelocalizationReport> RelocalizeDrive(
+    const DriveFolder& drive,
+    const DriveRelocalizationOptions& options,
+    std::shared_ptr<const PlaceIndex> places,
+    MapView& view,
+    const std::function<void(const RelocalizedScan&)>& on_scan);
+
+}  // namespace atlas
