@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 namespace atlas {
 namespace {
 
@@ -45,14 +43,21 @@ std::string_view LocalizationHealthName(LocalizationHealth health) {
   return "lost";
 }
 
-Localizer::Localizer(const MapProfile& profile, TilesAround tiles, const LocalizerOptions& options)
-    : options_(options), map_(profile, std::move(tiles), options.map), motion_(options.motion) {}
+Localizer::Localizer(const MapProfile& profile,
+                     TilesAround tiles,
+                     const LocalizerOptions& options,
+                     RelocalizerSource relocalizer)
+    : options_(options),
+      map_(profile, std::move(tiles), options.map),
+      motion_(options.motion),
+      relocalizer_(std::move(relocalizer)) {}
 
 void Localizer::Start(const Pose& T_world_sensor) {
   motion_.Start(T_world_sensor);
   is_first_ = true;
   usual_fit_ = 0.0;
   lost_ = 0;
+  astray_ = 0;
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
@@ -77,6 +82,17 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
     }
   }
   result.health = Judge(result.registration);
+  const auto elsewhere = Relocalize(scan, R_level_sensor, result.health);
+  if (!elsewhere) {
+    motion_ = before;
+    return Error(elsewhere.error());
+  }
+  if (*elsewhere) {
+    result.registration = **elsewhere;
+    result.health = Judge(result.registration);
+    lost_ = std::max(lost_, 1);  // its motion until now says nothing
+    is_found = true;
+  }
   result.T_world_sensor = result.health == LocalizationHealth::kLost
                               ? Prior().T_world_level
                               : result.registration.T_world_level;
@@ -215,6 +231,28 @@ std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features
   return best->registration;
 }
 
+Result<std::optional<RegistrationResult>> Localizer::Relocalize(
+    const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor, LocalizationHealth health) {
+  const bool is_astray = health == LocalizationHealth::kLost ||
+                         SpreadOf(motion_.covariance()).along_m > options_.relocalized_sigma_m;
+  astray_ = is_astray ? astray_ + 1 : 0;
+  if (!relocalizer_ || astray_ == 0 || astray_ % options_.relocalized_after != 0) {
+    return std::optional<RegistrationResult>();
+  }
+  const auto relocalizer = relocalizer_();
+  if (!relocalizer) return Error(relocalizer.error());
+  if (*relocalizer == nullptr) {
+    return std::optional<RegistrationResult>();
+  }
+  const auto found = (*relocalizer)->Find(scan, R_level_sensor);
+  if (!found) return Error(found.error());
+  if (!found->T_world_sensor) {
+    return std::optional<RegistrationResult>();
+  }
+  astray_ = 0;
+  return std::optional(found->places.front().registration);
+}
+
 // The first of `places` is where the vehicle was tracked to.
 bool Localizer::StandsOut(const std::vector<Place>& places, const Place& best) const {
   const bool is_likelier =
@@ -230,10 +268,7 @@ LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {
   if (result.fit < options_.min_fit) {
     return LocalizationHealth::kLost;
   }
-  const Eigen::Matrix2d horizontal = result.information.topLeftCorner<2, 2>();
-  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues()(0);
-  const double sigma_m = least > 0.0 ? 1.0 / std::sqrt(least) : 1e9;
-  return sigma_m > options_.max_weak_sigma_m || result.fit < options_.good_fit
+  return WorstSigma(result) > options_.max_weak_sigma_m || result.fit < options_.good_fit
              ? LocalizationHealth::kWeak
              : LocalizationHealth::kGood;
 }

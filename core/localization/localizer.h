@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <string_view>
@@ -11,6 +13,7 @@
 #include "core/base/status.h"
 #include "core/localization/local_map.h"
 #include "core/localization/motion_model.h"
+#include "core/localization/places/relocalizer.h"
 #include "core/localization/pose_search.h"
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
@@ -66,9 +69,17 @@ struct LocalizerOptions {
   double unique_log_ratio = 1.0;
   SearchReach search_reach;  // of the first search; each lost scan adds as much
   SearchReach max_search_reach{8.0, 8.0, std::numbers::pi};
+
+  // Lost for so many scans, or adrift this far, it is looked for in the whole map, again after as
+  // many scans as it was not found.
+  int relocalized_after = 5;
+  double relocalized_sigma_m = 8.0;
   // Found where the prior's log density is below this, the vehicle moved as nobody expected.
   double surprising_log_density = -8.0;
 };
+
+// Made when it is first needed; null: there is none.
+using RelocalizerSource = std::function<Result<std::shared_ptr<const Relocalizer>>()>;
 
 struct LocalizationResult {
   Pose T_world_sensor = Pose::Identity();
@@ -78,13 +89,18 @@ struct LocalizationResult {
 
 class Localizer {
  public:
-  Localizer(const MapProfile& profile, TilesAround tiles, const LocalizerOptions& options);
+  // `relocalizer` may be empty: a vehicle that is lost is then looked for around where it should
+  // be.
+  Localizer(const MapProfile& profile,
+            TilesAround tiles,
+            const LocalizerOptions& options,
+            RelocalizerSource relocalizer = {});
 
   // Forgets the motion; the next scan is near `T_world_sensor`.
   void Start(const Pose& T_world_sensor);
 
   // Requires Start(). `scan` is levelled by `R_level_sensor`. Errors are those of the tiles'
-  // source.
+  // and the relocalizer's sources.
   Result<LocalizationResult> Localize(const LeveledScan& scan,
                                       const Eigen::Quaterniond& R_level_sensor);
 
@@ -109,6 +125,10 @@ class Localizer {
   std::optional<RegistrationResult> Search(const ScanFeatures& features,
                                            const RegistrationResult& tracked);
   bool StandsOut(const std::vector<Place>& places, const Place& best) const;
+  // Anywhere in the map, where there is reason to.
+  Result<std::optional<RegistrationResult>> Relocalize(const LeveledScan& scan,
+                                                       const Eigen::Quaterniond& R_level_sensor,
+                                                       LocalizationHealth health);
   LocalizationHealth Judge(const RegistrationResult& result) const;
   void Remember(const LocalizationResult& result, bool is_found);
 
@@ -118,6 +138,8 @@ class Localizer {
   bool is_first_ = true;
   double usual_fit_ = 0.0;  // of good results, exponentially forgotten
   int lost_ = 0;            // scans in a row
+  RelocalizerSource relocalizer_;
+  int astray_ = 0;  // scans in a row in which it was lost or adrift too far
 };
 
 }  // namespace atlas

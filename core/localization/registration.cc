@@ -1,9 +1,11 @@
 #include "core/localization/registration.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "core/localization/normal_equations.h"
@@ -126,6 +128,12 @@ double Share(int part, std::size_t whole) {
 }
 
 }  // namespace
+
+double WorstSigma(const RegistrationResult& result) {
+  const Eigen::Matrix2d horizontal = result.information.topLeftCorner<2, 2>();
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues()(0);
+  return least > 0.0 ? 1.0 / std::sqrt(least) : 1e9;
+}
 
 RegistrationResult Register(const MapWindow& map,
                             const ScanFeatures& scan,

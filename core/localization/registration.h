@@ -48,6 +48,10 @@ struct RegistrationResult {
   bool is_converged = false;
 };
 
+// Standard deviation of the least certain horizontal direction, as far as features are independent,
+// metres; 1e9 where nothing holds it.
+double WorstSigma(const RegistrationResult& result);
+
 RegistrationResult Register(const MapWindow& map,
                             const ScanFeatures& features,
                             const Pose& T_world_level_start,

@@ -9,8 +9,9 @@
 namespace atlas {
 namespace {
 
-// Segments below the first column that a chunk gets to know; above there are 43.
-constexpr std::int64_t kBelow = 20;
+// Segments below the first column that a chunk gets to know; above there are 32. Structure beyond is
+// left out: hills within 26 m.
+constexpr std::int64_t kBelow = 31;
 
 }  // namespace
 

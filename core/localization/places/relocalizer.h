@@ -31,10 +31,12 @@ struct RelocalizerOptions {
   double refined_apart_rad = 0.1;
 
   // A place is believed when it fits this well, when this share of the scan's columns stands on
-  // structure there, and when any other place explains this much less of it.
+  // structure there and so much of it is explained, when what is seen holds the vehicle in all
+  // directions this well, and when any other place explains this much less.
   double min_fit = 0.6;
   double min_columns = 0.3;
   double min_explained = 0.15;
+  double max_sigma_m = 0.015; // of the worst horizontal direction
   double min_margin = 0.04;
 };
 

@@ -76,6 +76,7 @@ boost::json::object RelocalizedJson(const RelocalizedScan& scan) {
                                          {"column_fit", Rounded(place.registration.column_fit, 3)},
                                          {"columns", Rounded(place.registration.column_inliers, 3)},
                                          {"explained", Rounded(place.explained, 3)},
+                                         {"sigma", Rounded(WorstSigma(place.registration), 4)},
                                          {"x", Rounded(place.registration.T_world_level.translation().x(), 2)},
                                          {"y", Rounded(place.registration.T_world_level.translation().y(), 2)},
                                          {"z", Rounded(place.registration.T_world_level.translation().z(), 2)}});
