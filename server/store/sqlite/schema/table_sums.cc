@@ -34,7 +34,9 @@ constexpr SummedTable kTables[] = {
     {RowKind::kTombstone, "tombstones", "SELECT checksum FROM tombstones NOT INDEXED"},
     {RowKind::kStart, "starts", "SELECT checksum FROM starts NOT INDEXED"},
     {RowKind::kCounter, "counters", "SELECT checksum FROM counters NOT INDEXED"},
-    {RowKind::kFootprint, "keyframe_tiles", "SELECT checksum FROM keyframe_tiles NOT INDEXED"},
+    // Without rowids it is an index itself, and SQLite would take a smaller one that has all of it.
+    {RowKind::kFootprint, "keyframe_tiles",
+     "SELECT checksum FROM keyframe_tiles INDEXED BY sqlite_autoindex_keyframe_tiles_1"},
     {RowKind::kDirtyTile, "dirty_tiles", "SELECT checksum FROM dirty_tiles NOT INDEXED"},
     {RowKind::kEvent, "events", "SELECT checksum FROM events NOT INDEXED"},
     {RowKind::kDamagedKeyframe, "damaged_keyframes",

@@ -271,6 +271,30 @@ int DeleteDamagedPoses(Connection& connection, std::int64_t keyframe_id) {
   return static_cast<int>(damaged.size());
 }
 
+std::vector<std::int64_t> ListDamagedPoseLines(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum, "
+      "id FROM pose_history NOT INDEXED");
+  std::vector<std::int64_t> damaged;
+  while (row.Step()) {
+    if (!ReadHistoryRow(row)) {
+      damaged.push_back(row.Int());
+    }
+  }
+  return damaged;
+}
+
+bool IsPoseLineUnder(Connection& connection,
+                     std::int64_t id,
+                     std::int64_t keyframe_id,
+                     std::int64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT ?2, ?3, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "
+      "FROM pose_history WHERE id = ?1");
+  row.Bind(id).Bind(keyframe_id).Bind(revision);
+  return row.Step() && ReadHistoryRow(row).has_value();
+}
+
 void DeletePoses(Connection& connection, std::int64_t keyframe_id) {
   connection.Prepare("DELETE FROM poses WHERE keyframe_id = ?").Bind(keyframe_id).Run();
   connection.Prepare("DELETE FROM pose_history WHERE keyframe_id = ?").Bind(keyframe_id).Run();

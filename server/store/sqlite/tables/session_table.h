@@ -41,8 +41,18 @@ Result<SessionRow> TellSession(Connection& connection, std::int64_t id, Vouching
 // Writes it anew. SQLite does not, and throws, where an index has something else than the damaged
 // row.
 Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching);
-// Writes rows anew whatever indexes have. Of other damaged rows the index of names says no more
-// what they were called.
+// The same of one whose name is known.
+Result<SessionRow> TellNamedSession(Connection& connection,
+                                    std::int64_t id,
+                                    const SessionKey& name,
+                                    Vouching vouching);
+// What the index of names and the row itself, damaged or not, call it. Nothing: no name.
+std::optional<SessionKey> NameByIndex(Connection& connection, std::int64_t id);
+std::optional<SessionKey> NameByRow(Connection& connection, std::int64_t id);
+// By the rows.
+bool IsNameOfAnother(Connection& connection, const SessionKey& key, std::int64_t id);
+// Writes damaged rows anew. SQLite throws where an index has something else, unless it is told not
+// to.
 void PutBackSessions(Connection& connection, const std::vector<SessionRow>& rows);
 // Counts what is stored of each. How many counted something else.
 int RecountSessions(Connection& connection);

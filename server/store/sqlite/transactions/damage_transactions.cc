@@ -23,6 +23,7 @@
 #include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/history_horizon.h"
+#include "server/store/sqlite/transactions/key_repairs.h"
 #include "server/store/sqlite/transactions/session_repairs.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
@@ -226,10 +227,11 @@ Result<std::uint32_t> RepairRowsInStore(Connection& connection,
   auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
   repaired += static_cast<std::uint32_t>(RestoreIndexes(connection));
   repaired += PutBackLostTiles(connection);
-  connection.Execute("REINDEX");
+  const SessionNames names = ReadDamagedNames(connection);
+  repaired += RepairKeys(connection, author);
   repaired += static_cast<std::uint32_t>(RepairEvents(connection));
   repaired += static_cast<std::uint32_t>(RepairPoseBatches(connection));
-  const auto sessions = RepairSessions(connection, author);
+  const auto sessions = RepairSessions(connection, names, author);
   if (!sessions) {
     return Error(sessions.error());
   }
