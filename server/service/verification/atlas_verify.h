@@ -64,6 +64,7 @@ class AtlasVerifier {
   Status CheckKeyframe(std::int64_t id);
   Status HandleKeyframe(std::int64_t id, const Status& damage);
   Status HandleTile(const TileId& id);
+  Status HandlePlaceOf(const TileId& id);
   // Where it lies, if its row and its pose can be read.
   std::optional<std::vector<TileId>> FootprintOf(std::int64_t id);
   Status CheckTile(const TileId& id);

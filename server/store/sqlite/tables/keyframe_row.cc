@@ -94,6 +94,13 @@ bool IsKeyframeRowUnder(Connection& connection,
   return row.Step() && ReadFullKeyframeRow(row).has_value();
 }
 
+bool IsKeyframeRowOf(Connection& connection, std::int64_t id, std::int64_t other) {
+  Query row = connection.Prepare("SELECT ?2, session_id, sequence, " KEYFRAME_COLUMNS_BEHIND_ITS_KEY
+                                 " FROM keyframes WHERE id = ?1");
+  row.Bind(id).Bind(other);
+  return row.Step() && ReadFullKeyframeRow(row).has_value();
+}
+
 Result<NewKeyframe> ReadUploadedKeyframe(Connection& connection, std::int64_t id) {
   const auto row = ReadRowOf(connection, id);
   if (!row) {

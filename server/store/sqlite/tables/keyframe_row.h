@@ -38,6 +38,8 @@ bool IsKeyframeRowUnder(Connection& connection,
                         std::int64_t id,
                         std::int64_t session_id,
                         std::int64_t sequence);
+// The same of another id.
+bool IsKeyframeRowOf(Connection& connection, std::int64_t id, std::int64_t other);
 // As it was uploaded, but for the name of its session, its pose and its tiles. kInvalidData: its
 // row or its blob is damaged.
 Result<NewKeyframe> ReadUploadedKeyframe(Connection& connection, std::int64_t id);

@@ -60,7 +60,8 @@ void DeletePoses(Connection& connection, std::int64_t keyframe_id);
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
 // kInvalidData names the first batch whose row is damaged.
 Status CheckPoseBatches(Connection& connection);
-// Of damaged ones nobody knows whose they were. How many.
+// One whose number alone has a turned bit gets it back; of others nobody knows whose they were, and
+// one with a number that was never given goes. How many.
 int RepairPoseBatches(Connection& connection);
 
 }  // namespace atlas

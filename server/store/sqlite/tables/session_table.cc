@@ -15,9 +15,10 @@
 
 // Of a whole row, as ReadRow and WriteSession have them: statements are kept by the address of a
 // literal.
-#define SESSION_COLUMNS                                                                         \
-  "id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, last_sequence, " \
+#define SESSION_COLUMNS_BEHIND_ID                                                           \
+  "vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, last_sequence, " \
   "compacted, checksum"
+#define SESSION_COLUMNS "id, " SESSION_COLUMNS_BEHIND_ID
 
 namespace atlas {
 namespace {
@@ -239,6 +240,13 @@ std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
     }
   }
   return damaged;
+}
+
+bool IsSessionRowOf(Connection& connection, std::int64_t id, std::int64_t other) {
+  Query row =
+      connection.Prepare("SELECT ?2, " SESSION_COLUMNS_BEHIND_ID " FROM sessions WHERE id = ?1");
+  row.Bind(id).Bind(other);
+  return row.Step() && ReadRow(row).has_value();
 }
 
 std::optional<SessionKey> NameByIndex(Connection& connection, std::int64_t id) {

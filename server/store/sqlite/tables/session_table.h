@@ -33,6 +33,8 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 std::uint64_t CountQuarantined(Connection& connection);
 // Ids of those whose rows are damaged.
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection);
+// Whether the row would be intact with another id.
+bool IsSessionRowOf(Connection& connection, std::int64_t id, std::int64_t other);
 // What the row was, from the index of names, the history of states and the keyframes. kInvalidData
 // when the history does not tell, or the row's checksum speaks against it, unless that is not to
 // count any more.

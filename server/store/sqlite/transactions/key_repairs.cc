@@ -100,16 +100,37 @@ std::vector<std::pair<std::int64_t, RowKey>> KeysByIndex(Connection& connection,
   return keys;
 }
 
+std::map<RowKey, std::vector<std::int64_t>> ListTwins(Connection& connection,
+                                                      const KeyedTable& table) {
+  std::map<RowKey, std::vector<std::int64_t>> twins;
+  Query row = connection.Prepare(table.twins);
+  while (row.Step()) {
+    row.Rewind();
+    const RowKey key{row.Int(), row.Int()};
+    twins[key].push_back(row.Int());
+  }
+  return twins;
+}
+
+bool IsSameKeyframe(Connection& connection, std::int64_t a, std::int64_t b) {
+  const auto first = ReadKeyframeRow(connection, a);
+  const auto second = ReadKeyframeRow(connection, b);
+  return first && second && first->blob_hash == second->blob_hash &&
+         first->record.time_ms == second->record.time_ms;
+}
+
 class KeyRepair {
  public:
   KeyRepair(Connection& connection, const std::string& author)
       : connection_(connection), author_(author) {}
 
   std::uint32_t Run() {
-    connection_.Execute(
-        "REINDEX keyframe_tiles; REINDEX tiles; REINDEX dirty_tiles; REINDEX tombstones");
+    connection_.Execute("REINDEX keyframe_tiles; REINDEX tiles; REINDEX dirty_tiles");
     for (const KeyedTable* table : {&kStates, &kPoseLines, &kKeyframes}) {
       const ToleratedIndexes tolerated(connection_);
+      if (table == &kKeyframes) {
+        RestoreNumbers();
+      }
       RestoreKeys(*table);
       SettleTwinsOf(*table);
       connection_.Execute(table->reindex);
@@ -121,6 +142,23 @@ class KeyRepair {
   }
 
  private:
+  // Of keyframes whose number alone has a turned bit. Those of lines mean nothing.
+  void RestoreNumbers() {
+    for (const std::int64_t id : ListDamagedKeyframeRows(connection_)) {
+      for (int bit = 0; bit < 63; ++bit) {
+        const std::int64_t other = id ^ (std::int64_t{1} << bit);
+        if (IsKeyframeRowOf(connection_, id, other)) {
+          connection_.Prepare("UPDATE OR IGNORE keyframes SET id = ? WHERE id = ?")
+              .Bind(other)
+              .Bind(id)
+              .Run();
+          ++repaired_;
+          break;
+        }
+      }
+    }
+  }
+
   void RestoreKeys(const KeyedTable& table) {
     std::vector<std::int64_t> damaged = table.list_damaged(connection_);
     std::sort(damaged.begin(), damaged.end());
@@ -137,16 +175,7 @@ class KeyRepair {
 
   // A damaged row, if it is one of them, is not the one that stays.
   void SettleTwinsOf(const KeyedTable& table) {
-    std::map<RowKey, std::vector<std::int64_t>> twins;
-    {
-      Query row = connection_.Prepare(table.twins);
-      while (row.Step()) {
-        row.Rewind();
-        const RowKey key{row.Int(), row.Int()};
-        twins[key].push_back(row.Int());
-      }
-    }
-    for (const auto& [key, ids] : twins) {
+    for (const auto& [key, ids] : ListTwins(connection_, table)) {
       std::int64_t kept = ids.front();
       for (const std::int64_t id : std::span(ids).subspan(1)) {
         kept = &table == &kKeyframes ? SettleTwins(connection_, {kept, id, key.first}, author_)
@@ -184,6 +213,27 @@ class KeyRepair {
 
 std::uint32_t RepairKeys(Connection& connection, const std::string& author) {
   return KeyRepair(connection, author).Run();
+}
+
+Status CheckKeyedRows(Connection& connection) {
+  for (const KeyedTable* table : {&kStates, &kPoseLines, &kKeyframes}) {
+    if (!table->list_damaged(connection).empty()) {
+      return {StatusCode::kInvalidData,
+              StrCat("store: rows of table ", table->name, " are damaged")};
+    }
+    for (const auto& [key, ids] : ListTwins(connection, *table)) {
+      const bool is_same =
+          table == &kKeyframes &&
+          std::all_of(ids.begin(), ids.end(), [&, first = ids.front()](std::int64_t id) {
+            return IsSameKeyframe(connection, first, id);
+          });
+      if (!is_same) {
+        return {StatusCode::kInvalidData,
+                StrCat("store: table ", table->name, " has different rows under one key")};
+      }
+    }
+  }
+  return {};
 }
 
 }  // namespace atlas

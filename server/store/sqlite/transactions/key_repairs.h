@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/base/status.h"
 #include "server/store/sqlite/connection/connection.h"
 
 namespace atlas {
@@ -14,5 +15,9 @@ namespace atlas {
 // Then their indexes, and those without such keys, are made anew, but for those of sessions. How
 // many rows were not as they should be.
 std::uint32_t RepairKeys(Connection& connection, const std::string& author);
+
+// Whether it could do more than make indexes anew and drop what was stored twice: damaged rows, or
+// two different ones under a key, are for somebody to decide. kInvalidData names them.
+Status CheckKeyedRows(Connection& connection);
 
 }  // namespace atlas

@@ -107,6 +107,9 @@ class SessionRepair {
   // Of each id and each name one, that is whole.
   Status RepairRows() {
     const ToleratedIndexes tolerated(connection_);
+    for (const std::int64_t id : ListDamagedSessions(connection_)) {
+      RestoreId(id);
+    }
     for (const std::int64_t id : ListLostSessions(connection_)) {
       NameLost(id);
     }
@@ -117,6 +120,21 @@ class SessionRepair {
     ATLAS_RETURN_IF_ERROR(JoinTwins());
     connection_.Execute("REINDEX sessions");
     return {};
+  }
+
+  // Of which one bit turned.
+  void RestoreId(std::int64_t id) {
+    for (int bit = 0; bit < 63; ++bit) {
+      const std::int64_t other = id ^ (std::int64_t{1} << bit);
+      if (IsSessionRowOf(connection_, id, other)) {
+        connection_.Prepare("UPDATE OR IGNORE sessions SET id = ? WHERE id = ?")
+            .Bind(other)
+            .Bind(id)
+            .Run();
+        ++repaired_;
+        return;
+      }
+    }
   }
 
   // Vouched for where the row's checksum is that of what is told by the name.
