@@ -57,17 +57,21 @@ struct PairedTable {
   const char* name;
   const char* scan;
   const char* intact;  // a condition
+  const char* rows;    // itself, as an index
+  const char* copy;    // an index that has all columns, if there is one
 };
 
 constexpr PairedTable kPaired[] = {
     {RowKind::kFootprint, "keyframe_tiles",
      "SELECT tile_key, keyframe_id FROM keyframe_tiles INDEXED BY "
      "sqlite_autoindex_keyframe_tiles_1",
-     "checksum = row_hash(13, tile_key, keyframe_id, revision, is_current)"},
+     "checksum = row_hash(13, tile_key, keyframe_id, revision, is_current)",
+     "sqlite_autoindex_keyframe_tiles_1", "changes_of_tile"},
     {RowKind::kTombstone, "tombstones",
      "SELECT session_id, sequence FROM tombstones INDEXED BY sqlite_autoindex_tombstones_1",
      "checksum = row_hash(10, session_id, sequence, time_ms, blob_bytes, blob_hash, "
-     "compaction_id)"},
+     "compaction_id)",
+     "sqlite_autoindex_tombstones_1", nullptr},
 };
 
 bool IsFound(Connection& connection, const NumberedTable& table, std::int64_t number) {
@@ -223,6 +227,27 @@ void CopyNumbered(Connection& connection, const NumberedTable& table, Numbers nu
                          .c_str());
 }
 
+void CopyPaired(Connection& connection, const PairedTable& table) {
+  for (const char* const index : {table.rows, table.copy}) {
+    if (index != nullptr) {
+      connection.Execute(StrCat("INSERT OR IGNORE INTO rebuilt SELECT * FROM ", table.name,
+                                " INDEXED BY ", index, " WHERE ", table.intact)
+                             .c_str());
+    }
+  }
+}
+
+OrderedTables GroupOf(RowKind kind) {
+  switch (kind) {
+    case RowKind::kTile:
+      return OrderedTables::kTiles;
+    case RowKind::kFootprint:
+      return OrderedTables::kFootprints;
+    default:
+      return OrderedTables::kOthers;
+  }
+}
+
 }  // namespace
 
 void AddOrderChecks(const std::function<Status()>& check_stop,
@@ -241,10 +266,7 @@ void AddOrderChecks(const std::function<Status()>& check_stop,
 std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables which) {
   std::vector<std::string> rebuilt;
   for (const NumberedTable& table : kNumbered) {
-    if ((table.kind == RowKind::kTile) != (which == OrderedTables::kTiles)) {
-      continue;
-    }
-    if (!CheckOrder(connection, table, GoOn).ok()) {
+    if (GroupOf(table.kind) == which && !CheckOrder(connection, table, GoOn).ok()) {
       Numbers numbers = ReadNumbers(connection, table);
       Order(numbers);
       Rebuild(connection, table.kind, table.name,
@@ -253,13 +275,8 @@ std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables 
     }
   }
   for (const PairedTable& table : kPaired) {
-    if (which == OrderedTables::kOthers && !CheckOrder(connection, table, GoOn).ok()) {
-      Rebuild(connection, table.kind, table.name, [&] {
-        connection.Execute(StrCat("INSERT OR IGNORE INTO rebuilt SELECT * FROM ", table.name,
-                                  " INDEXED BY sqlite_autoindex_", table.name, "_1 WHERE ",
-                                  table.intact)
-                               .c_str());
-      });
+    if (GroupOf(table.kind) == which && !CheckOrder(connection, table, GoOn).ok()) {
+      Rebuild(connection, table.kind, table.name, [&] { CopyPaired(connection, table); });
       rebuilt.emplace_back(table.name);
     }
   }

@@ -150,6 +150,7 @@ Result<std::uint32_t> RepairRows(Connection& connection,
   auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
   repaired += static_cast<std::uint32_t>(RestoreIndexes(connection));
   repaired += OrderTables(connection, OrderedTables::kTiles, author);
+  repaired += OrderTables(connection, OrderedTables::kFootprints, author);
   repaired += PutBackLostTiles(connection);
   const SessionNames names = ReadDamagedNames(connection);
   repaired += RepairKeys(connection, author);

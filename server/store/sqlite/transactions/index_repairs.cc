@@ -6,6 +6,7 @@
 #include "server/store/event_types.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_order.h"
+#include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
@@ -37,7 +38,13 @@ Status CheckRowsAreWhole(Connection& connection) {
 Result<std::uint32_t> RepairIndexes(Connection& connection,
                                     std::uint8_t levels,
                                     const std::string& author) {
-  if (Status status = CheckRowsAreWhole(connection); !status.ok()) {
+  // All that a whole row of footprints was made of may be in one of two places.
+  const bool is_ordered = PutTablesInOrder(connection, OrderedTables::kFootprints).empty();
+  Status status = is_ordered ? Status() : CheckTableSum(connection, RowKind::kFootprint);
+  if (status.ok()) {
+    status = CheckRowsAreWhole(connection);
+  }
+  if (!status.ok()) {
     return Error(std::move(status));
   }
   std::uint32_t repaired = 1;
