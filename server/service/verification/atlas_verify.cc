@@ -106,6 +106,7 @@ Status AtlasVerifier::HandleTile(const TileId& id) {
     return marked.error();
   }
   ++report_.restored;
+  ++report_.marks;
   return {};
 }
 

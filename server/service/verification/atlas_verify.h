@@ -26,6 +26,7 @@ struct VerifyReport {
   // mismatched then is what still is.
   std::uint64_t restored = 0;
   std::uint64_t given_up = 0;
+  std::uint64_t marks = 0;  // on tiles: as many revisions that are its own
 };
 
 struct VerifyRequest {

@@ -83,7 +83,7 @@ TEST_F(DamageEndToEndTest, ADamagedLineOfTheLogIsOneOfThemAndHowTheCommandEnds) 
   DaemonProcess daemon(data, kSmall);
   ASSERT_EQ(Ingest(daemon, {"--session", "first"}).exit_code, 0);
   for (const char* const command : {"retract", "restore", "retract"}) {
-    ASSERT_EQ(RunAtlas(daemon.address(), {"session", command, "bus/first"}).exit_code, 0);
+    ASSERT_EQ(RunAtlas(daemon.address(), {"session", command, "vehicle/first"}).exit_code, 0);
   }
   Spoil(data, "UPDATE events SET author = x'FF', subject = 'other' WHERE id = 2");
   const CommandRun log = RunAtlas(daemon.address(), {"log"});

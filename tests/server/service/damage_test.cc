@@ -306,6 +306,23 @@ TEST_F(DamageTest, ATileUnderTheKeyOfAnotherPlaceIsBuiltAgainAtBoth) {
   EXPECT_FALSE(store_->ReadTile({0, 500, 500})->has_value());
 }
 
+// One that is damaged, and cannot be fused, and one that is missing: each look marks the first
+// again.
+TEST_F(DamageTest, AVerificationEndsWhereATileCannotBeFused) {
+  Fill();
+  const TileId stuck = store_->ReadKeyframe(4)->footprint.front();
+  const auto tiles = store_->ListTiles(-1, 1'000).value();
+  const auto missing = std::find_if(tiles.rbegin(), tiles.rend(),
+                                    [](const TileSummary& tile) { return tile.id.level == 0; });
+  Tamper(std::string(kSpoilBlob) + ";UPDATE tiles SET blob = zeroblob(blob_bytes) WHERE key = " +
+         std::to_string(stuck.Key()) +
+         ";DELETE FROM tiles WHERE key = " + std::to_string(missing->id.Key()));
+  const auto report = service_->Verify({.rebuild = true}, {std::chrono::seconds(30), {}});
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_GT(report->damaged, 0U);
+  EXPECT_GT(report->mismatched, 0U);
+}
+
 TEST_F(DamageTest, TilesThatAreListedAndNotFoundAreRepaired) {
   Fill();
   Tamper(testing::LoseTiles("key % 3 = 0"));

@@ -161,6 +161,40 @@ TEST_F(LostKeysTest, ARowWithTheKeyOfAnotherGetsItsOwnBack) {
   }
 }
 
+// Of another keyframe, of one that is damaged, and of none.
+TEST_F(LostKeysTest, AnIndexThatNamesAnotherRowEndsAnUpload) {
+  for (const std::uint8_t mask : std::vector<std::uint8_t>{1, 2, 4, 64}) {
+    SCOPED_TRACE(int{mask});
+    Fill();
+    Tamper("UPDATE keyframes SET time_ms = 1 WHERE id = 4");
+    Close();
+    testing::TurnBits(Database(), "sqlite_autoindex_keyframes_1", {4, 9, 1, 1, 5, 6}, 5, mask);
+    Open(1);
+    for (const std::uint32_t sequence : {5U, 6U, 4U, 20U}) {
+      const auto put = Upload(DriveUpload(sequence));
+      EXPECT_TRUE(put || put.error().code() == StatusCode::kUnavailable) << put.error().message();
+    }
+    Tamper("DELETE FROM keyframes WHERE id = 4");
+    const auto repaired = Repair();
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    EXPECT_TRUE(Upload(DriveUpload(5))->is_duplicate);
+    EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0U);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
+}
+
+// It names a session that never was.
+TEST_F(LostKeysTest, ASessionThatADamagedKeyframeNamesIsNotMade) {
+  Fill();
+  Tamper("UPDATE keyframes SET session_id = 65, time_ms = time_ms + 1 WHERE id = 6");
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(store_->ListSessions({}, 10)->size(), 1U);
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  ExpectWhole(intact_);
+}
+
 // Two lines of one batch: of keyframes 5 and 6.
 TEST_F(LostKeysTest, ALineOfPosesWithTheKeyOfAnotherGetsItsOwnBack) {
   Fill();

@@ -237,6 +237,14 @@ void CopyPaired(Connection& connection, const PairedTable& table) {
   }
 }
 
+// Rows that are damaged, and that an index has a copy of.
+bool HasDamagedCopy(Connection& connection, const PairedTable& table) {
+  return table.copy != nullptr &&
+         connection.Ask(StrCat("SELECT EXISTS (SELECT 1 FROM ", table.name, " INDEXED BY ",
+                               table.rows, " WHERE NOT (", table.intact, "))")
+                            .c_str()) != 0;
+}
+
 OrderedTables GroupOf(RowKind kind) {
   switch (kind) {
     case RowKind::kTile:
@@ -275,7 +283,8 @@ std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables 
     }
   }
   for (const PairedTable& table : kPaired) {
-    if (GroupOf(table.kind) == which && !CheckOrder(connection, table, GoOn).ok()) {
+    if (GroupOf(table.kind) == which &&
+        (!CheckOrder(connection, table, GoOn).ok() || HasDamagedCopy(connection, table))) {
       Rebuild(connection, table.kind, table.name, [&] { CopyPaired(connection, table); });
       rebuilt.emplace_back(table.name);
     }

@@ -152,6 +152,10 @@ Result<std::uint32_t> RepairRows(Connection& connection,
   repaired += OrderTables(connection, OrderedTables::kTiles, author);
   repaired += OrderTables(connection, OrderedTables::kFootprints, author);
   repaired += PutBackLostTiles(connection);
+  {
+    const ToleratedIndexes tolerated(connection);
+    repaired += RestoreTileRows(connection);
+  }
   const SessionNames names = ReadDamagedNames(connection);
   repaired += RepairKeys(connection, author);
   repaired += OrderTables(connection, OrderedTables::kOthers, author);

@@ -50,6 +50,10 @@ Result<std::uint32_t> RepairIndexes(Connection& connection,
   std::uint32_t repaired = 1;
   RestoreIndexes(connection);
   repaired += PutBackLostTiles(connection);
+  {
+    const ToleratedIndexes tolerated(connection);
+    repaired += RestoreTileRows(connection);
+  }
   repaired += RepairKeys(connection, author);
   connection.Execute("REINDEX tombstones; REINDEX sessions");
   AddEvent(connection, {EventKind::kTablesRepaired, author, "indexes",
