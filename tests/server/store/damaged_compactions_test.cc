@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/server/store/store_fixture.h"
+#include "tests/server/store/turned_bits.h"
 
 namespace atlas {
 namespace {
@@ -95,6 +96,25 @@ TEST_F(DamagedCompactionsTest, ANumberWithATurnedBitComesBackWithAllThatStandsTh
       "compactions UNION ALL SELECT 'b' || id || author || revision FROM pose_batches;"
       "CREATE TABLE same (ok CHECK (ok));"
       "INSERT INTO same SELECT count(*) = 6 FROM is_now NATURAL JOIN was");
+}
+
+// The second of three batches: a bit of its number, so that it is out of order and not found.
+TEST_F(DamagedCompactionsTest, ARowOutOfOrderGetsItsPlaceBack) {
+  Live();
+  store_.reset();
+  testing::TurnBits(Database(), "pose_batches", {0x16, 2, 7, 0, 1, 0x19}, 1, 64);
+  Open();
+  EXPECT_NE(store_->CheckIndexes([] { return Status(); }).message().find("table pose_batches"),
+            std::string::npos);
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_EQ(Findings(), "");
+  EXPECT_TRUE(store_->CheckIndexes([] { return Status(); }).ok());
+  EXPECT_EQ(Repair(), 0U);
+  ASSERT_TRUE(Update({{{{"bus", "day"}, 6}, PoseAt(77), {{0, 1, 2}}}}));  // counted as ever
+  EXPECT_EQ(Findings(), "");
+  store_.reset();
+  EXPECT_EQ(testing::AskDatabase(Database(), "SELECT group_concat(id, '') FROM pose_batches"),
+            1234);
 }
 
 // Of what nobody tells any more.
