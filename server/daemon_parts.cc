@@ -88,6 +88,7 @@ ServiceOptions ServiceFrom(const DaemonConfig& config) {
   options.fusion.building.survey_files.max_bytes = static_cast<std::size_t>(config.survey_disk_mib)
                                                    << 20;
   options.scrub.bytes_per_s = config.scrub_kib_per_s * 1024.0;
+  options.scrub.checks_indexes = true;
   options.scrub.between = std::chrono::hours(config.scrub_hours);
   options.sessions_per_hour = static_cast<std::uint32_t>(config.vehicle_sessions_per_hour);
   options.retention.limits.store_bytes = static_cast<std::uint64_t>(config.store_mib) << 20;

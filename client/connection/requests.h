@@ -190,6 +190,7 @@ struct AtlasEvent {
   std::string author;
   std::string subject;
   std::string detail;
+  bool is_damaged = false;  // nothing but its number is known
 };
 
 }  // namespace atlas

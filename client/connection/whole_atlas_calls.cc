@@ -214,7 +214,7 @@ Result<std::vector<AtlasEvent>> AtlasClient::ListEvents(std::uint64_t after_id) 
   std::vector<AtlasEvent> events;
   for (const wire::LogReply::Event& event : reply->log_reply().events()) {
     events.push_back({event.id(), event.revision(), event.time_ms(), event.kind(), event.author(),
-                      event.subject(), event.detail()});
+                      event.subject(), event.detail(), event.damaged()});
   }
   return events;
 }

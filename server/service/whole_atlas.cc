@@ -93,10 +93,11 @@ Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const Patience& pati
     }
     report->revision = after->revision;
     changes_.Notify();  // tiles that are damaged were marked
+    // Its own marks change nothing where tiles cannot be fused: they would be found for ever.
     // A tile that changed between being read and being rebuilt is no mismatch, and a keyframe that
     // was dropped since it was listed no damage: look again.
     const bool is_in_doubt =
-        (rebuild && report->mismatched > 0 && after->revision != clean_revision) ||
+        (rebuild && report->mismatched > 0 && after->revision != clean_revision + report->marks) ||
         (report->damaged > 0 && after->compacted != before->compacted);
     if (!is_in_doubt) {
       return report;

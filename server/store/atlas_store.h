@@ -164,7 +164,12 @@ class AtlasStore : public TileIndex {
   // Counts all rows, adds up their checksums and compares, in one snapshot. kInvalidData where rows
   // vanished.
   virtual Status CheckCounters() = 0;
-  // What happened beside uploads: above `after_id` in order, up to `limit`.
+  // Whether every row is found by its number and by every index, and by them nothing else: what is
+  // not gives wrong answers without an error. Reads all rows and no blobs, of each index in a
+  // snapshot of its own. kInvalidData names each that is damaged; a failed `check_stop` ends it.
+  virtual Status CheckIndexes(const std::function<Status()>& check_stop) = 0;
+  // What happened beside uploads: above `after_id` in order, up to `limit`; damaged ones, too,
+  // which say so.
   virtual Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) = 0;
 };
 

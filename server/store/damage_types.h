@@ -27,8 +27,11 @@ struct KeyframeRepair {
   bool gives_up = false;
 };
 
-// Before keyframes are repaired and after it.
+// The last two before keyframes are repaired and after it.
 enum class TableRepair {
+  // Indexes alone, where the rows that they are made of are whole: kInvalidData else. Every tile is
+  // marked then: what was fused since an index gave wrong answers nobody knows.
+  kIndexes,
   kRows,  // sessions, counters, marks and indexes, by what other rows say
   kSums,  // then what is counted, and what every table should hold, by the rows that are there
 };

@@ -83,6 +83,8 @@ struct Event {
   std::string author;   // name of a certificate or token, or what the client calls itself
   std::string subject;  // a session, say; may be empty
   std::string detail;   // for people
+  // Its row is: `detail` says how, and nothing else is told.
+  bool is_damaged = false;
 };
 
 }  // namespace atlas

@@ -242,7 +242,8 @@ void EventsToWire(const std::vector<Event>& events, wire::LogReply& out) {
     item.set_id(event.id);
     item.set_revision(event.revision);
     item.set_time_ms(event.time_ms);
-    item.set_kind(std::string(EventName(event.kind)));
+    item.set_kind(event.is_damaged ? std::string("damaged") : std::string(EventName(event.kind)));
+    item.set_damaged(event.is_damaged);
     item.set_author(event.author);
     item.set_subject(event.subject);
     item.set_detail(event.detail);

@@ -1,5 +1,6 @@
 #include "server/service/fusion/stored_keyframes.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -16,6 +17,25 @@ std::size_t SizeOf(const Keyframe& keyframe) {
          keyframe.anchors.capacity() * sizeof(std::int16_t);
 }
 
+// Where an index lost a keyframe, and it was stored a second time.
+Status CheckKeysDiffer(const std::vector<FrameOnMap>& frames) {
+  std::vector<const KeyframeKey*> keys;
+  keys.reserve(frames.size());
+  for (const FrameOnMap& frame : frames) {
+    keys.push_back(&frame.key);
+  }
+  const auto is_less = [](const KeyframeKey* a, const KeyframeKey* b) {
+    return *a < *b;
+  };
+  std::sort(keys.begin(), keys.end(), is_less);
+  const auto twin = std::adjacent_find(keys.begin(), keys.end(),
+                                       [](const auto* a, const auto* b) { return *a == *b; });
+  return twin == keys.end()
+             ? Status()
+             : Status(StatusCode::kInvalidData,
+                      StrCat("keyframe ", **twin, " is stored twice: an index is damaged"));
+}
+
 }  // namespace
 
 Result<std::vector<FrameOnMap>> PlaceKeyframes(const std::vector<KeyframeRecord>& records) {
@@ -28,6 +48,9 @@ Result<std::vector<FrameOnMap>> PlaceKeyframes(const std::vector<KeyframeRecord>
     }
     frames.push_back({record.key, record.time_ms, *placement, record.grid,
                       static_cast<std::uint64_t>(record.id)});
+  }
+  if (Status status = CheckKeysDiffer(frames); !status.ok()) {
+    return Error(std::move(status));
   }
   return frames;
 }

@@ -106,7 +106,18 @@ Status AtlasVerifier::HandleTile(const TileId& id) {
     return marked.error();
   }
   ++report_.restored;
+  ++report_.marks;
   return {};
+}
+
+// What lies under the key of another tile is missing at its own, of which nothing else may tell.
+Status AtlasVerifier::HandlePlaceOf(const TileId& id) {
+  const auto tile = store_.ReadTile(id);
+  if (!tile || !*tile) {
+    return {};
+  }
+  const auto decoded = DecodeTile((*tile)->blob, store_.identity().profile);
+  return decoded && decoded->id != id ? HandleTile(decoded->id) : Status();
 }
 
 // Counts damage; every other failure ends the verification.
@@ -237,6 +248,7 @@ Status AtlasVerifier::VerifyTiles() {
       if (const Status status = CheckTile(tile.id); !status.ok()) {
         ATLAS_RETURN_IF_ERROR(Note(status));
         ATLAS_RETURN_IF_ERROR(HandleTile(tile.id));
+        ATLAS_RETURN_IF_ERROR(HandlePlaceOf(tile.id));
       }
     }
     after = static_cast<std::int64_t>(page->back().id.Key());

@@ -26,6 +26,7 @@ struct VerifyReport {
   // mismatched then is what still is.
   std::uint64_t restored = 0;
   std::uint64_t given_up = 0;
+  std::uint64_t marks = 0;  // on tiles: as many revisions that are its own
 };
 
 struct VerifyRequest {
@@ -64,6 +65,7 @@ class AtlasVerifier {
   Status CheckKeyframe(std::int64_t id);
   Status HandleKeyframe(std::int64_t id, const Status& damage);
   Status HandleTile(const TileId& id);
+  Status HandlePlaceOf(const TileId& id);
   // Where it lies, if its row and its pose can be read.
   std::optional<std::vector<TileId>> FootprintOf(std::int64_t id);
   Status CheckTile(const TileId& id);

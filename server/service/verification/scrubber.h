@@ -1,11 +1,14 @@
 // Reads the whole atlas back again and again, at a pace that nobody notices: what is damaged on
 // disk is found before somebody needs it. As a verification without a rebuild: damaged keyframes
-// are listed, damaged tiles built again.
+// are listed, damaged tiles built again. Before it, and first of all after a start, it looks
+// whether the indexes are what their tables are, as fast as it can: what they have else is a wrong
+// answer without an error. They are made anew then, and all that was fused by them.
 #pragma once
 
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <thread>
 
 #include "server/service/change_signal.h"
@@ -18,6 +21,7 @@ struct ScrubOptions {
   double bytes_per_s = 0;  // of blobs; 0: nothing is read
   std::chrono::seconds first_after{60};
   std::chrono::seconds between{24 * 3'600};  // the end of a pass and the next one
+  bool checks_indexes = false;               // whatever else is read
 };
 
 // Since the start.
@@ -40,6 +44,9 @@ class Scrubber {
 
  private:
   void Run(const std::stop_token& stop);
+  void Try(const std::function<void()>& work) const;
+  void CheckIndexes(const std::stop_token& stop);
+  void RepairIndexes();
   void Pass(const std::stop_token& stop);
 
   AtlasStore& store_;

@@ -195,7 +195,10 @@ void Mend(Connection& writer, std::uint8_t levels) {
                         StrCat("session number ", session), "its row was damaged"});
     }  // who needs one that cannot be told, is told so
   }
-  PutBackSessions(writer, sessions);
+  {
+    const ToleratedIndexes tolerated(writer);
+    PutBackSessions(writer, sessions);
+  }
   if (const Status status = CheckMarks(writer); !status.ok()) {
     MarkAllInStore(writer, status.message(), levels);
   }

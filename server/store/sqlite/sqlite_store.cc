@@ -13,6 +13,7 @@
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
+#include "server/store/sqlite/schema/index_check.h"
 #include "server/store/sqlite/schema/stored_bytes.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
@@ -162,11 +163,10 @@ class SqliteStore final : public AtlasStore {
   }
   void RepairTables(TableRepair what, std::string author, Done<std::uint32_t> done) override {
     const std::uint8_t levels = identity_.profile.levels;
-    Write<std::uint32_t>(
-        std::move(done), [what, levels, a = std::move(author)](Connection& connection) {
-          return what == TableRepair::kRows ? RepairRowsInStore(connection, levels, a)
-                                            : RepairSumsInStore(connection, a);
-        });
+    Write<std::uint32_t>(std::move(done),
+                         [what, levels, a = std::move(author)](Connection& connection) {
+                           return RepairTablesInStore(connection, what, levels, a);
+                         });
   }
 
   Result<AtlasFacts> WriteBackup(const std::filesystem::path& file,
@@ -316,6 +316,11 @@ class SqliteStore final : public AtlasStore {
   }
   Status CheckCounters() override {
     return ReadStatus([](Connection& connection) { return atlas::CheckCounters(connection); });
+  }
+
+  Status CheckIndexes(const std::function<Status()>& check_stop) override {
+    return CheckStructure([this](const StructureCheck& check) { return ReadStatus(check); },
+                          check_stop);
   }
 
  private:

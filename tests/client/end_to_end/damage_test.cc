@@ -78,6 +78,27 @@ TEST_F(DamageEndToEndTest, ASecondIngestHealsAndARepairGivesUp) {
   EXPECT_EQ(Digest(daemon), intact);
 }
 
+TEST_F(DamageEndToEndTest, ADamagedLineOfTheLogIsOneOfThemAndHowTheCommandEnds) {
+  const fs::path data = NewData();
+  DaemonProcess daemon(data, kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--session", "first"}).exit_code, 0);
+  for (const char* const command : {"retract", "restore", "retract"}) {
+    ASSERT_EQ(RunAtlas(daemon.address(), {"session", command, "vehicle/first"}).exit_code, 0);
+  }
+  Spoil(data, "UPDATE events SET author = x'FF', subject = 'other' WHERE id = 2");
+  const CommandRun log = RunAtlas(daemon.address(), {"log"});
+  EXPECT_EQ(log.exit_code, 6) << log.out;
+  EXPECT_NE(log.err.find("1 of 3 events damaged"), std::string::npos) << log.err;
+  const auto& events = log.json().at("events").as_array();
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(events[1].at("kind").as_string(), "damaged");
+  EXPECT_TRUE(events[1].at("damaged").as_bool());
+  EXPECT_EQ(events[1].at("id").to_number<int>(), 2);
+  EXPECT_EQ(events[2].at("kind").as_string(), "retract");
+  EXPECT_EQ(RunAtlas(daemon.address(), {"verify", "--repair"}).exit_code, 0);
+  EXPECT_EQ(RunAtlas(daemon.address(), {"log"}).exit_code, 0);
+}
+
 TEST_F(DamageEndToEndTest, ADamagedSessionIsOneOfTheListAndHowTheCommandEnds) {
   const fs::path data = NewData();
   {

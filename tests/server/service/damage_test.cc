@@ -273,6 +273,56 @@ TEST_F(DamageTest, ATileThatIsListedAndNotFoundIsBuiltAgainForItsParent) {
   EXPECT_EQ(Digest().sha256, intact_.sha256);
 }
 
+// Whole, with its checksum: no index tells where it was.
+TEST_F(DamageTest, ATileUnderTheKeyOfAnotherPlaceIsBuiltAgainAtBoth) {
+  Fill();
+  const auto tiles = store_->ListTiles(-1, 2).value();
+  Close();
+  SqliteStoreOptions options;
+  options.directory = directory_ / "data";
+  auto opened = OpenSqliteStore(options);
+  ASSERT_TRUE(opened);
+  const StoredTile tile = (*opened)->ReadTile(tiles[0].id).value().value();
+  ASSERT_TRUE(Await<std::uint32_t>([&](auto done) {
+    (*opened)->MarkDirty({tiles[0].id, {0, 500, 500}}, std::move(done));
+  }));
+  const auto claims = Await<ClaimResult>([&](auto done) {
+    (*opened)->ClaimDirty({"hand", 1, 60'000, 100, 1U << 30}, std::move(done));
+  });
+  for (const TileClaim& claim : claims->claims) {
+    const bool is_here = claim.id == tiles[0].id;
+    ASSERT_TRUE(Await<FinishResult>([&](auto done) {
+      (*opened)->FinishTile(
+          {claim, 1,
+           is_here ? std::nullopt : std::optional(TileContent{tile.blob, tile.payload_hash, 1, 0})},
+          std::move(done));
+    }));
+  }
+  opened->reset();
+  Tamper("DELETE FROM dirty_tiles");
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(Digest().sha256, intact_.sha256);
+  EXPECT_FALSE(store_->ReadTile({0, 500, 500})->has_value());
+}
+
+// One that is damaged, and cannot be fused, and one that is missing: each look marks the first
+// again.
+TEST_F(DamageTest, AVerificationEndsWhereATileCannotBeFused) {
+  Fill();
+  const TileId stuck = store_->ReadKeyframe(4)->footprint.front();
+  const auto tiles = store_->ListTiles(-1, 1'000).value();
+  const auto missing = std::find_if(tiles.rbegin(), tiles.rend(),
+                                    [](const TileSummary& tile) { return tile.id.level == 0; });
+  Tamper(std::string(kSpoilBlob) + ";UPDATE tiles SET blob = zeroblob(blob_bytes) WHERE key = " +
+         std::to_string(stuck.Key()) +
+         ";DELETE FROM tiles WHERE key = " + std::to_string(missing->id.Key()));
+  const auto report = service_->Verify({.rebuild = true}, {std::chrono::seconds(30), {}});
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_GT(report->damaged, 0U);
+  EXPECT_GT(report->mismatched, 0U);
+}
+
 TEST_F(DamageTest, TilesThatAreListedAndNotFoundAreRepaired) {
   Fill();
   Tamper(testing::LoseTiles("key % 3 = 0"));

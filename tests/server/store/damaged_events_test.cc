@@ -64,6 +64,19 @@ TEST_F(DamagedEventsTest, AnEventThatIsDamagedIsNoticedAndRepaired) {
   }
 }
 
+TEST_F(DamagedEventsTest, OnlyTheDamagedOneIsNotTold) {
+  Live();
+  Spoil("UPDATE events SET author = 'mallory' WHERE id = 1");
+  const auto events = store_->ListEvents(0, 50);
+  ASSERT_TRUE(events) << events.error().message();
+  ASSERT_EQ(events->size(), 2U);
+  EXPECT_TRUE(events->front().is_damaged);
+  EXPECT_EQ(events->front().id, 1U);
+  EXPECT_EQ(events->front().author, "");
+  EXPECT_FALSE(events->back().is_damaged);
+  EXPECT_EQ(events->back().id, 2U);
+}
+
 TEST_F(DamagedEventsTest, SoIsABatchOfCorrections) {
   Live();
   Spoil("UPDATE pose_batches SET author = 'mallory', revision = 77");

@@ -380,5 +380,17 @@ TEST_F(DiskTest, AReadOnlyDiskIsRefused) {
   EXPECT_EQ(OpenCode(), StatusCode::kPermissionDenied);
 }
 
+TEST_F(DurabilityTest, ATableThatIsGoneIsDamage) {
+  for (const char* const table : {"sessions", "keyframes", "poses", "tiles", "dirty_tiles",
+                                  "counters", "table_sums", "starts", "events", "meta"}) {
+    SCOPED_TRACE(table);
+    std::filesystem::remove_all(options_.directory);
+    Open();
+    ASSERT_TRUE(Put(MakeKeyframe(1, {{0, 1, 2}})));
+    Tamper(std::string("DROP TABLE ") + table);
+    EXPECT_EQ(OpenCode(), StatusCode::kInvalidData);
+  }
+}
+
 }  // namespace
 }  // namespace atlas

@@ -4,14 +4,23 @@
 
 #include "client/cli/commands/atlas/atlas_commands.h"
 #include "client/cli/output/text_table.h"
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
 
 boost::json::object EventJson(const AtlasEvent& event) {
-  return {{"id", event.id},        {"revision", event.revision}, {"time_ms", event.time_ms},
-          {"kind", event.kind},    {"author", event.author},     {"subject", event.subject},
-          {"detail", event.detail}};
+  return {{"id", event.id},         {"revision", event.revision}, {"time_ms", event.time_ms},
+          {"kind", event.kind},     {"author", event.author},     {"subject", event.subject},
+          {"detail", event.detail}, {"damaged", event.is_damaged}};
+}
+
+// Behind the list: the others are as they were.
+Status CheckDamage(std::uint64_t damaged, std::size_t all) {
+  if (damaged == 0) return {};
+  return {StatusCode::kInvalidData,
+          StrCat("log: ", damaged, " of ", all,
+                 " events damaged: atlas verify --repair keeps that there were some")};
 }
 
 // RFC 3339, UTC.
@@ -42,24 +51,27 @@ class LogCommand : public Command {
     if (!client) return client.error();
     TextTable table({">id", "time", ">revision", "what", "by", "of", "detail"});
     boost::json::array array;
+    std::uint64_t damaged = 0;
     for (std::uint64_t after = after_;;) {
       const auto events = client->ListEvents(after);
       if (!events) return events.error();
       if (events->empty()) break;
       for (const AtlasEvent& event : *events) {
         array.push_back(EventJson(event));
-        table.Row({std::to_string(event.id), TimeText(event.time_ms),
-                   std::to_string(event.revision), event.kind, event.author, event.subject,
-                   event.detail});
+        damaged += event.is_damaged ? 1U : 0U;
+        table.Row({std::to_string(event.id), event.is_damaged ? "" : TimeText(event.time_ms),
+                   event.is_damaged ? "" : std::to_string(event.revision), event.kind, event.author,
+                   event.subject, event.detail});
       }
       after = events->back().id;
     }
+    const std::size_t all = array.size();
     if (context.is_json) {
       context.PrintJson({{"events", std::move(array)}});
     } else {
       table.Print(context.out);
     }
-    return {};
+    return CheckDamage(damaged, all);
   }
 
  private:

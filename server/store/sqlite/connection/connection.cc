@@ -250,6 +250,14 @@ OverwritingDeletions::~OverwritingDeletions() {
   }
 }
 
+ToleratedIndexes::~ToleratedIndexes() {
+  try {
+    connection_.Execute("PRAGMA writable_schema = OFF");
+  } catch (const SQLite::Exception&) {
+    // No statement here writes the schema; what an index lacks is found by who checks them.
+  }
+}
+
 Snapshot::~Snapshot() {
   try {
     if (connection_.is_in_transaction()) {

@@ -166,6 +166,21 @@ class OverwritingDeletions {
   Connection& connection_;
 };
 
+// As long as it is there, rows are written and deleted also where an index has something else of
+// them: who has it makes the indexes anew behind it.
+class ToleratedIndexes {
+ public:
+  explicit ToleratedIndexes(Connection& connection) : connection_(connection) {
+    connection_.Execute("PRAGMA writable_schema = ON");
+  }
+  ToleratedIndexes(const ToleratedIndexes&) = delete;
+  ToleratedIndexes& operator=(const ToleratedIndexes&) = delete;
+  ~ToleratedIndexes();
+
+ private:
+  Connection& connection_;
+};
+
 // A read transaction: everything inside sees one state of the atlas.
 class Snapshot {
  public:

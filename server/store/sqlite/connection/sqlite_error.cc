@@ -40,12 +40,25 @@ bool IsWithoutIndex(const SQLite::Exception& error) {
          std::string_view(error.what()).starts_with("no such index: ");
 }
 
+// What one is told whose table or column is not there, or not as it was made.
+bool IsWithoutTable(const SQLite::Exception& error) {
+  const std::string_view what = error.what();
+  return error.getErrorCode() == SQLITE_ERROR &&
+         (what.starts_with("no such table: ") || what.starts_with("no such column: ") ||
+          what.find(" has no column named ") != std::string_view::npos ||
+          what.find("ON CONFLICT clause does not match") != std::string_view::npos);
+}
+
 }  // namespace
 
 Status StatusFromSqlite(const SQLite::Exception& error) {
   if (IsWithoutIndex(error)) {
     return Status(StatusCode::kInvalidData, StrCat("store: the database is damaged: ", error.what(),
                                                    "; atlas verify --repair makes it anew"));
+  }
+  if (IsWithoutTable(error)) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("store: the database is damaged: ", error.what(), "; restore a backup"));
   }
   const int primary = error.getErrorCode() & 0xFF;
   return Status(CodeOf(primary),

@@ -27,6 +27,10 @@ void KeepVehicleBytes(Connection& connection) {
       "WITHOUT ROWID;"
       "INSERT INTO temp.vehicle_bytes SELECT vehicle, sum(bytes) FROM main.sessions "
       "GROUP BY vehicle");
+  KeepVehicleBytesOfChanges(connection);
+}
+
+void KeepVehicleBytesOfChanges(Connection& connection) {
   const auto trigger = [&connection](const char* event, const std::string& statements) {
     connection.Execute(StrCat("CREATE TEMP TRIGGER vehicle_bytes_", std::string_view(event, 6),
                               " AFTER ", event, " ON main.sessions BEGIN ", statements, " END")

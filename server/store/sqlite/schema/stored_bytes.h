@@ -12,6 +12,8 @@ namespace atlas {
 // statements of this connection keep the sums. In a table of the connection alone, of the same
 // transaction as what it counts: what fails is not counted.
 void KeepVehicleBytes(Connection& connection);
+// The same from now on alone, of a table of sessions that was written anew.
+void KeepVehicleBytesOfChanges(Connection& connection);
 // 0: nothing is stored of it. Of a connection that keeps the sums.
 std::uint64_t ReadVehicleBytes(Connection& connection, const std::string& vehicle);
 

@@ -34,7 +34,9 @@ constexpr SummedTable kTables[] = {
     {RowKind::kTombstone, "tombstones", "SELECT checksum FROM tombstones NOT INDEXED"},
     {RowKind::kStart, "starts", "SELECT checksum FROM starts NOT INDEXED"},
     {RowKind::kCounter, "counters", "SELECT checksum FROM counters NOT INDEXED"},
-    {RowKind::kFootprint, "keyframe_tiles", "SELECT checksum FROM keyframe_tiles NOT INDEXED"},
+    // Without rowids it is an index itself, and SQLite would take a smaller one that has all of it.
+    {RowKind::kFootprint, "keyframe_tiles",
+     "SELECT checksum FROM keyframe_tiles INDEXED BY sqlite_autoindex_keyframe_tiles_1"},
     {RowKind::kDirtyTile, "dirty_tiles", "SELECT checksum FROM dirty_tiles NOT INDEXED"},
     {RowKind::kEvent, "events", "SELECT checksum FROM events NOT INDEXED"},
     {RowKind::kDamagedKeyframe, "damaged_keyframes",
@@ -149,6 +151,19 @@ const SummedTable& Find(RowKind kind) {
                        [kind](const SummedTable& table) { return table.kind == kind; });
 }
 
+// Of the connection alone. SQLite has no XOR: a row that changes tells both checksums.
+void AddTriggers(Connection& connection, const SummedTable& table) {
+  const auto trigger = [&](const char* event, const char* rows, const char* checksums) {
+    connection.Execute(StrCat("CREATE TEMP TRIGGER ", table.name, "_", std::string_view(event, 6),
+                              " AFTER ", event, " ON main.", table.name, " BEGIN SELECT note_row(",
+                              static_cast<int>(table.kind), ", ", rows, ", ", checksums, "); END")
+                           .c_str());
+  };
+  trigger("INSERT", "1", "0, new.checksum");
+  trigger("DELETE", "-1", "old.checksum, 0");
+  trigger("UPDATE OF checksum", "0", "old.checksum, new.checksum");
+}
+
 }  // namespace
 
 void WriteTableSums(Connection& connection) {
@@ -171,8 +186,7 @@ void WithoutCounting(Connection& connection, RowKind table, const std::function<
   changes->Set(table, before);
 }
 
-// Triggers of the connection alone: what others delete is missed. SQLite has no XOR: a row that
-// changes tells both checksums.
+// Triggers of the connection alone: what others delete is missed.
 void KeepTableSums(Connection& connection) {
   SumChanges& changes = connection.Defer(std::make_unique<SumChanges>());
   connection.AddFunction(
@@ -184,16 +198,13 @@ void KeepTableSums(Connection& connection) {
         return 0;
       });
   for (const SummedTable& table : kTables) {
-    const auto trigger = [&](const char* event, const char* rows, const char* checksums) {
-      connection.Execute(StrCat("CREATE TEMP TRIGGER ", table.name, "_", std::string_view(event, 6),
-                                " AFTER ", event, " ON main.", table.name,
-                                " BEGIN SELECT note_row(", static_cast<int>(table.kind), ", ", rows,
-                                ", ", checksums, "); END")
-                             .c_str());
-    };
-    trigger("INSERT", "1", "0, new.checksum");
-    trigger("DELETE", "-1", "old.checksum, 0");
-    trigger("UPDATE OF checksum", "0", "old.checksum, new.checksum");
+    AddTriggers(connection, table);
+  }
+}
+
+void KeepTableSum(Connection& connection, RowKind table) {
+  if (connection.FindDeferred<SumChanges>() != nullptr) {
+    AddTriggers(connection, Find(table));
   }
 }
 

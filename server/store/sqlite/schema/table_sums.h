@@ -17,6 +17,8 @@ void WriteTableSums(Connection& connection);
 void WriteTableSum(Connection& connection, RowKind table);
 // From now on the transactions of this connection keep them, and it writes in no other way.
 void KeepTableSums(Connection& connection);
+// The same of a table that was written anew. Nothing where the connection counts none.
+void KeepTableSum(Connection& connection, RowKind table);
 
 // Runs `restore`, which makes rows what they were written as: their table holds what it should
 // then, and nothing is counted.

@@ -10,17 +10,6 @@
 namespace atlas {
 namespace {
 
-std::int64_t HashOf(const CompactionRow& row) {
-  return RowHash(RowKind::kCompaction)
-      .Int(row.id)
-      .Unsigned(row.revision)
-      .Int(row.before_ms)
-      .Text(row.author)
-      .Unsigned(row.dropped)
-      .Unsigned(row.bytes)
-      .value();
-}
-
 std::int64_t HashOf(const TombstoneRow& row) {
   return RowHash(RowKind::kTombstone)
       .Int(row.session_id)
@@ -113,6 +102,17 @@ std::uint64_t CountTombstones(Connection& connection, std::int64_t compaction_id
 
 }  // namespace
 
+std::int64_t HashOf(const CompactionRow& row) {
+  return RowHash(RowKind::kCompaction)
+      .Int(row.id)
+      .Unsigned(row.revision)
+      .Int(row.before_ms)
+      .Text(row.author)
+      .Unsigned(row.dropped)
+      .Unsigned(row.bytes)
+      .value();
+}
+
 void WriteCompaction(Connection& connection, const CompactionRow& row) {
   connection
       .Prepare(
@@ -183,7 +183,7 @@ Result<std::uint64_t> DeleteTombstones(Connection& connection, std::int64_t sess
     }
     compaction->dropped -= loss.dropped;
     compaction->bytes -= loss.bytes;
-    connection.Prepare("DELETE FROM compactions WHERE id = ?").Bind(compaction_id).Run();
+    DeleteCompaction(connection, compaction_id);
     WriteCompaction(connection, *compaction);
     deleted += loss.dropped;
   }
@@ -209,6 +209,54 @@ Status CheckTombstones(Connection& connection, std::int64_t session_id, std::uin
              : Status(StatusCode::kInvalidData,
                       StrCat("store: session ", session_id, " counts ", expected,
                              " dropped keyframes, and ", found, " tombstones are there"));
+}
+
+std::vector<TombstoneRow> ListDamagedTombstones(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT session_id, sequence, time_ms, blob_bytes, blob_hash, compaction_id, checksum "
+      "FROM tombstones");
+  std::vector<TombstoneRow> damaged;
+  while (row.Step()) {
+    if (!ReadTombstone(row)) {
+      row.Rewind();
+      TombstoneRow tombstone;
+      tombstone.session_id = row.Int();
+      tombstone.sequence = row.Unsigned32();
+      damaged.push_back(tombstone);
+    }
+  }
+  return damaged;
+}
+
+void DeleteTombstone(Connection& connection, std::int64_t session_id, std::uint32_t sequence) {
+  connection.Prepare("DELETE FROM tombstones WHERE session_id = ? AND sequence = ?")
+      .Bind(session_id)
+      .Bind(sequence)
+      .Run();
+}
+
+std::vector<StoredCompaction> ListCompactions(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT id, revision, before_ms, author, dropped, bytes, checksum, "
+      "(SELECT count(*) FROM tombstones WHERE compaction_id = id), "
+      "(SELECT coalesce(sum(blob_bytes), 0) FROM tombstones WHERE compaction_id = id) "
+      "FROM compactions ORDER BY id");
+  std::vector<StoredCompaction> compactions;
+  while (row.Step()) {
+    row.Rewind();
+    StoredCompaction stored;
+    CompactionRow& r = stored.row;
+    r = {row.Int(), row.Unsigned(), row.Int(), row.Text(), row.Unsigned(), row.Unsigned()};
+    stored.checksum = row.Int();
+    stored.tombstones = row.Unsigned();
+    stored.tombstone_bytes = row.Unsigned();
+    compactions.push_back(std::move(stored));
+  }
+  return compactions;
+}
+
+void DeleteCompaction(Connection& connection, std::int64_t id) {
+  connection.Prepare("DELETE FROM compactions WHERE id = ?").Bind(id).Run();
 }
 
 Status CheckCompactionRows(Connection& connection) {

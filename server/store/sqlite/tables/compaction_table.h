@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/status.h"
 #include "core/geometry/keyframe_key.h"
@@ -20,7 +21,20 @@ struct CompactionRow {
   std::uint64_t dropped = 0;  // keyframes
   std::uint64_t bytes = 0;    // of their blobs
 };
+// Its checksum.
+std::int64_t HashOf(const CompactionRow& row);
 void WriteCompaction(Connection& connection, const CompactionRow& row);
+void DeleteCompaction(Connection& connection, std::int64_t id);
+
+// As its columns have it, and what is left of it.
+struct StoredCompaction {
+  CompactionRow row;
+  std::int64_t checksum = 0;
+  std::uint64_t tombstones = 0;
+  std::uint64_t tombstone_bytes = 0;
+};
+// By their ids, damaged or not.
+std::vector<StoredCompaction> ListCompactions(Connection& connection);
 
 // A keyframe that was dropped.
 struct TombstoneRow {
@@ -42,6 +56,9 @@ bool HasTombstoneBetween(Connection& connection,
                          std::int64_t session_id,
                          std::uint32_t after,
                          std::uint32_t before);
+// Of damaged ones only session and sequence number are told, as their columns have them.
+std::vector<TombstoneRow> ListDamagedTombstones(Connection& connection);
+void DeleteTombstone(Connection& connection, std::int64_t session_id, std::uint32_t sequence);
 // All of a session, and out of what their compactions say that they dropped. How many.
 Result<std::uint64_t> DeleteTombstones(Connection& connection, std::int64_t session_id);
 

@@ -71,6 +71,35 @@ Status DamageOf(const Event& event) {
           StrCat("store: event ", event.id, " is damaged: wrong checksum")};
 }
 
+// Nothing of it but its number.
+Event DamagedEvent(std::uint64_t id) {
+  Event event;
+  event.id = id;
+  event.detail = "its row is damaged: wrong checksum";
+  event.is_damaged = true;
+  return event;
+}
+
+// Numbers rise, so that who goes on behind the last one comes to an end: a damaged one that does
+// not fit between its neighbours was another, and the one behind the former is free.
+void PutInOrder(std::vector<Event>& events, std::uint64_t after_id) {
+  std::uint64_t last = after_id;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    Event& event = events[i];
+    const bool fits = i + 1 == events.size() || event.id < events[i + 1].id;
+    if (event.is_damaged && (event.id <= last || !fits)) {
+      event.id = last + 1;
+    }
+    last = std::max(last, event.id);
+  }
+  last = after_id;
+  std::erase_if(events, [&last](const Event& event) {
+    const bool is_out_of_order = event.id <= last;
+    last = std::max(last, event.id);
+    return is_out_of_order;
+  });
+}
+
 }  // namespace
 
 void AddEvent(Connection& connection, const NewEvent& event) {
@@ -80,7 +109,8 @@ void AddEvent(Connection& connection, const NewEvent& event) {
                   event.kind,
                   event.author,
                   event.subject,
-                  event.detail};
+                  event.detail,
+                  false};
   connection
       .Prepare(
           "INSERT INTO events (id, revision, time_ms, kind, author, subject, detail, checksum) "
@@ -106,11 +136,9 @@ Result<std::vector<Event>> ReadEvents(Connection& connection,
   std::vector<Event> events;
   while (row.Step()) {
     std::optional<Event> event = ReadEvent(row);
-    if (!event) {
-      return Error(DamageOf(ReadColumns(row)));
-    }
-    events.push_back(*std::move(event));
+    events.push_back(event ? *std::move(event) : DamagedEvent(ReadColumns(row).id));
   }
+  PutInOrder(events, after_id);
   return events;
 }
 

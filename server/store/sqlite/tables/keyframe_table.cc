@@ -6,10 +6,10 @@
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
-#include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/keyframe_row.h"
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
@@ -17,66 +17,6 @@
 
 namespace atlas {
 namespace {
-
-// Everything in the row but the blob, which has a hash of its own.
-struct Row {
-  KeyframeRow row;
-  std::int64_t shard = 0;
-  std::uint64_t revision = 0;
-  std::optional<PositionPrior> prior = {};
-};
-
-void AddCommon(RowHash& hash, const KeyframeRow& row) {
-  hash.Int(row.record.id).Int(row.session_id).Int(row.record.key.sequence).Int(row.record.time_ms);
-  hash.Int(row.record.grid.cell_size_um).Int(row.record.grid.radius_cells);
-  for (const std::int32_t part : row.record.level_quaternion) {
-    hash.Int(part);
-  }
-  hash.Int(row.blob_bytes).Unsigned(row.blob_hash);
-}
-
-std::int64_t HashOf(const Row& row) {
-  RowHash hash(RowKind::kKeyframe);
-  AddCommon(hash, row.row);
-  hash.Int(row.shard).Unsigned(row.revision).Int(row.prior ? 1 : 0);
-  const PositionPrior prior = row.prior.value_or(PositionPrior{});
-  return hash.Int(prior.x_um).Int(prior.y_um).Int(prior.z_um).Int(prior.radius_mm).value();
-}
-
-// Of rows that earlier versions of the schema wrote: to write them anew is to write their blobs.
-std::int64_t FormerHashOf(const Row& row) {
-  RowHash hash(RowKind::kFormerKeyframe);
-  AddCommon(hash, row.row);
-  return hash.value();
-}
-
-// Columns: id to blob_hash, shard, revision, whether there is a prior, the prior, checksum.
-Result<KeyframeRow> ReadRow(Query& query) {
-  Row row;
-  KeyframeRecord& r = row.row.record;
-  r.id = query.Int();
-  row.row.session_id = query.Int();
-  r.key.sequence = query.Unsigned32();
-  r.time_ms = query.Int();
-  r.grid.cell_size_um = query.Unsigned32();
-  r.grid.radius_cells = query.Int32();
-  for (std::int32_t& part : r.level_quaternion) {
-    part = query.Int32();
-  }
-  row.row.blob_bytes = query.Unsigned32();
-  row.row.blob_hash = query.Unsigned();
-  row.shard = query.Int();
-  row.revision = query.Unsigned();
-  const bool has_prior = query.Int() != 0;
-  const PositionPrior prior{query.Int(), query.Int(), query.Int(), query.Unsigned32()};
-  row.prior = has_prior ? std::optional(prior) : std::nullopt;
-  const std::int64_t checksum = query.Int();
-  if (checksum != HashOf(row) && checksum != FormerHashOf(row)) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("store: the row of keyframe ", r.id, " is damaged: wrong checksum"));
-  }
-  return std::move(row.row);
-}
 
 std::vector<std::int64_t> ReadIds(Query& row) {
   std::vector<std::int64_t> ids;
@@ -102,7 +42,7 @@ void WriteRow(Connection& connection,
               std::int64_t id,
               std::int64_t session_id,
               std::uint64_t revision) {
-  Row row;
+  FullKeyframeRow row;
   row.row.record = {
       id, keyframe.key, keyframe.time_ms, keyframe.grid, keyframe.level_quaternion, {}, {}};
   row.row.session_id = session_id;
@@ -131,35 +71,28 @@ void WriteRow(Connection& connection,
 Result<std::optional<KeyframeRow>> FindKeyframeRow(Connection& connection,
                                                    std::int64_t session_id,
                                                    std::uint32_t sequence) {
-  Query row = connection.Prepare(
-      "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
-      "level_qy, level_qz, blob_bytes, blob_hash, shard, revision, prior_x_um IS NOT NULL, "
-      "coalesce(prior_x_um, 0), coalesce(prior_y_um, 0), coalesce(prior_z_um, 0), "
-      "coalesce(prior_radius_mm, 0), checksum FROM keyframes WHERE session_id = ? AND sequence = "
-      "?");
+  Query row = connection.Prepare("SELECT " KEYFRAME_COLUMNS
+                                 " FROM keyframes WHERE session_id = ? AND sequence = ?");
   row.Bind(session_id).Bind(sequence);
   if (!row.Step()) {
     return std::nullopt;
   }
-  auto result = ReadRow(row);
+  auto result = ReadFullKeyframeRow(row);
   if (!result) {
     return Error(result.error());
   }
-  return std::move(*result);
+  return std::move(result->row);
 }
 
 Result<KeyframeRow> ReadKeyframeRow(Connection& connection, std::int64_t id) {
-  Query row = connection.Prepare(
-      "SELECT id, session_id, sequence, time_ms, cell_size_um, radius_cells, level_qw, level_qx, "
-      "level_qy, level_qz, blob_bytes, blob_hash, shard, revision, prior_x_um IS NOT NULL, "
-      "coalesce(prior_x_um, 0), coalesce(prior_y_um, 0), coalesce(prior_z_um, 0), "
-      "coalesce(prior_radius_mm, 0), checksum FROM keyframes WHERE id = ?");
+  Query row = connection.Prepare("SELECT " KEYFRAME_COLUMNS " FROM keyframes WHERE id = ?");
   row.Bind(id);
   if (!row.Step()) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the row of keyframe ", id, " is missing"));
   }
-  return ReadRow(row);
+  auto result = ReadFullKeyframeRow(row);
+  return result ? Result<KeyframeRow>(std::move(result->row)) : Error(result.error());
 }
 
 Result<KeyframeRecord> ReadKeyframeRecord(Connection& connection, std::int64_t id) {

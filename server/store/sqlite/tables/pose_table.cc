@@ -129,9 +129,22 @@ struct PoseBatchRow {
   std::string author;
   std::uint64_t updated = 0;
   std::uint64_t if_revision = 0;
+  std::int64_t checksum = 0;  // as stored
 
   std::int64_t Hash() const { return HashOfBatch(id, revision, author, updated, if_revision); }
 };
+
+// With which the row is whole.
+std::optional<std::uint64_t> IdOneBitAway(PoseBatchRow batch) {
+  const std::uint64_t stored = batch.id;
+  for (int bit = 0; bit < 63; ++bit) {
+    batch.id = stored ^ (std::uint64_t{1} << bit);
+    if (batch.Hash() == batch.checksum) {
+      return batch.id;
+    }
+  }
+  return std::nullopt;
+}
 
 // The first `most`.
 std::vector<PoseBatchRow> ListDamagedBatches(Connection& connection, std::size_t most) {
@@ -146,7 +159,8 @@ std::vector<PoseBatchRow> ListDamagedBatches(Connection& connection, std::size_t
     batch.author = row.Text();
     batch.updated = row.Unsigned();
     batch.if_revision = row.Unsigned();
-    if (row.Int() != batch.Hash()) {
+    batch.checksum = row.Int();
+    if (batch.checksum != batch.Hash()) {
       damaged.push_back(std::move(batch));
     }
   }
@@ -271,6 +285,30 @@ int DeleteDamagedPoses(Connection& connection, std::int64_t keyframe_id) {
   return static_cast<int>(damaged.size());
 }
 
+std::vector<std::int64_t> ListDamagedPoseLines(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum, "
+      "id FROM pose_history NOT INDEXED");
+  std::vector<std::int64_t> damaged;
+  while (row.Step()) {
+    if (!ReadHistoryRow(row)) {
+      damaged.push_back(row.Int());
+    }
+  }
+  return damaged;
+}
+
+bool IsPoseLineUnder(Connection& connection,
+                     std::int64_t id,
+                     std::int64_t keyframe_id,
+                     std::int64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT ?2, ?3, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "
+      "FROM pose_history WHERE id = ?1");
+  row.Bind(id).Bind(keyframe_id).Bind(revision);
+  return row.Step() && ReadHistoryRow(row).has_value();
+}
+
 void DeletePoses(Connection& connection, std::int64_t keyframe_id) {
   connection.Prepare("DELETE FROM poses WHERE keyframe_id = ?").Bind(keyframe_id).Run();
   connection.Prepare("DELETE FROM pose_history WHERE keyframe_id = ?").Bind(keyframe_id).Run();
@@ -300,17 +338,29 @@ Status CheckPoseBatches(Connection& connection) {
 }
 
 int RepairPoseBatches(Connection& connection) {
+  const std::uint64_t most = ReadCounter(connection, Counter::kBatch);
   const std::vector<PoseBatchRow> damaged =
       ListDamagedBatches(connection, std::numeric_limits<std::size_t>::max());
   for (PoseBatchRow batch : damaged) {
-    batch.author = kAtlasItself;
-    batch.revision = std::min(batch.revision, ReadCounter(connection, Counter::kRevision));
+    const std::uint64_t stored = batch.id;
+    if (const auto id = IdOneBitAway(batch)) {
+      batch.id = *id;
+    } else if (stored == 0 || stored > most) {
+      connection.Prepare("DELETE FROM pose_batches WHERE id = ?").Bind(stored).Run();
+      continue;
+    } else {
+      batch.author = kAtlasItself;
+      batch.revision = std::min(batch.revision, ReadCounter(connection, Counter::kRevision));
+    }
     connection
-        .Prepare("UPDATE pose_batches SET revision = ?, author = ?, checksum = ? WHERE id = ?")
+        .Prepare(
+            "UPDATE OR REPLACE pose_batches SET id = ?, revision = ?, author = ?, checksum = ? "
+            "WHERE id = ?")
+        .Bind(batch.id)
         .Bind(batch.revision)
         .Bind(std::string_view(batch.author))
         .Bind(batch.Hash())
-        .Bind(batch.id)
+        .Bind(stored)
         .Run();
   }
   return static_cast<int>(damaged.size());

@@ -46,6 +46,13 @@ void WritePose(Connection& connection, const PoseChange& change);
 bool RestorePose(Connection& connection, std::int64_t keyframe_id, const std::string& author);
 // Takes damaged lines out of the history. How many.
 int DeleteDamagedPoses(Connection& connection, std::int64_t keyframe_id);
+// Of lines of the history whose checksum is wrong: the numbers of their rows.
+std::vector<std::int64_t> ListDamagedPoseLines(Connection& connection);
+// Whether the line of that row would be intact under another key.
+bool IsPoseLineUnder(Connection& connection,
+                     std::int64_t id,
+                     std::int64_t keyframe_id,
+                     std::int64_t revision);
 
 // The current pose and the whole history.
 void DeletePoses(Connection& connection, std::int64_t keyframe_id);
@@ -53,7 +60,8 @@ void DeletePoses(Connection& connection, std::int64_t keyframe_id);
 void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
 // kInvalidData names the first batch whose row is damaged.
 Status CheckPoseBatches(Connection& connection);
-// Of damaged ones nobody knows whose they were. How many.
+// One whose number alone has a turned bit gets it back; of others nobody knows whose they were, and
+// one with a number that was never given goes. How many.
 int RepairPoseBatches(Connection& connection);
 
 }  // namespace atlas

@@ -131,6 +131,29 @@ Status CheckSessionStates(Connection& connection, std::int64_t session_id, Sessi
   return last == current ? Status() : Missing(session_id);
 }
 
+std::vector<std::int64_t> ListDamagedSessionStates(Connection& connection) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum, id "
+      "FROM session_states NOT INDEXED");
+  std::vector<std::int64_t> damaged;
+  while (row.Step()) {
+    if (!ReadRow(row)) {
+      damaged.push_back(row.Int());
+    }
+  }
+  return damaged;
+}
+
+bool IsSessionStateUnder(Connection& connection,
+                         std::int64_t id,
+                         std::int64_t session_id,
+                         std::int64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT ?2, ?3, state, author, reason, checksum FROM session_states WHERE id = ?1");
+  row.Bind(id).Bind(session_id).Bind(revision);
+  return row.Step() && ReadRow(row).has_value();
+}
+
 void DeleteSessionStates(Connection& connection, std::int64_t session_id) {
   connection.Prepare("DELETE FROM session_states WHERE session_id = ?").Bind(session_id).Run();
 }

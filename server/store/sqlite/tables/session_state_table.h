@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/base/status.h"
 #include "server/store/session_types.h"
@@ -31,6 +32,13 @@ Result<std::string> ReadStateReason(Connection& connection, std::int64_t session
 Result<SessionState> ReadStateBeforeRetraction(Connection& connection, std::int64_t session_id);
 // kInvalidData when a line is damaged or the last is not the current state.
 Status CheckSessionStates(Connection& connection, std::int64_t session_id, SessionState current);
+// Of lines whose checksum is wrong: the numbers of their rows.
+std::vector<std::int64_t> ListDamagedSessionStates(Connection& connection);
+// Whether the line of that row would be intact under another key.
+bool IsSessionStateUnder(Connection& connection,
+                         std::int64_t id,
+                         std::int64_t session_id,
+                         std::int64_t revision);
 void DeleteSessionStates(Connection& connection, std::int64_t session_id);
 
 }  // namespace atlas

@@ -15,9 +15,10 @@
 
 // Of a whole row, as ReadRow and WriteSession have them: statements are kept by the address of a
 // literal.
-#define SESSION_COLUMNS                                                                         \
-  "id, vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, last_sequence, " \
+#define SESSION_COLUMNS_BEHIND_ID                                                           \
+  "vehicle, session, state, keyframes, bytes, first_time_ms, last_time_ms, last_sequence, " \
   "compacted, checksum"
+#define SESSION_COLUMNS "id, " SESSION_COLUMNS_BEHIND_ID
 
 namespace atlas {
 namespace {
@@ -36,6 +37,15 @@ std::int64_t HashOf(const SessionRow& row) {
       .Int(r.last_sequence)
       .Unsigned(r.compacted)
       .value();
+}
+
+// All columns but the first.
+Query& BindBehindId(Query& query, const SessionRow& row) {
+  const SessionRecord& r = row.record;
+  query.Bind(std::string_view(r.key.vehicle)).Bind(std::string_view(r.key.session));
+  query.Bind(static_cast<std::int64_t>(r.state)).Bind(r.keyframes).Bind(r.bytes);
+  query.Bind(r.first_time_ms).Bind(r.last_time_ms).Bind(r.last_sequence).Bind(r.compacted);
+  return query.Bind(HashOf(row));
 }
 
 // Of a row of SESSION_COLUMNS.
@@ -208,22 +218,10 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key) {
 }
 
 void WriteSession(Connection& connection, const SessionRow& row) {
-  const SessionRecord& r = row.record;
-  connection
-      .Prepare("INSERT OR REPLACE INTO sessions (" SESSION_COLUMNS
-               ") VALUES (?,?,?,?,?,?,?,?,?,?,?)")
-      .Bind(row.id)
-      .Bind(std::string_view(r.key.vehicle))
-      .Bind(std::string_view(r.key.session))
-      .Bind(static_cast<std::int64_t>(r.state))
-      .Bind(r.keyframes)
-      .Bind(r.bytes)
-      .Bind(r.first_time_ms)
-      .Bind(r.last_time_ms)
-      .Bind(r.last_sequence)
-      .Bind(r.compacted)
-      .Bind(HashOf(row))
-      .Run();
+  Query insert = connection.Prepare("INSERT OR REPLACE INTO sessions (" SESSION_COLUMNS
+                                    ") VALUES (?,?,?,?,?,?,?,?,?,?,?)");
+  insert.Bind(row.id);
+  BindBehindId(insert, row).Run();
 }
 
 std::uint64_t CountQuarantined(Connection& connection) {
@@ -244,22 +242,63 @@ std::vector<std::int64_t> ListDamagedSessions(Connection& connection) {
   return damaged;
 }
 
+bool IsSessionRowOf(Connection& connection, std::int64_t id, std::int64_t other) {
+  Query row =
+      connection.Prepare("SELECT ?2, " SESSION_COLUMNS_BEHIND_ID " FROM sessions WHERE id = ?1");
+  row.Bind(id).Bind(other);
+  return row.Step() && ReadRow(row).has_value();
+}
+
+std::optional<SessionKey> NameByIndex(Connection& connection, std::int64_t id) {
+  Query names = connection.Prepare(
+      "SELECT vehicle, session FROM sessions INDEXED BY sqlite_autoindex_sessions_1 "
+      "WHERE vehicle >= '' AND id = ?");
+  names.Bind(id);
+  if (!names.Step()) {
+    return std::nullopt;
+  }
+  SessionKey key;
+  key.vehicle = names.Text();
+  key.session = names.Text();
+  return IsNamed(key) ? std::optional(std::move(key)) : std::nullopt;
+}
+
+std::optional<SessionKey> NameByRow(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare("SELECT vehicle, session FROM sessions NOT INDEXED WHERE id = ?");
+  row.Bind(id);
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  SessionKey key;
+  key.vehicle = row.Text();
+  key.session = row.Text();
+  return IsNamed(key) ? std::optional(std::move(key)) : std::nullopt;
+}
+
+bool IsNameOfAnother(Connection& connection, const SessionKey& key, std::int64_t id) {
+  Query row = connection.Prepare(
+      "SELECT 1 FROM sessions NOT INDEXED WHERE vehicle = ? AND session = ? AND id <> ?");
+  row.Bind(std::string_view(key.vehicle)).Bind(std::string_view(key.session)).Bind(id);
+  return row.Step();
+}
+
 Result<SessionRow> TellSession(Connection& connection, std::int64_t id, Vouching vouching) {
+  const auto name = NameByIndex(connection, id);
+  if (!name) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the index of session ", id, " is damaged, as is its row"));
+  }
+  return TellNamedSession(connection, id, *name, vouching);
+}
+
+Result<SessionRow> TellNamedSession(Connection& connection,
+                                    std::int64_t id,
+                                    const SessionKey& name,
+                                    Vouching vouching) {
   SessionRow row;
   row.id = id;
   SessionRecord& r = row.record;
-  {
-    Query names = connection.Prepare(
-        "SELECT vehicle, session FROM sessions INDEXED BY sqlite_autoindex_sessions_1 "
-        "WHERE vehicle >= '' AND id = ?");
-    names.Bind(id);
-    if (!names.Step()) {
-      return Error(StatusCode::kInvalidData,
-                   StrCat("store: the index of session ", id, " is damaged, as is its row"));
-    }
-    r.key.vehicle = names.Text();
-    r.key.session = names.Text();
-  }
+  r.key = name;
   const auto state = ReadSessionStateAt(connection, id, std::numeric_limits<std::int64_t>::max());
   if (!state) {
     return Error(state.error());
@@ -282,14 +321,15 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
   return {};
 }
 
+// A row that is replaced would find what an index still has of itself in its way.
 void PutBackSessions(Connection& connection, const std::vector<SessionRow>& rows) {
-  if (rows.empty()) {
-    return;
-  }
-  connection.Execute("REINDEX sessions");
   WithoutCounting(connection, RowKind::kSession, [&] {
     for (const SessionRow& row : rows) {
-      WriteSession(connection, row);
+      Query update = connection.Prepare(
+          "UPDATE sessions SET vehicle = ?, session = ?, state = ?, keyframes = ?, bytes = ?, "
+          "first_time_ms = ?, last_time_ms = ?, last_sequence = ?, compacted = ?, checksum = ? "
+          "WHERE id = ?");
+      BindBehindId(update, row).Bind(row.id).Run();
     }
   });
 }

@@ -33,6 +33,8 @@ Status CheckSessionHistory(Connection& connection, const SessionKey& key);
 std::uint64_t CountQuarantined(Connection& connection);
 // Ids of those whose rows are damaged.
 std::vector<std::int64_t> ListDamagedSessions(Connection& connection);
+// Whether the row would be intact with another id.
+bool IsSessionRowOf(Connection& connection, std::int64_t id, std::int64_t other);
 // What the row was, from the index of names, the history of states and the keyframes. kInvalidData
 // when the history does not tell, or the row's checksum speaks against it, unless that is not to
 // count any more.
@@ -41,8 +43,18 @@ Result<SessionRow> TellSession(Connection& connection, std::int64_t id, Vouching
 // Writes it anew. SQLite does not, and throws, where an index has something else than the damaged
 // row.
 Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching);
-// Writes rows anew whatever indexes have. Of other damaged rows the index of names says no more
-// what they were called.
+// The same of one whose name is known.
+Result<SessionRow> TellNamedSession(Connection& connection,
+                                    std::int64_t id,
+                                    const SessionKey& name,
+                                    Vouching vouching);
+// What the index of names and the row itself, damaged or not, call it. Nothing: no name.
+std::optional<SessionKey> NameByIndex(Connection& connection, std::int64_t id);
+std::optional<SessionKey> NameByRow(Connection& connection, std::int64_t id);
+// By the rows.
+bool IsNameOfAnother(Connection& connection, const SessionKey& key, std::int64_t id);
+// Writes damaged rows anew. SQLite throws where an index has something else, unless it is told not
+// to.
 void PutBackSessions(Connection& connection, const std::vector<SessionRow>& rows);
 // Counts what is stored of each. How many counted something else.
 int RecountSessions(Connection& connection);

@@ -74,4 +74,24 @@ Status CheckStarts(Connection& connection) {
              : Status(StatusCode::kInvalidData, "store: a start is damaged: wrong checksum");
 }
 
+int DropUnknownStarts(Connection& connection) {
+  std::int64_t last = 0;
+  bool is_damaged = false;
+  {
+    Query row = connection.Prepare("SELECT number, id, revision, checksum FROM starts");
+    while (row.Step()) {
+      row.Rewind();
+      const std::int64_t number = row.Int();
+      const Bytes id = row.Blob();
+      const std::uint64_t revision = row.Unsigned();
+      if (id.size() != AtlasStart().id.size() || row.Int() != HashOf(number, id, revision)) {
+        last = is_damaged ? std::max(last, number) : number;
+        is_damaged = true;
+      }
+    }
+  }
+  return is_damaged ? connection.Prepare("DELETE FROM starts WHERE number <= ?").Bind(last).Run()
+                    : 0;
+}
+
 }  // namespace atlas

@@ -18,5 +18,7 @@ std::uint64_t NextRevision(Connection& connection);
 std::vector<AtlasStart> ReadStarts(Connection& connection);
 // kInvalidData when a row is damaged.
 Status CheckStarts(Connection& connection);
+// Damaged ones and all before them, of which nothing is known. How many.
+int DropUnknownStarts(Connection& connection);
 
 }  // namespace atlas

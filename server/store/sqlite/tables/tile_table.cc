@@ -270,6 +270,46 @@ std::uint32_t PutBackLostTiles(Connection& connection) {
   return put_back;
 }
 
+std::uint32_t RestoreTileRows(Connection& connection) {
+  std::vector<TileRow> told;
+  {
+    Query query = connection.Prepare(kByTable);
+    query.Bind(std::numeric_limits<std::int64_t>::min()).Bind(kLastKey).Bind(kNoLimit);
+    while (query.Step()) {
+      query.Rewind();
+      TileRow row;
+      row.key = query.Unsigned();
+      ReadNumbers(query, row);
+      const auto id = TileId::FromKey(row.key);
+      if (row.checksum == row.ExpectedChecksum() || !id) {
+        continue;
+      }
+      if (auto listed = ReadListed(connection, *id)) {
+        told.push_back(*std::move(listed));
+      }
+    }
+  }
+  WithoutCounting(connection, RowKind::kTile, [&] {
+    for (const TileRow& row : told) {
+      connection
+          .Prepare(
+              "UPDATE tiles SET revision = ?, fused_revision = ?, payload_hash = ?, cells = ?, "
+              "multilayer_cells = ?, blob_bytes = ?, blob_hash = ?, checksum = ? WHERE key = ?")
+          .Bind(row.revision)
+          .Bind(row.fused_revision)
+          .Bind(row.payload_hash)
+          .Bind(row.cells)
+          .Bind(row.multilayer_cells)
+          .Bind(row.blob_bytes)
+          .Bind(row.blob_hash)
+          .Bind(row.checksum)
+          .Bind(row.key)
+          .Run();
+    }
+  });
+  return static_cast<std::uint32_t>(told.size());
+}
+
 void ScanTileRows(Connection& connection,
                   const TileRect& rect,
                   const std::function<void(const TileSummary&)>& visit) {

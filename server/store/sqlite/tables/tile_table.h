@@ -25,6 +25,9 @@ bool StoreTile(Connection& connection,
 // Rows that are not found and that the index lists, so that whoever makes the index anew does not
 // forget them: they are damaged from then on. How many.
 std::uint32_t PutBackLostTiles(Connection& connection);
+// Damaged rows become again what the index has of them; SQLite is to be told not to mind what else
+// it has. How many.
+std::uint32_t RestoreTileRows(Connection& connection);
 
 void ScanTileRows(Connection& connection,
                   const TileRect& rect,

@@ -8,6 +8,7 @@
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
+#include "server/store/sqlite/tables/start_table.h"
 
 namespace atlas {
 namespace {
@@ -91,8 +92,8 @@ Status CheckCounters(Connection& connection) {
       add(StrCat("store: counter ", recount.name, " is ", counted, ", and the rows say ", found));
     }
   }
-  for (const auto check :
-       {&CheckTableSums, &CheckIndexes, &CheckStructure, &CheckEvents, &CheckPoseBatches}) {
+  for (const auto check : {&CheckTableSums, &CheckIndexes, &CheckStructure, &CheckEvents,
+                           &CheckPoseBatches, &CheckStarts}) {
     if (const Status status = check(connection); status.code() == StatusCode::kInvalidData) {
       add(status.message());
     } else if (!status.ok()) {

@@ -11,6 +11,7 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/table_order.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/dirty_table.h"
@@ -21,8 +22,11 @@
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
+#include "server/store/sqlite/transactions/compaction_repairs.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/history_horizon.h"
+#include "server/store/sqlite/transactions/index_repairs.h"
+#include "server/store/sqlite/transactions/key_repairs.h"
 #include "server/store/sqlite/transactions/session_repairs.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
@@ -118,6 +122,15 @@ void GiveUp(Connection& connection, const KeyframeRepair& repair, const Status& 
                         StrCat(why.message(), "; ", tiles.size(), " tiles")});
 }
 
+std::uint32_t OrderTables(Connection& connection, OrderedTables which, const std::string& author) {
+  const std::vector<std::string> tables = PutTablesInOrder(connection, which);
+  for (const std::string& table : tables) {
+    AddEvent(connection, {EventKind::kTablesRepaired, author, StrCat("table ", table),
+                          "its rows were not found by their numbers: it was written anew"});
+  }
+  return static_cast<std::uint32_t>(tables.size());
+}
+
 // Runs what may throw of damage. Everything else it throws is not for it.
 Status StatusOf(const std::function<Status()>& check) {
   try {
@@ -129,6 +142,48 @@ Status StatusOf(const std::function<Status()>& check) {
     }
     return status;
   }
+}
+
+Result<std::uint32_t> RepairRows(Connection& connection,
+                                 std::uint8_t levels,
+                                 const std::string& author) {
+  auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
+  repaired += static_cast<std::uint32_t>(RestoreIndexes(connection));
+  repaired += OrderTables(connection, OrderedTables::kTiles, author);
+  repaired += OrderTables(connection, OrderedTables::kFootprints, author);
+  repaired += PutBackLostTiles(connection);
+  {
+    const ToleratedIndexes tolerated(connection);
+    repaired += RestoreTileRows(connection);
+  }
+  const SessionNames names = ReadDamagedNames(connection);
+  repaired += RepairKeys(connection, author);
+  repaired += OrderTables(connection, OrderedTables::kOthers, author);
+  repaired += RepairCompactions(connection, author);
+  repaired += RepairStarts(connection, author);
+  repaired += static_cast<std::uint32_t>(RepairEvents(connection));
+  repaired += static_cast<std::uint32_t>(RepairPoseBatches(connection));
+  const auto sessions = RepairSessions(connection, names, author);
+  if (!sessions) {
+    return Error(sessions.error());
+  }
+  repaired += *sessions;
+  if (const Status marks = CheckMarks(connection); !marks.ok()) {
+    MarkAllInStore(connection, marks.message(), levels);
+    ++repaired;
+  }
+  return repaired;
+}
+
+Result<std::uint32_t> RepairSums(Connection& connection, const std::string& author) {
+  auto repaired = static_cast<std::uint32_t>(RecountSessions(connection));
+  repaired += static_cast<std::uint32_t>(RecountCounters(connection));
+  if (const Status sums = CheckTableSums(connection); !sums.ok()) {
+    WriteTableSums(connection);
+    ++repaired;
+    AddEvent(connection, {EventKind::kTablesRepaired, author, "", sums.message()});
+  }
+  return repaired;
 }
 
 }  // namespace
@@ -220,36 +275,19 @@ Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const Keyfra
   return RepairOutcome::kGivenUp;
 }
 
-Result<std::uint32_t> RepairRowsInStore(Connection& connection,
-                                        std::uint8_t levels,
-                                        const std::string& author) {
-  auto repaired = static_cast<std::uint32_t>(RestoreCounters(connection));
-  repaired += static_cast<std::uint32_t>(RestoreIndexes(connection));
-  repaired += PutBackLostTiles(connection);
-  connection.Execute("REINDEX");
-  repaired += static_cast<std::uint32_t>(RepairEvents(connection));
-  repaired += static_cast<std::uint32_t>(RepairPoseBatches(connection));
-  const auto sessions = RepairSessions(connection, author);
-  if (!sessions) {
-    return Error(sessions.error());
+Result<std::uint32_t> RepairTablesInStore(Connection& connection,
+                                          TableRepair what,
+                                          std::uint8_t levels,
+                                          const std::string& author) {
+  switch (what) {
+    case TableRepair::kIndexes:
+      return RepairIndexes(connection, levels, author);
+    case TableRepair::kRows:
+      return RepairRows(connection, levels, author);
+    case TableRepair::kSums:
+      break;
   }
-  repaired += *sessions;
-  if (const Status marks = CheckMarks(connection); !marks.ok()) {
-    MarkAllInStore(connection, marks.message(), levels);
-    ++repaired;
-  }
-  return repaired;
-}
-
-Result<std::uint32_t> RepairSumsInStore(Connection& connection, const std::string& author) {
-  auto repaired = static_cast<std::uint32_t>(RecountSessions(connection));
-  repaired += static_cast<std::uint32_t>(RecountCounters(connection));
-  if (const Status sums = CheckTableSums(connection); !sums.ok()) {
-    WriteTableSums(connection);
-    ++repaired;
-    AddEvent(connection, {EventKind::kTablesRepaired, author, "", sums.message()});
-  }
-  return repaired;
+  return RepairSums(connection, author);
 }
 
 }  // namespace atlas

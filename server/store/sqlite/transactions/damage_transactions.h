@@ -26,10 +26,10 @@ Result<std::optional<PutKeyframeResult>> HealInStore(Connection& connection,
 
 Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const KeyframeRepair& repair);
 
-// TableRepair, kRows and kSums. How much was not as it should be.
-Result<std::uint32_t> RepairRowsInStore(Connection& connection,
-                                        std::uint8_t levels,
-                                        const std::string& author);
-Result<std::uint32_t> RepairSumsInStore(Connection& connection, const std::string& author);
+// How much was not as it should be.
+Result<std::uint32_t> RepairTablesInStore(Connection& connection,
+                                          TableRepair what,
+                                          std::uint8_t levels,
+                                          const std::string& author);
 
 }  // namespace atlas

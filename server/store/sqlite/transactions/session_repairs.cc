@@ -1,16 +1,22 @@
 #include "server/store/sqlite/transactions/session_repairs.h"
 
+#include <algorithm>
+#include <exception>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
+#include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/session_state_table.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"
 #include "server/store/sqlite/transactions/history_horizon.h"
+#include "server/store/sqlite/transactions/session_twins.h"
 #include "server/store/store_types.h"
 
 namespace atlas {
@@ -18,20 +24,31 @@ namespace {
 
 constexpr const char* kLostVehicle = "lost";
 
+// A damaged row may name a session that never was.
+bool HasWholeKeyframe(Connection& connection, std::int64_t session_id) {
+  const auto ids = ListSessionKeyframes(connection, session_id);
+  return std::any_of(ids.begin(), ids.end(), [&connection](std::int64_t id) {
+    return ReadKeyframeRow(connection, id).has_value();
+  });
+}
+
 std::vector<std::int64_t> ListLostSessions(Connection& connection) {
-  Query row = connection.Prepare(
-      "SELECT DISTINCT session_id FROM keyframes "
-      "WHERE session_id NOT IN (SELECT id FROM sessions NOT INDEXED)");
   std::vector<std::int64_t> ids;
-  while (row.Step()) {
-    row.Rewind();
-    ids.push_back(row.Int());
+  {
+    Query row = connection.Prepare(
+        "SELECT DISTINCT session_id FROM keyframes "
+        "WHERE session_id NOT IN (SELECT id FROM sessions NOT INDEXED)");
+    while (row.Step()) {
+      row.Rewind();
+      ids.push_back(row.Int());
+    }
   }
+  std::erase_if(ids, [&](std::int64_t id) { return !HasWholeKeyframe(connection, id); });
   return ids;
 }
 
-std::vector<std::int64_t> ListSessionIds(Connection& connection) {
-  Query row = connection.Prepare("SELECT id FROM sessions NOT INDEXED");
+std::vector<std::int64_t> ListSessionIds(Connection& connection, const char* sql) {
+  Query row = connection.Prepare(sql);
   std::vector<std::int64_t> ids;
   while (row.Step()) {
     row.Rewind();
@@ -62,29 +79,15 @@ void BeginHistory(Connection& connection,
 
 class SessionRepair {
  public:
-  SessionRepair(Connection& connection, std::string author)
-      : connection_(connection), author_(std::move(author)) {}
+  SessionRepair(Connection& connection, const SessionNames& names, std::string author)
+      : connection_(connection), names_(names), author_(std::move(author)) {}
 
   Result<std::uint32_t> Run() {
-    for (const std::int64_t id : ListLostSessions(connection_)) {
-      NameLost(id);
+    if (Status status = RepairRows(); !status.ok()) {
+      return Error(std::move(status));
     }
-    for (const std::int64_t id : ListDamagedSessions(connection_)) {
-      if (!HasState(connection_, id)) {
-        BeginHistoryOf(id, SessionState::kLive);
-      }
-      const bool is_vouched = TellSession(connection_, id, Vouching::kByChecksum).has_value();
-      if (Status status = RestoreSession(connection_, id, Vouching::kByNobody); !status.ok()) {
-        return Error(std::move(status));
-      }
-      if (!is_vouched) {
-        MarkTilesOf(id);
-        AddEvent(connection_, {EventKind::kTablesRepaired, author_, StrCat("session number ", id),
-                               "its row was damaged, and nothing vouches for its name"});
-      }
-      ++repaired_;
-    }
-    for (const std::int64_t id : ListSessionIds(connection_)) {
+    for (const std::int64_t id :
+         ListSessionIds(connection_, "SELECT id FROM sessions NOT INDEXED")) {
       const auto session = ReadSession(connection_, id);
       if (!session) {
         return Error(session.error());
@@ -101,6 +104,101 @@ class SessionRepair {
   }
 
  private:
+  // Of each id and each name one, that is whole.
+  Status RepairRows() {
+    const ToleratedIndexes tolerated(connection_);
+    for (const std::int64_t id : ListDamagedSessions(connection_)) {
+      RestoreId(id);
+    }
+    for (const std::int64_t id : ListLostSessions(connection_)) {
+      NameLost(id);
+    }
+    for (const std::int64_t id : ListDamagedSessions(connection_)) {
+      ATLAS_RETURN_IF_ERROR(RepairRow(id));
+      ++repaired_;
+    }
+    ATLAS_RETURN_IF_ERROR(JoinTwins());
+    connection_.Execute("REINDEX sessions");
+    return {};
+  }
+
+  // Of which one bit turned.
+  void RestoreId(std::int64_t id) {
+    for (int bit = 0; bit < 63; ++bit) {
+      const std::int64_t other = id ^ (std::int64_t{1} << bit);
+      if (IsSessionRowOf(connection_, id, other)) {
+        connection_.Prepare("UPDATE OR IGNORE sessions SET id = ? WHERE id = ?")
+            .Bind(other)
+            .Bind(id)
+            .Run();
+        ++repaired_;
+        return;
+      }
+    }
+  }
+
+  // Vouched for where the row's checksum is that of what is told by the name.
+  Status RepairRow(std::int64_t id) {
+    if (!HasState(connection_, id)) {
+      BeginHistoryOf(id, SessionState::kLive);
+    }
+    std::vector<SessionKey> names;
+    if (const auto by_index = names_.find(id); by_index != names_.end()) {
+      names.push_back(by_index->second);
+    }
+    if (auto by_row = NameByRow(connection_, id)) {
+      names.push_back(*std::move(by_row));
+    }
+    std::erase_if(names, [this, id](const SessionKey& name) {
+      return IsNameOfAnother(connection_, name, id);
+    });
+    for (const SessionKey& name : names) {
+      if (const auto row = TellNamedSession(connection_, id, name, Vouching::kByChecksum)) {
+        PutBackSessions(connection_, {*row});
+        return {};
+      }
+    }
+    names.push_back({kLostVehicle, StrCat("session-", id)});
+    const auto row = TellNamedSession(connection_, id, names.front(), Vouching::kByNobody);
+    if (!row) {
+      return row.error();
+    }
+    PutBackSessions(connection_, {*row});
+    MarkTilesOf(id);
+    AddEvent(connection_, {EventKind::kTablesRepaired, author_, StrCat("session number ", id),
+                           "its row was damaged, and nothing vouches for its name"});
+    return {};
+  }
+
+  // Of one name. The older one stays.
+  Status JoinTwins() {
+    const std::vector<std::int64_t> ids = ListSessionIds(
+        connection_,
+        "SELECT id FROM sessions NOT INDEXED WHERE (vehicle, session) IN "
+        "(SELECT vehicle, session FROM sessions NOT INDEXED GROUP BY 1, 2 HAVING count(*) > 1) "
+        "ORDER BY vehicle, session, id");
+    std::optional<SessionRow> older;
+    for (const std::int64_t id : ids) {
+      auto session = ReadSession(connection_, id);
+      if (!session) {
+        return session.error();
+      }
+      if (!older || older->record.key != session->record.key) {
+        older = *std::move(session);
+        continue;
+      }
+      ATLAS_RETURN_IF_ERROR(JoinSessions(connection_, *older, *session, author_));
+      auto joined = ReadSession(connection_, older->id);
+      if (!joined) {
+        return joined.error();
+      }
+      older = *std::move(joined);
+      has_new_history_ = true;
+      ++repaired_;
+    }
+    return {};
+  }
+
   void NameLost(std::int64_t id) {
     const SessionKey key{kLostVehicle, StrCat("session-", id)};
     const auto state =
@@ -142,6 +240,7 @@ class SessionRepair {
   }
 
   Connection& connection_;
+  const SessionNames& names_;
   const std::string author_;
   bool has_new_history_ = false;
   std::uint32_t repaired_ = 0;
@@ -149,8 +248,26 @@ class SessionRepair {
 
 }  // namespace
 
-Result<std::uint32_t> RepairSessions(Connection& connection, const std::string& author) {
-  return SessionRepair(connection, author).Run();
+SessionNames ReadDamagedNames(Connection& connection) {
+  SessionNames names;
+  for (const std::int64_t id : ListDamagedSessions(connection)) {
+    try {
+      if (auto name = NameByIndex(connection, id)) {
+        names[id] = *std::move(name);
+      }
+    } catch (const std::exception& error) {
+      if (StatusFromException(error).code() != StatusCode::kInvalidData) {
+        throw;
+      }  // an index that cannot be read tells nothing
+    }
+  }
+  return names;
+}
+
+Result<std::uint32_t> RepairSessions(Connection& connection,
+                                     const SessionNames& names,
+                                     const std::string& author) {
+  return SessionRepair(connection, names, author).Run();
 }
 
 }  // namespace atlas

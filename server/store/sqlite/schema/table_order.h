@@ -1,0 +1,27 @@
+// Tables whose rows are not in the order of their numbers, or are not found by them: a bit of such
+// a number turned, in the row or on the way to it. SQLite searches by that order; no index made
+// anew mends it.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+
+namespace atlas {
+
+// Checks as those of index_check.h, of all tables.
+void AddOrderChecks(const std::function<Status()>& check_stop,
+                    std::vector<std::function<Status(Connection&)>>& checks);
+
+enum class OrderedTables { kTiles, kFootprints, kOthers };
+
+// Writes such tables anew, with all their blobs, inside a savepoint. A number out of order becomes
+// the one between its neighbours that is one bit away; a row for which there is none, or one of
+// footprints or tombstones whose checksum is wrong, is left out; of footprints the index of changes
+// tells what it was. The names of those tables.
+std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables which);
+
+}  // namespace atlas

@@ -1,0 +1,278 @@
+// Keyframes and sessions that an index lost: they are stored a second time when they are sent
+// again, and a repair makes one of the two, as if they had been sent once.
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include "tests/server/service/service_fixture.h"
+#include "tests/server/store/turned_bits.h"
+
+namespace atlas {
+namespace {
+
+constexpr std::uint32_t kDrive = 8;
+
+class LostKeysTest : public ServiceTest {
+ protected:
+  LostKeysTest() { surveys_ = {0, 0}; }
+
+  std::filesystem::path Database() const { return directory_ / "data" / "atlas.db"; }
+  void Fill() {
+    Open(1);
+    UploadDrive(kDrive);
+    intact_ = Digest();
+  }
+  void Tamper(const std::string& sql) {
+    Close();
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(db);
+    Open(1);
+  }
+  // The index of keys finds number 5 (id 6) of the first session no more.
+  void LoseKeyframe() {
+    Close();
+    testing::TurnBits(Database(), "sqlite_autoindex_keyframes_1", {4, 9, 1, 1, 5, 6}, 4, 64);
+    Open(1);
+  }
+  void LoseSession() {
+    Close();
+    testing::TurnBits(Database(), "sqlite_autoindex_sessions_1", "busday", 0, 32);
+    Open(1);
+  }
+  Result<VerifyReport> Repair() {
+    return service_->Verify({.repair = true, .author = "operator"}, Long());
+  }
+  void ExpectWhole(const AtlasDigest& expected) {
+    const auto report = service_->Verify({.rebuild = true}, Long());
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
+    EXPECT_EQ(Digest().sha256, expected.sha256);
+    EXPECT_EQ(store_->ReadCounts()->keyframes, kDrive);
+  }
+  std::string Events() {
+    std::string text;
+    const auto events = store_->ListEvents(0, 1'000).value();
+    for (const Event& event : events) {
+      text +=
+          std::string(EventName(event.kind)) + ": " + event.subject + ": " + event.detail + "\n";
+    }
+    return text;
+  }
+
+  AtlasDigest intact_;
+};
+
+TEST_F(LostKeysTest, AKeyframeThatIsStoredTwiceBecomesOne) {
+  Fill();
+  LoseKeyframe();
+  const auto again = Upload(DriveUpload(5));
+  ASSERT_TRUE(again) << again.error().message();
+  ASSERT_FALSE(again->is_duplicate) << "the index found it";
+  const auto found = service_->Verify({}, Long());
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_GT(found->damaged, 0U);
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(repaired->given_up, 0U);
+  EXPECT_THAT(Events(), ::testing::HasSubstr("keyframe bus/day/5: it was stored twice"));
+  ExpectWhole(intact_);
+  EXPECT_TRUE(Upload(DriveUpload(5))->is_duplicate);
+}
+
+TEST_F(LostKeysTest, TilesOfAKeyframeThatIsStoredTwiceAreNotFused) {
+  Fill();
+  LoseKeyframe();
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  Result<AtlasDigest> digest = Error(StatusCode::kTimeout, "");
+  for (int i = 0; !digest && digest.error().code() == StatusCode::kTimeout && i < 1'000; ++i) {
+    now_ms_ += 60'000;  // they are tried again
+    digest = service_->Digest({std::chrono::milliseconds(50), {}});
+  }
+  ASSERT_FALSE(digest);
+  EXPECT_EQ(digest.error().code(), StatusCode::kInvalidData);
+  EXPECT_THAT(digest.error().message(), ::testing::HasSubstr("is stored twice"));
+}
+
+// Only the second one is found under the key.
+TEST_F(LostKeysTest, ACorrectionOfTheSecondOneIsKept) {
+  const auto move = [this] {
+    return Move({{{{"bus", "day"}, 5}, PoseOf({3.0, 1.0, 1.8, 5.0})}});
+  };
+  Fill();
+  ASSERT_TRUE(move());
+  const AtlasDigest moved = Digest();
+  Close();
+  std::filesystem::remove_all(directory_ / "data");
+  Fill();
+  LoseKeyframe();
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  ASSERT_TRUE(move());
+  ASSERT_TRUE(Repair());
+  ExpectWhole(moved);
+}
+
+TEST_F(LostKeysTest, OtherBytesUnderTheKeyGo) {
+  Fill();
+  LoseKeyframe();
+  UploadRequest other = DriveUpload(5);
+  other.blob = DriveUpload(6).blob;
+  ASSERT_TRUE(Upload(std::move(other)));
+  ASSERT_TRUE(Repair());
+  EXPECT_THAT(Events(), ::testing::HasSubstr("another one was stored under its key"));
+  ExpectWhole(intact_);
+}
+
+TEST_F(LostKeysTest, TheSecondOneHealsTheFirst) {
+  for (const char* damage : {"UPDATE keyframes SET blob = zeroblob(blob_bytes) WHERE id = 6",
+                             "UPDATE keyframes SET time_ms = time_ms + 1 WHERE id = 6"}) {
+    SCOPED_TRACE(damage);
+    Fill();
+    LoseKeyframe();
+    ASSERT_TRUE(Upload(DriveUpload(5)));
+    Tamper(damage);
+    const auto repaired = Repair();
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    EXPECT_EQ(repaired->given_up, 0U);
+    ExpectWhole(intact_);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
+}
+
+// Its index still has the key that it was written with.
+TEST_F(LostKeysTest, ARowWithTheKeyOfAnotherGetsItsOwnBack) {
+  for (const std::uint8_t mask : std::vector<std::uint8_t>{6, 64}) {  // number 3, and none
+    SCOPED_TRACE(int{mask});
+    Fill();
+    Close();
+    const std::string revision(1, static_cast<char>(testing::AskDatabase(
+                                      Database(), "SELECT revision FROM keyframes WHERE id = 6")));
+    // Its number, 1,500 ms, its revision, cells of 200,000 um.
+    testing::TurnBits(Database(), "", "\x05\x05\xDC" + revision + "\x03\x0D\x40", 0, mask);
+    Open(1);
+    const auto repaired = Repair();
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    EXPECT_EQ(repaired->given_up, 0U);
+    ExpectWhole(intact_);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
+}
+
+// Of another keyframe, of one that is damaged, and of none.
+TEST_F(LostKeysTest, AnIndexThatNamesAnotherRowEndsAnUpload) {
+  for (const std::uint8_t mask : std::vector<std::uint8_t>{1, 2, 4, 64}) {
+    SCOPED_TRACE(int{mask});
+    Fill();
+    Tamper("UPDATE keyframes SET time_ms = 1 WHERE id = 4");
+    Close();
+    testing::TurnBits(Database(), "sqlite_autoindex_keyframes_1", {4, 9, 1, 1, 5, 6}, 5, mask);
+    Open(1);
+    for (const std::uint32_t sequence : {5U, 6U, 4U, 20U}) {
+      const auto put = Upload(DriveUpload(sequence));
+      EXPECT_TRUE(put || put.error().code() == StatusCode::kUnavailable) << put.error().message();
+    }
+    Tamper("DELETE FROM keyframes WHERE id = 4");
+    const auto repaired = Repair();
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    EXPECT_TRUE(Upload(DriveUpload(5))->is_duplicate);
+    EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0U);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
+}
+
+// It names a session that never was.
+TEST_F(LostKeysTest, ASessionThatADamagedKeyframeNamesIsNotMade) {
+  Fill();
+  Tamper("UPDATE keyframes SET session_id = 65, time_ms = time_ms + 1 WHERE id = 6");
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(store_->ListSessions({}, 10)->size(), 1U);
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  ExpectWhole(intact_);
+}
+
+// Two lines of one batch: of keyframes 5 and 6.
+TEST_F(LostKeysTest, ALineOfPosesWithTheKeyOfAnotherGetsItsOwnBack) {
+  Fill();
+  ASSERT_TRUE(Move({{{{"bus", "day"}, 4}, PoseOf({3.0, 1.0, 1.8, 5.0})},
+                    {{{"bus", "day"}, 5}, PoseOf({4.0, 1.0, 1.8, 5.0})}}));
+  const AtlasDigest moved = Digest();
+  Close();
+  const std::string revision(1, static_cast<char>(testing::AskDatabase(
+                                    Database(), "SELECT max(revision) FROM pose_history")));
+  testing::TurnBits(Database(), "pose_history", "\x06" + revision + "tester", 0, 3);
+  Open(1);
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  ExpectWhole(moved);
+  EXPECT_EQ(DigestAt(kDrive).sha256, DigestAt(kDrive).sha256) << "its past can be read";
+}
+
+TEST_F(LostKeysTest, OfTwoLinesOfPosesWithOneKeyTheWholeOneStays) {
+  Fill();
+  ASSERT_TRUE(Move({{{{"bus", "day"}, 4}, PoseOf({3.0, 1.0, 1.8, 5.0})},
+                    {{{"bus", "day"}, 5}, PoseOf({4.0, 1.0, 1.8, 5.0})}}));
+  const AtlasDigest moved = Digest();
+  Close();
+  const std::string revision(1, static_cast<char>(testing::AskDatabase(
+                                    Database(), "SELECT max(revision) FROM pose_history")));
+  testing::TurnBits(Database(), "pose_history", "\x06" + revision + "tester", 0, 3);
+  testing::TurnBits(Database(), "sqlite_autoindex_pose_history_1", std::string("\x06") + revision,
+                    0, 64);
+  Open(1);
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  ExpectWhole(moved);
+}
+
+// The history of its states is gone, too, so that who opens the atlas cannot tell what it was.
+TEST_F(LostKeysTest, TheIndexTellsTheNameOfADamagedSession) {
+  Fill();
+  Tamper("DELETE FROM session_states");
+  Close();
+  testing::TurnBits(Database(), "sessions", "busday", 0, 2);
+  Open(1);
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_THAT(Events(), ::testing::Not(::testing::HasSubstr("nothing vouches")));
+  ExpectWhole(intact_);
+}
+
+TEST_F(LostKeysTest, ASessionThatBeganTwiceBecomesOne) {
+  Fill();
+  LoseSession();
+  ASSERT_FALSE(Upload(DriveUpload(5))->is_duplicate);
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(store_->ListSessions({}, 10)->size(), 1U);
+  ExpectWhole(intact_);
+}
+
+TEST_F(LostKeysTest, ARetractionOfTheSecondSessionIsOfBoth) {
+  Fill();
+  LoseSession();
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  ASSERT_TRUE(Change("day", SessionAction::kRetract));
+  ASSERT_TRUE(Repair());
+  EXPECT_EQ(Digest().tiles, 0U);
+  ASSERT_TRUE(Change("day", SessionAction::kRestore));
+  ExpectWhole(intact_);
+}
+
+TEST_F(LostKeysTest, APurgeOfTheSecondSessionIsOfBoth) {
+  Fill();
+  LoseSession();
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  ASSERT_TRUE(Change("day", SessionAction::kPurge));
+  ASSERT_TRUE(Repair());
+  EXPECT_EQ(Digest().tiles, 0U);
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 0U);
+  EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0U);
+}
+
+}  // namespace
+}  // namespace atlas
