@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace atlas {
 namespace {
@@ -28,14 +29,18 @@ class Pen {
   }
 
   void Disc(const Eigen::Vector2d& at, double radius_px, const Rgb& color) {
-    const auto low = [radius_px](double v) {
-      return static_cast<std::int64_t>(v - radius_px) - 1;
+    const std::int64_t width = image_.width;
+    const std::int64_t height = image_.height;
+    const auto first = [radius_px](double v) {
+      return std::max<std::int64_t>(0, static_cast<std::int64_t>(std::floor(v - radius_px)));
     };
-    for (std::int64_t y = low(at.y()); y <= low(at.y()) + 2 * radius_px + 3; ++y) {
-      for (std::int64_t x = low(at.x()); x <= low(at.x()) + 2 * radius_px + 3; ++x) {
+    const auto end = [radius_px](double v, std::int64_t size) {
+      return std::min(size, static_cast<std::int64_t>(std::ceil(v + radius_px)));
+    };
+    for (std::int64_t y = first(at.y()); y < end(at.y(), height); ++y) {
+      for (std::int64_t x = first(at.x()); x < end(at.x(), width); ++x) {
         const Eigen::Vector2d middle(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
-        if (x >= 0 && y >= 0 && x < image_.width && y < image_.height &&
-            (middle - at).norm() <= radius_px) {
+        if ((middle - at).norm() <= radius_px) {
           image_.at(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)) = color;
         }
       }
@@ -47,7 +52,7 @@ class Pen {
             double radius_px,
             const Rgb& color) {
     const double steps = std::max(1.0, std::ceil((to - from).norm()));
-    for (double i = 0.0; i <= steps; ++i) {
+    for (double i = 0.0; i <= steps; i += 1.0) {
       Disc(from + i / steps * (to - from), radius_px, color);
     }
   }

@@ -135,7 +135,7 @@ TEST(CorridorTest, LinesBetweenWaypointsKeepOffObstacles) {
       EXPECT_GT(off_m(p, 11.5, 13.5, 1.0, 2.0), 0.85);
     }
   }
-  EXPECT_LT(route->cost, route->searched_cost - 0.2);
+  EXPECT_LT(route->cost, route->searched_cost - 0.1);
 }
 
 TEST(CorridorTest, FewerNodesAreExpandedWhereThereAreManyWays) {

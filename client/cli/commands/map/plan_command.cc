@@ -110,7 +110,7 @@ class PlanCommand : public Command {
     }
     if (!file_.empty() && route->found) {
       const std::string text = RouteText(*route, format);
-      ATLAS_RETURN_IF_ERROR(WriteWholeFile(file_, AsBytes(text)));
+      ATLAS_RETURN_IF_ERROR(WriteWholeFile(file_, Bytes(text.begin(), text.end())));
     }
     if (context.is_json) {
       context.PrintJson(RouteJson(*route, ms));
