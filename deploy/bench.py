@@ -19,6 +19,7 @@ import bench_follow
 import bench_load
 import bench_memory
 import bench_nginx
+import bench_planning
 import bench_serving
 import bench_unread
 import bench_updates
@@ -217,7 +218,7 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
-                                   **bench_memory.BENCHMARKS, **bench_unread.BENCHMARKS,
+                                   **bench_memory.BENCHMARKS, **bench_planning.BENCHMARKS, **bench_unread.BENCHMARKS,
                                    **bench_crowd.BENCHMARKS}.items()},
               **{name: lambda bin_dir, name=name: bench_with_client(name, bin_dir) for name in WITH_CLIENT}}
 

@@ -4,6 +4,9 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
+
+#include <Eigen/Core>
 
 #include "client/render/image.h"
 #include "client/render/map_raster.h"
@@ -28,6 +31,7 @@ struct RenderOptions {
   std::int64_t max_side_px = 4096;
   std::int64_t margin_px = 12;
   bool has_scale_bar = true;
+  std::vector<Eigen::Vector3d> route;  // drawn over the map, world frame; may be empty
 };
 
 struct MapPicture {

@@ -37,6 +37,7 @@ Status PlanOptions::Validate(const MapProfile& profile) const {
       {"snap far below in metres", snap_far_below_m, 0.0, 50.0},
       {"snap above in metres", snap_above_m, 0.0, 50.0},
       {"waypoint spacing in metres", waypoint_spacing_m, 0.0, 1000.0},
+      {"time limit in seconds", max_time_s, 0.0, 1e6},
   };
   for (const Range& range : ranges) {
     if (!(range.value >= range.low && range.value <= range.high)) {  // NaN fails too

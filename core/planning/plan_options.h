@@ -25,6 +25,9 @@ struct PlanOptions {
   double min_support = 0.4;
   // Unknown cells are not traversable, but a hole in a sparse map no longer than this is crossed.
   double max_gap_m = 0.2;
+  // Drives over what was seen but never found free, too. Where nothing was seen there is no
+  // surface to drive on: holes are crossed up to max_gap_m.
+  bool allow_unknown = false;
   // Column segments and cells count as occupied from here on (a single return is 0.73): where hits
   // and misses balance, a cell is not driven over but does not close what lies around it.
   double occupied_probability = 0.6;
@@ -44,9 +47,13 @@ struct PlanOptions {
   // Points of the found route are thinned out to this distance.
   double waypoint_spacing_m = 0.5;
 
+  // Searches the finest level alone, over everything: what a corridor is compared with.
+  bool is_exhaustive = false;
+
   // Limits of the planner.
   std::uint64_t max_expansions = 20'000'000;
   std::size_t max_memory_bytes = std::size_t{512} << 20;
+  double max_time_s = 60.0;  // by the clock that is passed in
 
   double inflation_m() const { return 0.5 * vehicle_width_m + safety_margin_m; }
   double clearance_reach_m() const { return inflation_m() + comfort_m; }

@@ -73,6 +73,10 @@ USAGE = {
         ["--from", "0,0,0", "--to", "1e30,0,0"], ["--from", "0,0,0", "--to", "5,0,0", "--max-slope-deg", "-5"],
         ["--from", "0,0,0", "--to", "5,0,0", "--max-slope-deg", "90"],
         ["--from", "0,0,0", "--to", "5,0,0", "--max-slope-deg", "steep"],
+        *(["--from", "0,0,0", "--to", "5,0,0", *wrong] for wrong in (
+            ["--width", "99"], ["--width", "nan"], ["--margin", "-1"], ["--headroom", "-2"], ["--max-step", "5"],
+            ["--max-gap", "9"], ["--comfort", "-1"], ["--comfort-weight", "1e9"], ["--max-expansions", "-1"],
+            ["--max-time", "-1"], ["--max-memory", "much"], ["-o", "WORK/route.txt"])),
     ],
     "render": [[], ["-o"], ["-o", "WORK/x.png", "--layer", "middle"], ["-o", "WORK/x.png", "--layer", "-1"],
                ["-o", "WORK/x.png", "--color", "pink"]],

@@ -39,7 +39,7 @@ KEYS = {
     "segment": "precision recall f1 missed_curb false_road ms_per_scan scans",
     "localize": "type translation_rmse_m rotation_rmse_deg translation_p95_m failures lost restarts scans hz "
                 "bytes_received",
-    "plan": "found length_m cost waypoints tiles_loaded ms",
+    "plan": "found length_m cost searched_cost waypoints clearance_m slope_deg tiles_loaded expansions ms",
     "render": "width height metres_per_pixel",
     "simulate": "scans metres",
 }

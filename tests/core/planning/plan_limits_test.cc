@@ -46,6 +46,40 @@ TEST(PlanLimitsTest, ExceededBudgetsAreTyped) {
   EXPECT_EQ(small.error().code(), StatusCode::kResourceExhausted);
 }
 
+TEST(PlanLimitsTest, TimeIsLimitedByTheClockThatIsPassedIn) {
+  TinyWorld world;
+  world.Draw(kCorridor, 0.0);
+  PlanRequest request{world.start(), world.goal(), {}};
+  request.options.max_time_s = 2.0;
+  double now_s = 100.0;
+  request.now_s = [&now_s] {
+    return now_s += 0.5;
+  };  // whenever it is asked
+  const auto late = PlanRoute(world, world.profile(), request);
+  ASSERT_FALSE(late.has_value());
+  EXPECT_EQ(late.error().code(), StatusCode::kTimeout);
+  request.options.max_time_s = 1e6;
+  EXPECT_TRUE(PlanRoute(world, world.profile(), request).has_value());
+  request.options.max_time_s = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(PlanRoute(world, world.profile(), request).error().code(),
+            StatusCode::kInvalidArgument);
+}
+
+TEST(PlanLimitsTest, UnknownIsDrivenOverOnlyWhereItIsAllowed) {
+  TinyWorld world;
+  world.Draw({"..........??............",  //
+              "..........??............",  //
+              "..S.......??.........G..",  //
+              "..........??............",  //
+              "..........??............"},
+             0.0);
+  world.BuildPyramid();
+  PlanOptions options;
+  EXPECT_FALSE(world.Plan(options)->found);
+  options.allow_unknown = true;
+  EXPECT_TRUE(world.Plan(options)->found);
+}
+
 TEST(PlanLimitsTest, NoSurfaceAtAnEndIsNotFoundAndSaysWhich) {
   TinyWorld world;
   world.Draw(kCorridor, 0.0);

@@ -1,5 +1,5 @@
 // Gradients of planes, with holes and with noise.
-#include "core/planning/plane_fit.h"
+#include "core/planning/surface/plane_fit.h"
 
 #include <random>
 

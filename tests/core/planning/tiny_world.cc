@@ -1,8 +1,11 @@
 // Squares to cells, cells to tiles.
 #include "tests/core/planning/tiny_world.h"
 
+#include <array>
 #include <cmath>
 #include <utility>
+
+#include "core/tile/tile_pyramid.h"
 
 namespace atlas {
 namespace {
@@ -80,22 +83,55 @@ void TinyWorld::Draw(const std::vector<std::string_view>& rows, const Height& he
   }
 }
 
+Tile TinyWorld::Finest(const TileId& id) const {
+  Tile tile;
+  tile.id = id;
+  tile.cell_begin.push_back(0);
+  for (const auto& cell : cells_.at(id.Key())) {
+    tile.layers.insert(tile.layers.end(), cell.begin(), cell.end());
+    tile.cell_begin.push_back(static_cast<std::uint32_t>(tile.layers.size()));
+  }
+  return tile;
+}
+
+void TinyWorld::BuildPyramid() {
+  coarser_.clear();
+  std::map<std::uint64_t, Tile> below;
+  for (const auto& [key, cells] : cells_) {
+    below.emplace(key, Finest(TileId::FromKey(key).value()));
+  }
+  for (std::uint8_t level = 1; level < profile_.levels; ++level) {
+    std::map<std::uint64_t, Tile> made;
+    for (const auto& [key, tile] : below) {
+      const TileId id = tile.id.Parent();
+      if (made.contains(id.Key())) {
+        continue;
+      }
+      std::array<const Tile*, 4> children{};
+      for (std::size_t i = 0; i < children.size(); ++i) {
+        const auto child = below.find(id.Children()[i].Key());
+        children[i] = child == below.end() ? nullptr : &child->second;
+      }
+      made.emplace(id.Key(), BuildParentTile(id, children, profile_));
+    }
+    coarser_.insert(made.begin(), made.end());
+    below = std::move(made);
+  }
+}
+
 Result<const Tile*> TinyWorld::Get(const TileId& id) {
   ++tiles_asked_;
   if (!failure_.ok()) {
     return Error(failure_);
   }
-  const auto found = cells_.find(id.Key());
-  if (found == cells_.end()) {
+  if (id.level > 0) {
+    const auto found = coarser_.find(id.Key());
+    return found == coarser_.end() ? nullptr : &found->second;
+  }
+  if (!cells_.contains(id.Key())) {
     return nullptr;
   }
-  tile_ = Tile{};
-  tile_.id = id;
-  tile_.cell_begin.push_back(0);
-  for (const auto& cell : found->second) {
-    tile_.layers.insert(tile_.layers.end(), cell.begin(), cell.end());
-    tile_.cell_begin.push_back(static_cast<std::uint32_t>(tile_.layers.size()));
-  }
+  tile_ = Finest(id);
   return &tile_;
 }
 

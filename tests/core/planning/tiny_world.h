@@ -30,6 +30,9 @@ class TinyWorld : public TileSource {
   // One cell's layer on top of what is there.
   void Put(std::int64_t cell_x, std::int64_t cell_y, const TileLayer& layer);
 
+  // Coarser levels are made of what is drawn so far; without this there are none, and no corridor.
+  void BuildPyramid();
+
   Result<const Tile*> Get(const TileId& id) override;
   Result<Route> Plan(const PlanOptions& options = {});
 
@@ -42,7 +45,10 @@ class TinyWorld : public TileSource {
 
  private:
   MapProfile profile_;
+  Tile Finest(const TileId& id) const;
+
   std::map<std::uint64_t, std::vector<std::vector<TileLayer>>> cells_;
+  std::map<std::uint64_t, Tile> coarser_;
   Tile tile_;  // lives until the next Get, as the contract says
   std::size_t tiles_asked_ = 0;
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();

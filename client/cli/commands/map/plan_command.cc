@@ -1,5 +1,10 @@
 // `atlas plan`: a route over the map's surfaces.
+#include <chrono>
+
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/commands/map/plan_flags.h"
+#include "client/cli/commands/map/route_text.h"
+#include "client/cli/files/whole_file.h"
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
@@ -30,22 +35,32 @@ class ViewTiles : public TileSource {
 
 boost::json::object RouteJson(const Route& route, double ms) {
   boost::json::array waypoints;
-  for (const Eigen::Vector3d& p : route.waypoints) {
+  boost::json::array clearances;
+  boost::json::array slopes;
+  for (std::size_t i = 0; i < route.waypoints.size(); ++i) {
+    const Eigen::Vector3d& p = route.waypoints[i];
     waypoints.push_back({Rounded(p.x(), 3), Rounded(p.y(), 3), Rounded(p.z(), 3)});
+    clearances.push_back(Rounded(route.clearance_m[i], 3));
+    slopes.push_back(Rounded(route.slope_deg[i], 3));
   }
   return {{"found", route.found},
           {"length_m", Rounded(route.length_m, 3)},
           {"cost", Rounded(route.cost, 3)},
+          {"searched_cost", Rounded(route.searched_cost, 3)},
           {"waypoints", std::move(waypoints)},
+          {"clearance_m", std::move(clearances)},
+          {"slope_deg", std::move(slopes)},
           {"tiles_loaded", route.tiles_loaded},
           {"expansions", route.expansions},
           {"ms", Rounded(ms, 3)}};
 }
 
 void PrintRoute(const Route& route, double ms, std::ostream& out) {
-  TextTable table({">x m", ">y m", ">z m"});
-  for (const Eigen::Vector3d& p : route.waypoints) {
-    table.Row({FixedText(p.x(), 2), FixedText(p.y(), 2), FixedText(p.z(), 2)});
+  TextTable table({">x m", ">y m", ">z m", ">clearance m", ">slope deg"});
+  for (std::size_t i = 0; i < route.waypoints.size(); ++i) {
+    const Eigen::Vector3d& p = route.waypoints[i];
+    table.Row({FixedText(p.x(), 2), FixedText(p.y(), 2), FixedText(p.z(), 2),
+               FixedText(route.clearance_m[i], 2), FixedText(route.slope_deg[i], 1)});
   }
   if (!route.waypoints.empty()) table.Print(out);
   out << (route.found ? StrCat("route of ", FixedText(route.length_m, 1), " m")
@@ -62,11 +77,23 @@ class PlanCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     arguments.Required("--from", "X,Y,Z", request_.from, "Start, metres; Z names the surface");
     arguments.Required("--to", "X,Y,Z", request_.to, "Goal, metres");
-    arguments.Optional("--max-slope-deg", "D", request_.options.max_slope_deg,
-                       "Steepest surface the vehicle drives [25]");
+    arguments.Optional("-o,--output", "FILE", file_,
+                       "Also as a file: .geojson (map frame, metres) or .csv");
+    DeclarePlanFlags(arguments, request_.options, memory_mib_);
   }
 
   Status Run(CommandContext& context) override {
+    RouteFormat format{};
+    if (!file_.empty()) {
+      const auto named = RouteFormatOf(file_);
+      if (!named) return named.error();
+      format = *named;
+    }
+    request_.options.max_memory_bytes = std::size_t{memory_mib_} << 20;
+    request_.now_s = [] {
+      return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+          .count();
+    };
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
     MapView view(map->source());
@@ -81,6 +108,10 @@ class PlanCommand : public Command {
       failure = route.error();
       route = Route();
     }
+    if (!file_.empty() && route->found) {
+      const std::string text = RouteText(*route, format);
+      ATLAS_RETURN_IF_ERROR(WriteWholeFile(file_, Bytes(text.begin(), text.end())));
+    }
     if (context.is_json) {
       context.PrintJson(RouteJson(*route, ms));
     } else {
@@ -94,6 +125,8 @@ class PlanCommand : public Command {
 
  private:
   PlanRequest request_;
+  std::uint32_t memory_mib_ = 512;
+  std::string file_;
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // `atlas render`: a picture of the whole atlas.
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/files/route_file.h"
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/render/map_picture.h"
@@ -31,6 +32,7 @@ class RenderCommand : public Command {
                        "Which surface of a cell is shown; 0 is the lowest [highest]");
     arguments.Choice("--color", {"height", "occupancy", "layers", "columns"}, color_,
                      "What colours mean");
+    arguments.Optional("--path", "FILE", path_, "A route of `atlas plan --output`, drawn over it");
   }
 
   Status Run(CommandContext& context) override {
@@ -41,6 +43,11 @@ class RenderCommand : public Command {
     const auto color = ParseMapColor(color_);
     if (!color) return color.error();
     options.color = *color;
+    if (!path_.empty()) {
+      auto route = ReadRoute(path_);
+      if (!route) return route.error();
+      options.route = *std::move(route);
+    }
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
     const auto picture = RenderMap(ReaderOf(map->source()), options, map->profile());
@@ -63,6 +70,7 @@ class RenderCommand : public Command {
   }
 
   std::string file_;
+  std::string path_;
   std::string layer_ = "highest";
   std::string color_ = "height";
 };

@@ -1,5 +1,5 @@
 // Which layers are open, and which are obstacles, by what the tile itself knows.
-#include "core/planning/surface_tile.h"
+#include "core/planning/surface/surface_tile.h"
 
 #include <cmath>
 #include <utility>
@@ -16,6 +16,7 @@ struct Limits {
   std::int32_t headroom_to_next_mm;  // to the surface above
   std::uint8_t occupied_state;       // the lowest that counts
   std::int32_t occupied_evidence;    // the lowest that counts
+  bool is_unknown_open;
   const MapProfile& profile;
 };
 
@@ -32,24 +33,26 @@ Limits LimitsOf(const MapProfile& profile, const PlanOptions& options) {
          EvidenceProbability(evidence) < options.occupied_probability) {
     ++evidence;
   }
-  return {to_mm(options.headroom_m), to_mm(options.headroom_m + options.slab_thickness_m), state,
-          evidence, profile};
+  return {to_mm(options.headroom_m),
+          to_mm(options.headroom_m + options.slab_thickness_m),
+          state,
+          evidence,
+          options.allow_unknown,
+          profile};
 }
 
 // Segments are as high as a person: one counts when its middle lies below the headroom, so that the
 // ceiling of a garage does not close it.
 bool IsColumnInTheWay(const TileLayer& layer, const Limits& limits) {
   const std::int32_t height_mm = limits.profile.segment_height_mm;
-  std::int32_t middle_mm =
-      ColumnBaseIndex(layer.altitude_mm, limits.profile) * height_mm + height_mm / 2;
-  for (std::uint64_t column = layer.column; column != 0; column >>= 4) {
-    if (middle_mm - layer.altitude_mm >= limits.headroom_mm) {
-      return false;
-    }
+  std::int32_t segment = 0;
+  for (std::uint64_t column = layer.column; column != 0; column >>= 4, ++segment) {
     if ((column & 0xF) >= limits.occupied_state) {
-      return true;
+      const std::int32_t middle_mm =
+          (ColumnBaseIndex(layer.altitude_mm, limits.profile) + segment) * height_mm +
+          height_mm / 2;
+      return middle_mm - layer.altitude_mm < limits.headroom_mm;
     }
-    middle_mm += height_mm;
   }
   return false;
 }
@@ -69,11 +72,24 @@ SurfaceNode MakeNode(const TileLayer& layer, const TileLayer* above, const Limit
       layer.occupancy >= limits.occupied_evidence || is_low || IsColumnInTheWay(layer, limits);
   if (is_obstacle) {
     node.flags |= SurfaceNode::kObstacle;
-  } else if (layer.is_traversable()) {
+  } else if (layer.is_traversable() || limits.is_unknown_open) {
     node.flags |= SurfaceNode::kOpen;
   }
   if ((layer.flags & TileLayer::kMeasured) != 0) {
     node.flags |= SurfaceNode::kMeasured;
+  }
+  return node;
+}
+
+// Of a coarser level, where something may be open beside an obstacle.
+SurfaceNode MakeCoarseNode(const TileLayer& layer, const Limits& limits) {
+  SurfaceNode node;
+  node.altitude_mm = layer.altitude_mm;
+  if ((layer.flags & TileLayer::kTraversableAny) != 0 || limits.is_unknown_open) {
+    node.flags |= SurfaceNode::kOpen;
+  }
+  if (layer.occupancy >= limits.occupied_evidence) {
+    node.flags |= SurfaceNode::kObstacle;
   }
   return node;
 }
@@ -99,16 +115,28 @@ Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
     return Error(std::move(status));
   }
   const Limits limits = LimitsOf(profile, options);
+  const std::uint32_t side = profile.tile_cells;
+  const std::size_t row_words = (side + 63) / 64;
   SurfaceTile surface;
   surface.id = id;
+  surface.origin_x = std::int64_t{id.x} * side;
+  surface.origin_y = std::int64_t{id.y} * side;
   surface.cell_begin = tile.cell_begin;
-  surface.nodes.reserve(tile.layers.size());
-  for (std::size_t cell = 0; cell + 1 < tile.cell_begin.size(); ++cell) {
+  surface.nodes.resize(tile.layers.size());
+  surface.obstacle_bits.resize(side * row_words);
+  auto next = surface.nodes.begin();
+  for (std::uint32_t cell = 0; cell < side * side; ++cell) {
     const auto layers = tile.Layers(cell);
     for (std::size_t i = 0; i < layers.size(); ++i) {
       const TileLayer* above = i + 1 < layers.size() ? &layers[i + 1] : nullptr;
-      surface.nodes.push_back(MakeNode(layers[i], above, limits));
-      surface.nodes.back().cell = static_cast<std::uint16_t>(cell);
+      SurfaceNode node =
+          id.level == 0 ? MakeNode(layers[i], above, limits) : MakeCoarseNode(layers[i], limits);
+      node.cell = static_cast<std::uint16_t>(cell);
+      *next++ = node;
+      if (node.Has(SurfaceNode::kObstacle)) {
+        surface.obstacle_bits[cell / side * row_words + cell % side / 64] |= std::uint64_t{1}
+                                                                             << (cell % side % 64);
+      }
     }
   }
   return surface;

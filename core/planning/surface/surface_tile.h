@@ -18,21 +18,22 @@ struct SurfaceNode {
   static constexpr std::uint8_t kOpen = 1;       // traversable, with headroom
   static constexpr std::uint8_t kObstacle = 2;   // inflates what lies around it
   static constexpr std::uint8_t kMeasured = 4;   // its altitude can be fitted to
-  static constexpr std::uint8_t kAnalysed = 8;   // kDrivable is known
+  static constexpr std::uint8_t kAnalysed = 8;   // kDrivable and `clearance` are known
   static constexpr std::uint8_t kDrivable = 16;  // a vehicle's middle may be here
   static constexpr std::uint8_t kClosed = 32;    // the search is done with it
+  static constexpr std::uint8_t kCorridor = 64;  // a finer level's search may go here
 
   static constexpr std::uint8_t kFar = 255;  // no obstacle within reach
 
   std::int32_t altitude_mm = 0;
   std::uint16_t cell = 0;
   std::uint8_t flags = 0;
-  std::uint8_t clearance = kFar;  // ObstacleInflation::Clearance
+  std::uint8_t clearance = kFar;  // ObstacleClearance::Metres
 
   bool Has(std::uint8_t flag) const { return (flags & flag) != 0; }
 };
 
-// One node of the whole map.
+// One node of all tiles of a level.
 struct NodeRef {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
@@ -43,8 +44,12 @@ struct NodeRef {
   friend bool operator==(const NodeRef&, const NodeRef&) = default;
 };
 
+// What a search knows of a node.
 struct SearchNode {
-  float cost = std::numeric_limits<float>::infinity();
+  static constexpr float kUnasked = -1.0F;
+
+  float cost = std::numeric_limits<float>::infinity();  // of the way that led here
+  float ahead = kUnasked;                               // what the search expects from here on
   NodeRef parent;
 };
 
@@ -52,26 +57,32 @@ struct SurfaceTile {
   static constexpr std::int32_t kNotThere = -1;
 
   TileId id;
+  std::int64_t origin_x = 0;  // of the corner cell, in cells of the level
+  std::int64_t origin_y = 0;
   std::vector<std::uint32_t> cell_begin;  // as in Tile
   std::vector<SurfaceNode> nodes;         // as Tile::layers
   std::vector<SearchNode> search;         // one a node, once the search came here
-  // Slots of the 3 x 3 tiles around, row-major, this one in the middle; only once `is_ready`.
+  // A bit a cell, row by row: whether a node of the cell is an obstacle. 64 cells a word, each row
+  // begins a new one.
+  std::vector<std::uint64_t> obstacle_bits;
+  // Slots of the 3 x 3 tiles around, row-major, this one in the middle; only once `is_joined`.
   std::array<std::int32_t, 9> around{};
-  bool is_ready = false;
+  bool is_joined = false;
 
-  std::span<SurfaceNode> Nodes(std::uint32_t cell) {
-    return std::span(nodes).subspan(cell_begin[cell], cell_begin[cell + 1] - cell_begin[cell]);
-  }
   std::span<const SurfaceNode> Nodes(std::uint32_t cell) const {
     return std::span(nodes).subspan(cell_begin[cell], cell_begin[cell + 1] - cell_begin[cell]);
   }
+  static std::size_t row_words(std::int32_t side) {
+    return (static_cast<std::size_t>(side) + 63) / 64;
+  }
   std::size_t memory_bytes() const {
     return cell_begin.capacity() * sizeof(std::uint32_t) + nodes.capacity() * sizeof(SurfaceNode) +
-           search.capacity() * sizeof(SearchNode);
+           obstacle_bits.capacity() * sizeof(std::uint64_t);
   }
 };
 
-// kInvalidData when `tile` is not tile `id` of this profile.
+// Of a level-0 tile what is open and what is an obstacle, of a coarser one, optimistically, what
+// may hold anything open. kInvalidData when `tile` is not tile `id` of this profile.
 Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
                                     const TileId& id,
                                     const MapProfile& profile,

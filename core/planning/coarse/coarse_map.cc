@@ -1,0 +1,202 @@
+// Obstacles close the cells that lie all within the vehicle's half width of them, wherever in their
+// own cell they stand.
+#include "core/planning/coarse/coarse_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "core/base/integer_math.h"
+
+namespace atlas {
+namespace {
+
+// Merged layers lie this far from those that they were made of, beside what the ground climbs.
+constexpr double kMerged_m = 0.5;
+// An obstacle this near in height stands on the same surface.
+constexpr std::int32_t kSameObstacle_mm = 300;
+constexpr std::size_t kMaxCosts = 255;
+
+}  // namespace
+
+CoarseMap::CoarseMap(TileSource& source,
+                     const MapProfile& profile,
+                     const PlanOptions& options,
+                     PlanBudget& budget,
+                     std::uint8_t level)
+    : tiles_(source, profile, options, budget, level) {
+  const double cell_m = tiles_.cell_m();
+  max_cells_ = static_cast<std::int32_t>(
+      std::ceil((options.max_gap_m + profile.cell_size_m()) / cell_m - 1e-9));
+  const double climb_m =
+      std::tan(options.max_slope_deg * std::numbers::pi / 180.0) * std::numbers::sqrt2 * cell_m;
+  const double step_m = std::min(options.max_step_m + climb_m + kMerged_m, 1e-3 * kSameSurface_mm);
+  max_step_mm_ = static_cast<std::int32_t>(std::lround(step_m * 1e3));
+  FillOffsets(profile, options);
+}
+
+void CoarseMap::FillOffsets(const MapProfile& profile, const PlanOptions& options) {
+  const double reach_m = options.clearance_reach_m();
+  const auto farthest_m = [&](std::int32_t cells) {
+    return (std::abs(cells) + 1) * tiles_.cell_m() - profile.cell_size_m();
+  };
+  const auto cells = static_cast<std::int32_t>(reach_m / tiles_.cell_m()) + 1;
+  for (std::int32_t dy = -cells; dy <= cells; ++dy) {
+    for (std::int32_t dx = -cells; dx <= cells; ++dx) {
+      const double distance_m = std::hypot(farthest_m(dx), farthest_m(dy));
+      if (distance_m < reach_m) {
+        offsets_.push_back({dx, dy, distance_m, distance_m <= options.inflation_m(), 0});
+      }
+    }
+  }
+  std::stable_sort(offsets_.begin(), offsets_.end(),
+                   [](const Offset& a, const Offset& b) { return a.farthest_m < b.farthest_m; });
+  for (Offset& offset : offsets_) {
+    const double spare_m = offset.farthest_m - options.inflation_m();
+    const double crowding =
+        options.comfort_m > 0.0 ? std::clamp(1.0 - spare_m / options.comfort_m, 0.0, 1.0) : 0.0;
+    const auto cost = static_cast<float>(1.0 + options.comfort_weight * crowding);
+    if (costs_.empty() || (cost != costs_.back() && costs_.size() < kMaxCosts)) {
+      costs_.push_back(std::min(cost, costs_.empty() ? cost : costs_.back()));
+    }
+    offset.cost = static_cast<std::uint8_t>(costs_.size() - 1);
+  }
+  costs_.push_back(1.0F);
+}
+
+bool CoarseMap::IsObstacle(const SurfaceTile& home,
+                           const SurfaceNode& node,
+                           const Offset& offset) const {
+  const CellNodes cell = tiles_.Cell(home, node.cell % tiles_.side() + offset.dx,
+                                     node.cell / tiles_.side() + offset.dy);
+  for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
+    const SurfaceNode& other = tiles_.tile(cell.slot).nodes[i];
+    if (other.Has(SurfaceNode::kObstacle) &&
+        std::abs(std::int64_t{other.altitude_mm} - node.altitude_mm) <= kSameObstacle_mm) {
+      return true;
+    }
+  }
+  return false;
+}
+
+Status CoarseMap::Analyse(const NodeRef& ref) {
+  ATLAS_RETURN_IF_ERROR(tiles_.Join(ref.slot));
+  SurfaceNode& node = tiles_.node(ref);
+  if (node.Has(SurfaceNode::kAnalysed)) {
+    return {};
+  }
+  node.flags |= SurfaceNode::kAnalysed;
+  Judge(tiles_.tile(ref.slot), node);
+  if (finest_ != nullptr && node.Has(SurfaceNode::kDrivable)) {
+    const auto is_drivable = IsDrivableBelow(ref);
+    if (!is_drivable) {
+      return is_drivable.error();
+    }
+    if (!*is_drivable) {
+      node.flags &= static_cast<std::uint8_t>(~SurfaceNode::kDrivable);
+    }
+  }
+  return {};
+}
+
+// From the middle of the cell on, where it is most likely.
+Result<bool> CoarseMap::IsDrivableBelow(const NodeRef& ref) {
+  SurfaceTiles& finest = finest_->tiles();
+  const int shift = tiles_.level();
+  const TileId& id = tiles_.tile(ref.slot).id;
+  const SurfaceNode& node = tiles_.node(ref);
+  const std::int32_t side = tiles_.side();
+  const std::int32_t cells = 1 << shift;
+  const std::int32_t x = (node.cell % side) << shift;
+  const std::int32_t y = (node.cell / side) << shift;
+  const auto slot = finest.Load({0, (id.x << shift) + x / side, (id.y << shift) + y / side});
+  if (!slot) {
+    return Error(slot.error());
+  }
+  if (*slot == SurfaceTile::kNotThere) {
+    return false;
+  }
+  const auto home = static_cast<std::uint32_t>(*slot);
+  const std::int32_t half = cells / 2;
+  for (std::int32_t i = 0; i < cells * cells; ++i) {
+    const std::int32_t cx = x % side + (i + half) % cells;
+    const std::int32_t cy = y % side + (i / cells + half) % cells;
+    const auto cell = static_cast<std::uint32_t>(cy * side + cx);
+    const SurfaceTile& tile = finest.tile(home);
+    for (std::uint32_t n = tile.cell_begin[cell]; n < tile.cell_begin[cell + 1]; ++n) {
+      if (std::abs(std::int64_t{tile.nodes[n].altitude_mm} - node.altitude_mm) >= kSameSurface_mm) {
+        continue;
+      }
+      if (Status status = finest_->Analyse({home, n}); !status.ok()) {
+        return Error(std::move(status));
+      }
+      if (tile.nodes[n].Has(SurfaceNode::kDrivable)) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+void CoarseMap::Judge(const SurfaceTile& home, SurfaceNode& node) const {
+  node.clearance = static_cast<std::uint8_t>(costs_.size() - 1);
+  if (!node.Has(SurfaceNode::kOpen)) {
+    return;
+  }
+  for (const Offset& offset : offsets_) {
+    if (IsObstacle(home, node, offset)) {
+      node.clearance = offset.cost;
+      if (offset.closes) {
+        return;
+      }
+      break;
+    }
+  }
+  node.flags |= SurfaceNode::kDrivable;
+}
+
+Result<NodeRef> CoarseMap::Above(const SurfaceTiles& finer, const NodeRef& ref) {
+  const int shift = tiles_.level() - finer.level();
+  const std::int64_t side = tiles_.side();
+  const std::int64_t x = finer.CellX(ref) >> shift;
+  const std::int64_t y = finer.CellY(ref) >> shift;
+  const TileId id{tiles_.level(), static_cast<std::int32_t>(FloorDiv(x, side)),
+                  static_cast<std::int32_t>(FloorDiv(y, side))};
+  const auto slot = tiles_.Load(id);
+  if (!slot) {
+    return Error(slot.error());
+  }
+  NodeRef best;
+  if (*slot == SurfaceTile::kNotThere) {
+    return best;
+  }
+  const auto home = static_cast<std::uint32_t>(*slot);
+  if (Status status = tiles_.Join(home); !status.ok()) {
+    return Error(std::move(status));
+  }
+  std::int32_t best_squared = std::numeric_limits<std::int32_t>::max();
+  for (std::int32_t dy = -1; dy <= 1; ++dy) {
+    for (std::int32_t dx = -1; dx <= 1; ++dx) {
+      const CellNodes cell =
+          tiles_.Cell(tiles_.tile(home), static_cast<std::int32_t>(x - id.x * side) + dx,
+                      static_cast<std::int32_t>(y - id.y * side) + dy);
+      const NodeRef node = tiles_.Nearest(cell, finer.node(ref).altitude_mm, kSameSurface_mm);
+      if (node.is_none() || dx * dx + dy * dy >= best_squared) {
+        continue;
+      }
+      if (Status status = Analyse(node); !status.ok()) {
+        return Error(std::move(status));
+      }
+      if (tiles_.node(node).Has(SurfaceNode::kDrivable)) {
+        best = node;
+        best_squared = dx * dx + dy * dy;
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace atlas

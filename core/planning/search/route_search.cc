@@ -1,0 +1,97 @@
+// Guided where a corridor leads, else everywhere.
+#include "core/planning/search/route_search.h"
+
+#include <utility>
+
+#include "core/planning/search/ahead.h"
+#include "core/planning/search/corridor.h"
+#include "core/planning/search/enclosure.h"
+#include "core/planning/search/grid_search.h"
+
+namespace atlas {
+namespace {
+
+// The search leans so much towards the goal. What it finds is compared with the corridor's lower
+// bound; if it may be dearer than kLoss, the search is made again leaning less. Measured: leaning
+// by 5 % costs routes 0.6 %, by 10 % 1.1 %; by 2 % it expands twice as much as by 5 %.
+constexpr float kLeaning = 1.05F;
+constexpr float kUpright = 1.0F;
+constexpr float kLeaningLess = 1.0F + static_cast<float>(RouteSearch::kLoss);
+// The coarse level takes for open what is not, by 2 % of a street and more at crossings: streets
+// that much dearer may be the cheapest after all. Where there is no way on them, others may lead
+// on.
+constexpr Corridor::Width kWidths[] = {{1.05F, 20.0F}, {1.5F, 200.0F}};
+// On shorter ways what coarse cells round at both ends is more than leaning may add.
+constexpr double kShort_m = 60.0;
+
+template <typename Ahead>
+Result<std::vector<NodeRef>> Search(SurfaceMap& map,
+                                    const Ahead& ahead,
+                                    PlanBudget& budget,
+                                    const NodeRef& start,
+                                    const NodeRef& goal) {
+  map.tiles().ClearSearch();
+  GridSearch<SurfaceMap, Ahead> search(map, ahead, budget);
+  const auto end = search.RunTo(start, goal);
+  if (!end) {
+    return Error(end.error());
+  }
+  return *end ? search.WayTo(goal) : std::vector<NodeRef>();
+}
+
+}  // namespace
+
+Result<std::vector<NodeRef>> RouteSearch::Run(const NodeRef& start, const NodeRef& goal) {
+  if (options_.is_exhaustive) {
+    return Everywhere(start, goal);
+  }
+  Corridor corridor(source_, profile_, options_, budget_, map_);
+  auto way = Guided(corridor, start, goal);
+  if (!way || !way->empty()) {
+    return way;
+  }
+  if (!corridor.has_coarse_ends()) {
+    return Everywhere(start, goal);
+  }
+  const auto is_enclosed = IsEnclosed(map_, goal, start, budget_);
+  if (!is_enclosed) {
+    return Error(is_enclosed.error());
+  }
+  return *is_enclosed ? std::move(way) : Everywhere(start, goal);
+}
+
+Result<std::vector<NodeRef>> RouteSearch::Guided(Corridor& corridor,
+                                                 const NodeRef& start,
+                                                 const NodeRef& goal) {
+  for (const Corridor::Width& width : kWidths) {
+    const auto bound = corridor.Find(start, goal, width);
+    if (!bound) {
+      return Error(bound.error());
+    }
+    if (!*bound) {
+      continue;
+    }
+    const bool is_short = **bound < kShort_m;
+    for (const float weight : {is_short ? kUpright : kLeaning, kLeaningLess}) {
+      const GuidedAhead ahead(map_.tiles(), corridor.tiles(), weight);
+      auto way = Search(map_, ahead, budget_, start, goal);
+      if (!way) {
+        return way;
+      }
+      if (way->empty()) {
+        break;
+      }
+      const double limit = (1.0 + kLoss) * **bound;
+      if (map_.tiles().cost(goal) <= limit || weight <= kLeaningLess) {
+        return way;
+      }
+    }
+  }
+  return std::vector<NodeRef>();
+}
+
+Result<std::vector<NodeRef>> RouteSearch::Everywhere(const NodeRef& start, const NodeRef& goal) {
+  return Search(map_, StraightAhead(map_.tiles(), goal), budget_, start, goal);
+}
+
+}  // namespace atlas
