@@ -73,6 +73,7 @@ struct LocalizerOptions {
 struct LocalizationResult {
   Pose T_world_sensor = Pose::Identity();
   LocalizationHealth health = LocalizationHealth::kLost;
+  PoseCovariance covariance = PoseCovariance::Zero();  // of the pose, all that is known considered
   RegistrationResult registration;
 };
 
