@@ -1,8 +1,10 @@
 // `atlas localize DIR`: where a drive's scans lie in the map, scored against the drive's poses.
+#include <filesystem>
 #include <numbers>
 
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/commands/drive/track_output.h"
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
@@ -15,14 +17,14 @@ namespace {
 
 boost::json::object ScanJson(const LocalizedScan& scan) {
   boost::json::array pose;
-  for (const double number : PoseToRowMajor(scan.T_world_sensor)) {
+  for (const double number : PoseToRowMajor(scan.located.T_world_sensor)) {
     pose.emplace_back(number);
   }
   return {{"type", "scan"},
           {"scan", scan.scan},
           {"trial", scan.trial},
           {"pose", std::move(pose)},
-          {"health", LocalizationHealthName(scan.health)},
+          {"health", LocalizationHealthName(scan.located.health)},
           {"error_m", Rounded(scan.error.translation_m, 5)},
           {"error_deg", Rounded(scan.error.rotation_deg, 5)}};
 }
@@ -75,12 +77,16 @@ class LocalizeCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt");
-    drive_.DeclareSelection(arguments, options_.max_range_m, "what is matched");
+    drive_.DeclareScans(arguments);
+    arguments.Optional("--max-range", "M", options_.max_range_m,
+                       "Reach of what is matched [100; paper: 40]");
     arguments.Optional("--perturb", "T_M,R_DEG", perturbation_,
                        "Single shots from starts so far off; else the drive is tracked");
     arguments.Optional("--trials", "N", trials_, "Single shots a scan [10]");
     arguments.Optional("--seed", "K", options_.seed, "Of the disturbances [0]");
-    arguments.Choice("--mode", {"atlas"}, mode_, "How scans are matched");
+    arguments.Choice("--mode", {"atlas", "paper"}, mode_,
+                     "How scans are matched; paper: its encode, decode and ICP, to compare with");
+    track_.Declare(arguments);
   }
 
   Status Run(CommandContext& context) override {
@@ -91,6 +97,7 @@ class LocalizeCommand : public Command {
     if (!map) return map.error();
     const auto report = Localize(*drive, map->source(), context);
     if (!report) return report.error();
+    ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
     if (context.is_json) {
       context.PrintJson(SummaryJson(*report, map->bytes_received()));
     } else {
@@ -104,6 +111,7 @@ class LocalizeCommand : public Command {
     const Result<ScanParity> parity = drive_.parity();
     if (!parity) return parity.error();
     options_.rings = drive_.rings();
+    options_.mode = mode_ == "paper" ? LocalizationMode::kPaper : LocalizationMode::kAtlas;
     options_.selection.parity = *parity;
     if (trials_ && !perturbation_) {
       return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
@@ -113,12 +121,19 @@ class LocalizeCommand : public Command {
                         perturbation_->rotation_deg * std::numbers::pi / 180.0,
                         trials_.value_or(10)};
     }
+    ATLAS_RETURN_IF_ERROR(track_.Check(!perturbation_));
     return options_.Validate();
+  }
+
+  std::string Title(const DriveFolder& drive) const {
+    const std::filesystem::path folder = std::filesystem::absolute(drive.path).lexically_normal();
+    const std::string name = (folder / ".").parent_path().filename().string();
+    return StrCat(name.empty() ? folder.parent_path().filename().string() : name, ", mode ", mode_);
   }
 
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,
                                            MapSource& source,
-                                           const CommandContext& context) const {
+                                           const CommandContext& context) {
     MapView view(source);
     // Lines of a stream would run into the bar on the same terminal.
     const bool is_stream_seen = context.is_json && context.is_out_terminal;
@@ -127,11 +142,13 @@ class LocalizeCommand : public Command {
                     drive.scans.back().number - first + 1);
     return LocalizeDrive(drive, options_, view, [&](const LocalizedScan& scan) {
       if (context.is_json) context.PrintJson(ScanJson(scan));
+      if (track_.is_wanted()) track_.Add(scan);
       bar.Update(scan.scan - first + 1);
     });
   }
 
   DriveFlags drive_;
+  TrackOutput track_;
   std::string mode_ = "atlas";
   std::optional<Perturbation> perturbation_;
   std::optional<std::uint32_t> trials_;
