@@ -41,6 +41,7 @@ KEYS = {
                 "bytes_received",
     "plan": "found length_m cost waypoints tiles_loaded ms",
     "render": "width height metres_per_pixel",
+    "export": "points",
     "simulate": "scans metres",
 }
 LAYER = "z_m sigma_m occupancy traversable measured observations confirmed column"
@@ -72,6 +73,7 @@ def lines_of(cases, work, drive):
         "localize": ["localize", drive, "--perturb", "0.2,1", "--trials", "2", "--max-range", "12"],
         "plan": ["plan", "--from", "0,-1.6,0", "--to", "4,-1.6,0"],
         "render": ["render", "-o", f"{work}/map.png"],
+        "export": ["export", "--points", f"{work}/map.pcd"],
     }
 
 
