@@ -44,7 +44,7 @@ Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
   return DiskError("cannot write", path, failed);
 }
 
-Status WriteWholeFile(const std::filesystem::path& path, std::string_view text) {
+Status WriteTextFile(const std::filesystem::path& path, std::string_view text) {
   return WriteWholeFile(path,
                         ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }

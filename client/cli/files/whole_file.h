@@ -15,7 +15,7 @@ Status MakeDirectory(const std::filesystem::path& directory);
 
 // Written beside `path` and renamed over it.
 Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes);
-Status WriteWholeFile(const std::filesystem::path& path, std::string_view text);
+Status WriteTextFile(const std::filesystem::path& path, std::string_view text);
 
 // Also of a pipe. kNotFound, kPermissionDenied, kInvalidData for a folder; kResourceExhausted above
 // `max_bytes`.

@@ -125,10 +125,10 @@ class LocalizeCommand : public Command {
     return options_.Validate();
   }
 
+  // Of the picture: the folder's own name.
   std::string Title(const DriveFolder& drive) const {
     const std::filesystem::path folder = std::filesystem::absolute(drive.path).lexically_normal();
-    const std::string name = (folder / ".").parent_path().filename().string();
-    return StrCat(name.empty() ? folder.parent_path().filename().string() : name, ", mode ", mode_);
+    return StrCat((folder / ".").parent_path().filename().string(), ", mode ", mode_);
   }
 
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,

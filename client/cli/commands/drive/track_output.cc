@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include <unistd.h>
+
 #include "client/cli/files/whole_file.h"
 #include "client/render/image.h"
 #include "client/render/plot/line_plot.h"
@@ -24,7 +26,7 @@ constexpr Rgb kViolet{148, 103, 189};
 Status CheckPlace(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder, error)) return DiskError("cannot write", path, ENOENT);
+  if (::access((folder / ".").c_str(), W_OK) != 0) return DiskError("cannot write", path, errno);
   if (std::filesystem::is_directory(path, error)) return DiskError("cannot write", path, EISDIR);
   return {};
 }
@@ -98,14 +100,14 @@ Status TrackOutput::Check(bool is_tracking) {
 
 Status TrackOutput::Write(const std::string& title) const {
   if (format_) {
-    ATLAS_RETURN_IF_ERROR(WriteWholeFile(text_file_, TrackText(*format_, scans_)));
+    ATLAS_RETURN_IF_ERROR(WriteTextFile(text_file_, TrackText(*format_, scans_)));
   }
   return plot_file_.empty() ? Status() : WritePlot(title);
 }
 
 Status TrackOutput::WritePlot(const std::string& title) const {
   const LinePlot plot = PlotOf(scans_, title);
-  return is_svg_ ? WriteWholeFile(plot_file_, PlotSvg(plot)) : WritePng(DrawPlot(plot), plot_file_);
+  return is_svg_ ? WriteTextFile(plot_file_, PlotSvg(plot)) : WritePng(DrawPlot(plot), plot_file_);
 }
 
 }  // namespace atlas

@@ -18,7 +18,7 @@ class TrackOutput {
   void Declare(ArgumentSet& arguments);
 
   // Before anything is computed: kInvalidArgument for an unknown ending, or for a trajectory
-  // of single shots; kNotFound or kConflict where the files cannot be.
+  // of single shots; kNotFound, kPermissionDenied or kConflict where the files cannot be.
   Status Check(bool is_tracking);
   bool is_wanted() const { return !text_file_.empty() || !plot_file_.empty(); }
   void Add(const LocalizedScan& scan) { scans_.push_back(scan); }
