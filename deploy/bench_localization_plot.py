@@ -29,12 +29,12 @@ def draw_shots(results, records, path):
                         label=f"{NAMES[shots.mode]}, {rings} rings")
         axes[0, 1].scatter(shots.cpu_ms(), shots.rmse("error_m"), color=color, marker="o" if rings == 16 else "s", s=60)
         axes[0, 1].annotate(f"{NAMES[shots.mode]}, {rings}", (shots.cpu_ms(), shots.rmse("error_m")), fontsize=8,
-                            xytext=(6, 4), textcoords="offset points")
+                            xytext=(0, 7), textcoords="offset points", ha="center")
     axes[0, 0].set(xscale="log", xlabel="error, m", ylabel="share of shots", title="single shots")
     axes[0, 0].legend(fontsize=8)
     axes[0, 1].set(xscale="log", yscale="log", xlabel="CPU ms a scan", ylabel="RMSE, m",
                    title="what it costs (circles: 16 rings, squares: 64)")
-    axes[0, 1].margins(0.2)
+    axes[0, 1].margins(0.25)
     rows = [record for record in records if record["rings"] == 16 and record["mode"] != "raw"]
     bars(axes[1, 0], [row for row in rows if row["cell_m"] == 0.2 and row["range_m"] == 40], "segments",
          lambda row: str(row["segments"]))
@@ -55,7 +55,7 @@ def bars(axis, rows, what, name_of):
         axis.bar([k + 0.27 * (i - 1) for k in range(len(names))], [values[name] for name in names], 0.25, color=color,
                  label=label)
     axis.set_xticks(range(len(names)), names)
-    axis.set(xlabel=what, ylabel="RMSE, m")
+    axis.set(xlabel=what, ylabel="RMSE, m", ylim=(0.0, 1.3 * max(max(values.values()) for _, _, values in series)))
     axis.legend(fontsize=8)
 
 
