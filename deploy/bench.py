@@ -5,7 +5,6 @@ the median of five runs."""
 import argparse
 import importlib
 import json
-import math
 import os
 import pathlib
 import statistics
@@ -17,10 +16,12 @@ import bench_asked
 import bench_crowd
 import bench_follow
 import bench_load
+import bench_localization
 import bench_memory
 import bench_nginx
 import bench_planning
 import bench_serving
+import bench_tracking
 import bench_unread
 import bench_updates
 from bench_daemon import Atlas
@@ -73,32 +74,6 @@ def bench_frontend(bin_dir):
                     for i, folder in enumerate(folders)))
         emit(f"frontend.scan_to_blob.{name}", statistics.median(times), "ms",
              "the paper, 16 rings, 20 m", 46.2)
-
-
-def bench_localization(bin_dir):
-    squares = {"translation": 0.0, "rotation": 0.0}
-    shots = failures = 0
-    rates = []
-    for piece in PIECES:
-        folder = drive(f"semantickitti_mini/{piece}")
-        with Atlas(bin_dir, "--cell-size", "0.2", "--segments", "8", "--segment-height", "1") as atlas:
-            atlas.run("ingest", folder, "--scans", "even", "--every", 0, "--rings", 16, "--max-range", 40)
-            atlas.run("wait")
-            result = atlas.run("localize", folder, "--scans", "odd", "--rings", 16, "--max-range", 40,
-                               "--perturb", "0.4,1.5")
-        hits = result["shots"] - result["failures"]
-        squares["translation"] += hits * result["translation_rmse_m"] ** 2
-        squares["rotation"] += hits * result["rotation_rmse_deg"] ** 2
-        shots += result["shots"]
-        failures += result["failures"]
-        rates.append(result["hz"])
-    hits = shots - failures
-    emit("localization.translation_rmse", math.sqrt(squares["translation"] / hits), "m",
-         "the paper's encode-decode-ICP", 0.108)
-    emit("localization.rotation_rmse", math.sqrt(squares["rotation"] / hits), "deg",
-         "the paper's encode-decode-ICP", 0.36)
-    emit("localization.failures", failures, f"of {shots}", "none", None)
-    emit("localization.rate", statistics.median(rates), "scans/CPU s", "the paper", 10.0)
 
 
 def bench_fusion(bin_dir):
@@ -205,6 +180,7 @@ def draw_curbs(rows, path):
     figure.savefig(path, dpi=110)
 
 
+PARTS = ("tracking",)  # of localization: by name alone
 WITH_CLIENT = ("soak", "restart", "purge")  # the one in Python, whose messages the build makes
 
 
@@ -213,13 +189,14 @@ def bench_with_client(name, bin_dir):
 
 
 BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
-              "localization": bench_localization, "fusion": bench_fusion, "accuracy": bench_accuracy,
+              "fusion": bench_fusion, "accuracy": bench_accuracy,
               "curbs": bench_curbs,
               **{name: lambda bin_dir, bench=bench: bench(bin_dir, emit, drive)
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
                                    **bench_memory.BENCHMARKS, **bench_planning.BENCHMARKS, **bench_unread.BENCHMARKS,
-                                   **bench_crowd.BENCHMARKS}.items()},
+                                   **bench_crowd.BENCHMARKS, **bench_localization.BENCHMARKS,
+                                   **bench_tracking.BENCHMARKS}.items()},
               **{name: lambda bin_dir, name=name: bench_with_client(name, bin_dir) for name in WITH_CLIENT}}
 
 
@@ -236,7 +213,7 @@ def main():
     bench_nginx.PROGRAM = args.nginx
     bench_memory.LONG = bench_asked.LONG = args.long
     missed = []
-    for name in args.names or BENCHMARKS:
+    for name in args.names or [name for name in BENCHMARKS if name not in PARTS]:
         try:
             BENCHMARKS[name](args.bin)
         except bench_asked.NotAsAsked as miss:

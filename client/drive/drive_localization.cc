@@ -1,13 +1,11 @@
 #include "client/drive/drive_localization.h"
 
-#include <numbers>
+#include <utility>
 
 #include "client/drive/drive_survey.h"
 #include "client/drive/localization_trial.h"
-#include "client/drive/tiles_around.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
-#include "core/keyframe/keyframe_builder.h"
 #include "core/scan/scan_reader.h"
 
 namespace atlas {
@@ -17,19 +15,9 @@ class DriveLocalization {
  public:
   DriveLocalization(const DriveFolder& drive,
                     const DriveLocalizationOptions& options,
-                    DriveSurvey survey,
-                    MapView& view,
+                    ScanLocalizer& localizer,
                     const std::function<void(const LocalizedScan&)>& on_scan)
-      : drive_(drive),
-        options_(options),
-        survey_(std::move(survey)),
-        on_scan_(on_scan),
-        localizer_(
-            view.profile(),
-            [&view](const Eigen::Vector3d& center, double radius_m) {
-              return TilesAroundPlace(view, center, radius_m);
-            },
-            LocalizerOptionsFor(options)) {}
+      : drive_(drive), options_(options), on_scan_(on_scan), localizer_(localizer) {}
 
   Result<DriveLocalizationReport> Run() {
     std::optional<std::uint32_t> last_part;
@@ -48,12 +36,6 @@ class DriveLocalization {
   }
 
  private:
-  static LocalizerOptions LocalizerOptionsFor(const DriveLocalizationOptions& options) {
-    LocalizerOptions result;
-    result.features.max_range_m = static_cast<float>(options.max_range_m);
-    return result;
-  }
-
   Status Shoot(const DriveScan& scan, const PointCloud& cloud) {
     for (std::uint32_t trial = 0; trial < options_.shots->trials; ++trial) {
       const TrialSeed seed{options_.seed, scan.number, trial};
@@ -62,47 +44,59 @@ class DriveLocalization {
       localizer_.Start(PerturbedStart(scan.T_world_sensor, R_level_sensor,
                                       options_.shots->translation_m, options_.shots->yaw_rad,
                                       seed));
-      ATLAS_RETURN_IF_ERROR(Localize(scan, cloud, R_level_sensor, trial));
+      LocalizedScan localized;
+      localized.trial = trial;
+      ATLAS_RETURN_IF_ERROR(Localize(scan, cloud, R_level_sensor, localized));
     }
     return {};
   }
 
   Status Track(const DriveScan& scan, const PointCloud& cloud, bool is_start, bool is_after_jump) {
-    if (is_start) {
+    if (is_start && (options_.is_restarted || !is_after_jump)) {
       localizer_.Start(scan.T_world_sensor);
       report_.restarts += is_after_jump ? 1U : 0U;
     }
     const Eigen::Quaterniond R_level_sensor = DisturbedLevel(
         scan.T_world_sensor, options_.tilt_error_rad, {options_.seed, scan.number, 0});
-    return Localize(scan, cloud, R_level_sensor, 0);
+    LocalizedScan localized;
+    localized.is_after_jump = is_start && is_after_jump;
+    return Localize(scan, cloud, R_level_sensor, localized);
   }
 
   Status Localize(const DriveScan& scan,
                   const PointCloud& cloud,
                   const Eigen::Quaterniond& R_level_sensor,
-                  std::uint32_t trial) {
+                  LocalizedScan localized) {
     const CpuTimer timer;
-    const LeveledScan leveled =
-        SegmentScan(cloud, survey_.layout, survey_.ring_step, R_level_sensor, {});
-    const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor);
-    report_.cpu_s += timer.elapsed_s();
-    if (!result) return result.error();
-    LocalizedScan localized;
+    Result<LocatedScan> located = localizer_.Locate(cloud, R_level_sensor);
+    localized.cpu_s = timer.elapsed_s();
+    if (!located) return located.error();
     localized.scan = scan.number;
-    localized.trial = trial;
-    localized.T_world_sensor = result->T_world_sensor;
-    localized.health = result->health;
-    localized.error = ErrorOf(result->T_world_sensor, scan.T_world_sensor);
-    report_.score.Add(localized.error, result->health == LocalizationHealth::kLost);
+    localized.time_s = scan.time_s;
+    localized.located = *std::move(located);
+    Judge(scan.T_world_sensor, localized);
     on_scan_(localized);
     return {};
   }
 
+  void Judge(const Pose& truth, LocalizedScan& localized) {
+    const LocatedScan& located = localized.located;
+    const bool is_lost = located.health == LocalizationHealth::kLost;
+    localized.error = ErrorOf(located.T_world_sensor, truth);
+    localized.offset = OffsetOf(located.T_world_sensor, truth);
+    localized.is_failure = IsFailure(localized.error, is_lost);
+    if (located.covariance) {
+      localized.covariance = AlongHeading(*located.covariance, truth);
+      localized.normalized_square = NormalizedSquare(localized.offset, *localized.covariance);
+    }
+    report_.score.Add(localized.error, is_lost);
+    report_.cpu_s += localized.cpu_s;
+  }
+
   const DriveFolder& drive_;
   const DriveLocalizationOptions& options_;
-  DriveSurvey survey_;
   const std::function<void(const LocalizedScan&)>& on_scan_;
-  Localizer localizer_;
+  ScanLocalizer& localizer_;
   DriveLocalizationReport report_;
 };
 
@@ -112,13 +106,25 @@ SurveyOptions SurveyOptionsFor(const DriveLocalizationOptions& options) {
   return survey;
 }
 
+Result<std::unique_ptr<ScanLocalizer>> MakeLocalizer(const DriveFolder& drive,
+                                                     const DriveLocalizationOptions& options,
+                                                     MapView& view) {
+  const bool is_paper = options.mode == LocalizationMode::kPaper;
+  const SurveyOptions survey_options = SurveyOptionsFor(options);
+  const Result<DriveSurvey> survey =
+      is_paper ? SurveyDrive(drive, survey_options) : SurveySensor(drive, survey_options);
+  if (!survey) return Error(survey.error());
+  if (is_paper) return MakePaperLocalizer(*survey, options.range_m(), view);
+  return MakeAtlasLocalizer(*survey, options.range_m(), view);
+}
+
 }  // namespace
 
 Status DriveLocalizationOptions::Validate() const {
   ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
-  if (!(max_range_m >= 1.0 && max_range_m <= 200.0)) {
+  if (!(range_m() >= 1.0 && range_m() <= 200.0)) {
     return {StatusCode::kInvalidArgument,
-            StrCat("maximum range ", max_range_m, " m: expected 1 to 200")};
+            StrCat("maximum range ", range_m(), " m: expected 1 to 200")};
   }
   if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
@@ -132,9 +138,18 @@ Result<DriveLocalizationReport> LocalizeDrive(
     MapView& view,
     const std::function<void(const LocalizedScan&)>& on_scan) {
   if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
-  Result<DriveSurvey> survey = SurveySensor(drive, SurveyOptionsFor(options));
-  if (!survey) return Error(survey.error());
-  return DriveLocalization(drive, options, *std::move(survey), view, on_scan).Run();
+  const auto localizer = MakeLocalizer(drive, options, view);
+  if (!localizer) return Error(localizer.error());
+  return LocalizeDrive(drive, options, **localizer, on_scan);
+}
+
+Result<DriveLocalizationReport> LocalizeDrive(
+    const DriveFolder& drive,
+    const DriveLocalizationOptions& options,
+    ScanLocalizer& localizer,
+    const std::function<void(const LocalizedScan&)>& on_scan) {
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
+  return DriveLocalization(drive, options, localizer, on_scan).Run();
 }
 
 }  // namespace atlas

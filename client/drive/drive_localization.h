@@ -9,13 +9,17 @@
 #include <optional>
 
 #include "client/drive/drive_selection.h"
+#include "client/drive/scan_localizer.h"
 #include "client/map/map_view.h"
 #include "client/score/localization_score.h"
+#include "client/score/pose_offset.h"
 #include "core/base/status.h"
 #include "core/localization/localizer.h"
 #include "core/scan/drive_folder.h"
 
 namespace atlas {
+
+enum class LocalizationMode { kAtlas, kPaper };  // ours; the paper's encode, decode and ICP
 
 struct DriveLocalizationOptions {
   struct Shots {
@@ -24,13 +28,18 @@ struct DriveLocalizationOptions {
     std::uint32_t trials = 10;  // a scan
   };
 
+  LocalizationMode mode = LocalizationMode::kAtlas;
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
-  double max_range_m = 100.0;
-  std::optional<Shots> shots;  // tracking, if not given
+  std::optional<double> max_range_m;  // 100 m; the paper's: 40 m
+  std::optional<Shots> shots;         // tracking, if not given
   std::uint64_t seed = 0;
+  bool is_restarted = true;  // tracking is told where it is after a jump
   double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;  // a cheap IMU's
 
+  double range_m() const {
+    return max_range_m.value_or(mode == LocalizationMode::kPaper ? 40.0 : 100.0);
+  }
   // kInvalidArgument naming the first option out of range.
   Status Validate() const;
 };
@@ -38,9 +47,16 @@ struct DriveLocalizationOptions {
 struct LocalizedScan {
   std::uint32_t scan = 0;
   std::uint32_t trial = 0;
-  Pose T_world_sensor = Pose::Identity();
-  LocalizationHealth health = LocalizationHealth::kLost;
+  std::optional<double> time_s;  // where the drive says it
+  LocatedScan located;
   PoseError error;
+  PoseOffset offset;
+  // Of (along, left, up, yaw), where the method knows it, and the error measured against it.
+  std::optional<Eigen::Matrix4d> covariance;
+  std::optional<double> normalized_square;
+  bool is_failure = false;     // as LocalizationScore counts
+  bool is_after_jump = false;  // tracking began again here
+  double cpu_s = 0.0;
 };
 
 struct DriveLocalizationReport {
@@ -57,6 +73,12 @@ Result<DriveLocalizationReport> LocalizeDrive(
     const DriveFolder& drive,
     const DriveLocalizationOptions& options,
     MapView& view,
+    const std::function<void(const LocalizedScan&)>& on_scan);
+// By a method of the caller's; `options.mode` and the range mean nothing then.
+Result<DriveLocalizationReport> LocalizeDrive(
+    const DriveFolder& drive,
+    const DriveLocalizationOptions& options,
+    ScanLocalizer& localizer,
     const std::function<void(const LocalizedScan&)>& on_scan);
 
 }  // namespace atlas

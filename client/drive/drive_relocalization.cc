@@ -1,10 +1,11 @@
 #include "client/drive/drive_relocalization.h"
 
-#include <cmath>
+#include <algorithm>
 #include <utility>
 
 #include "client/drive/drive_survey.h"
 #include "client/drive/localization_trial.h"
+#include "client/drive/place_reader.h"
 #include "client/drive/tiles_around.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
@@ -44,16 +45,17 @@ Status DriveRelocalizationOptions::Validate() const {
 Result<DriveRelocalizationReport> RelocalizeDrive(
     const DriveFolder& drive,
     const DriveRelocalizationOptions& options,
-    std::shared_ptr<const PlaceIndex> places,
     MapView& view,
     const std::function<void(const RelocalizedScan&)>& on_scan) {
   if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
   const Result<DriveSurvey> survey = SurveySensor(drive, SurveyOptionsFor(options));
   if (!survey) return Error(survey.error());
+  auto places = ReadPlaces(view);
+  if (!places) return Error(places.error());
   DriveRelocalizationReport report;
-  report.places = places->places();
+  report.places = (*places)->places();
   const Relocalizer relocalizer(
-      view.profile(), std::move(places),
+      view.profile(), *std::move(places),
       [&view](const Eigen::Vector3d& center, double radius_m) {
         return TilesAroundPlace(view, center, radius_m);
       },

@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <numbers>
 #include <optional>
 
@@ -49,10 +48,10 @@ struct DriveRelocalizationReport {
   static constexpr double kRight_m = 0.5;
 };
 
+// Reads the whole map first.
 Result<DriveRelocalizationReport> RelocalizeDrive(
     const DriveFolder& drive,
     const DriveRelocalizationOptions& options,
-    std::shared_ptr<const PlaceIndex> places,
     MapView& view,
     const std::function<void(const RelocalizedScan&)>& on_scan);
 

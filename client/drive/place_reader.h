@@ -3,14 +3,13 @@
 
 #include <memory>
 
-#include "client/map/map_source.h"
+#include "client/map/map_view.h"
 #include "core/base/status.h"
 #include "core/localization/places/place_index.h"
 
 namespace atlas {
 
-// Reads all level-0 tiles, one after the other, and keeps none. Fails as the source does;
-// kInvalidData on a blob that is not the tile it should be.
-Result<std::shared_ptr<const PlaceIndex>> ReadPlaces(MapSource& source);
+// Reads all level-0 tiles, one after the other, and keeps none. Fails as the view does.
+Result<std::shared_ptr<const PlaceIndex>> ReadPlaces(MapView& view);
 
 }  // namespace atlas

@@ -13,18 +13,33 @@ namespace atlas {
 MapView::MapView(MapSource& source, const MapViewOptions& options)
     : source_(source), options_(options), cache_(options.max_cache_bytes) {}
 
+Result<Tile> MapView::Decode(const TileBlob& read) const {
+  Result<Tile> tile = DecodeTile(read.blob, profile());
+  if (!tile) return Error(tile.error().WithContext(StrCat("tile ", read.id)));
+  if (tile->id != read.id) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("tile ", read.id, ": the blob says it is ", tile->id));
+  }
+  return tile;
+}
+
 Status MapView::Fetch(std::uint8_t level, const DiscArea& disc, const OnDecoded& on_tile) {
   return source_.ReadLevel(level, disc, [&](const TileBlob& read) -> Status {
-    Result<Tile> tile = DecodeTile(read.blob, profile());
-    if (!tile) return tile.error().WithContext(StrCat("tile ", read.id));
-    if (tile->id != read.id) {
-      return {StatusCode::kInvalidData,
-              StrCat("tile ", read.id, ": the blob says it is ", tile->id)};
-    }
+    Result<Tile> tile = Decode(read);
+    if (!tile) return tile.error();
     ++tiles_loaded_;
     auto shared = std::make_shared<const Tile>(*std::move(tile));
     cache_.Put(read.id, shared);
     on_tile(shared);
+    return {};
+  });
+}
+
+Status MapView::ReadAll(std::uint8_t level, const std::function<void(const Tile&)>& on_tile) {
+  return source_.ReadLevel(level, std::nullopt, [&](const TileBlob& read) -> Status {
+    const Result<Tile> tile = Decode(read);
+    if (!tile) return tile.error();
+    on_tile(*tile);
     return {};
   });
 }

@@ -35,6 +35,8 @@ class MapView {
   Result<std::shared_ptr<const Tile>> Get(const TileId& id);
   // Makes sure that the tiles of `level` that the disc touches are known.
   Status Load(const Eigen::Vector2d& center_m, double radius_m, std::uint8_t level);
+  // Calls back once for every tile of `level`, in any order, and keeps none.
+  Status ReadAll(std::uint8_t level, const std::function<void(const Tile&)>& on_tile);
   // The layers of the cell that holds the place, lowest first; empty where there is none.
   Result<std::vector<TileLayer>> LayersAt(const Eigen::Vector2d& p_m, std::uint8_t level = 0);
   void Forget() { cache_.Clear(); }
@@ -44,6 +46,7 @@ class MapView {
  private:
   using OnDecoded = std::function<void(const std::shared_ptr<const Tile>&)>;
 
+  Result<Tile> Decode(const TileBlob& read) const;
   Status Fetch(std::uint8_t level, const DiscArea& disc, const OnDecoded& on_tile);
   Result<std::shared_ptr<const Tile>> FetchOne(const TileId& id);
   Status FetchDisc(std::uint8_t level, const DiscArea& disc, const std::vector<TileId>& missing);

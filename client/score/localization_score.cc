@@ -19,12 +19,15 @@ PoseError ErrorOf(const Pose& estimate, const Pose& truth) {
           a.angularDistance(b) * 180.0 / std::numbers::pi};
 }
 
+bool IsFailure(const PoseError& error, bool is_lost) {
+  return is_lost ||
+         !(error.translation_m <= kMaxTranslation_m && error.rotation_deg <= kMaxRotation_deg);
+}
+
 void LocalizationScore::Add(const PoseError& error, bool is_lost) {
   ++shots_;
   lost_ += is_lost ? 1U : 0U;
-  const bool is_near =
-      error.translation_m <= kMaxTranslation_m && error.rotation_deg <= kMaxRotation_deg;
-  if (is_lost || !is_near) {
+  if (IsFailure(error, is_lost)) {
     ++failures_;
     return;
   }

@@ -14,10 +14,12 @@ struct PoseError {
 };
 PoseError ErrorOf(const Pose& estimate, const Pose& truth);
 
+// A shot that is lost, or off by more than 1 m or 5 degrees.
+bool IsFailure(const PoseError& error, bool is_lost);
+
 class LocalizationScore {
  public:
-  // A shot that is lost, or off by more than 1 m or 5 degrees, is a failure: counted, and left out
-  // of the figures below.
+  // A failure is counted, and left out of the figures below.
   void Add(const PoseError& error, bool is_lost);
 
   std::uint64_t shots() const { return shots_; }

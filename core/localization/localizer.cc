@@ -98,6 +98,7 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
                               : result.registration.T_world_level;
   result.T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
   Remember(result, is_found);
+  result.covariance = motion_.covariance();
   return result;
 }
 

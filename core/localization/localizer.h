@@ -84,6 +84,7 @@ using RelocalizerSource = std::function<Result<std::shared_ptr<const Relocalizer
 struct LocalizationResult {
   Pose T_world_sensor = Pose::Identity();
   LocalizationHealth health = LocalizationHealth::kLost;
+  PoseCovariance covariance = PoseCovariance::Zero();  // of the pose, all that is known considered
   RegistrationResult registration;
 };
 

@@ -42,6 +42,7 @@ ALLOWED = {
                                      "core/fusion/fusion_context.h"],
     "core/fusion/combination": FLOOR_4 + ["core/fusion/observation", "core/fusion/segment"],
     "core/localization": FLOOR_4 + ["core/localization/window"],
+    "core/localization/icp": FLOOR_4 + ["core/localization/local_map.h"],
     "core/localization/window": FLOOR_4,
     "core/planning": FLOOR_4 + ["core/planning/coarse", "core/planning/route", "core/planning/search",
                                 "core/planning/surface"],
@@ -79,9 +80,11 @@ ALLOWED = {
     "client/atlas_file": FLOOR_1 + ["client/connection", "client/map", "client/vehicle", "server/store",
                                    "core/tile", "server/store/sqlite/restore.h",
                                    "server/store/sqlite/store_snapshot.h"],
-    "client/drive": FLOOR_4 + ["core/localization", "client/connection", "client/map", "client/score",
+    "client/drive": FLOOR_4 + ["core/localization", "core/localization/icp", "client/connection", "client/map", "client/score",
                                "client/vehicle/atlas_link.h"],
+    "client/export": FLOOR_1 + ["core/tile"],
     "client/render": FLOOR_1 + ["core/tile"],
+    "client/render/plot": FLOOR_1 + ["client/render"],
     "server/service": FUSED + ["server/service/backup", "server/service/compaction", "server/service/fusion", "server/service/history",
                                "server/service/region", "server/service/sync", "server/service/verification",
                                "server/service/watch"],
@@ -115,10 +118,11 @@ ALLOWED = {
     "client/cli/map_input": FLOOR_1 + ["client/atlas_file", "client/cli/command_line", "client/connection",
                                        "client/map"],
     "client/cli/commands/atlas": FLOOR_1 + COMMAND_ROOMS + ["client/atlas_file"],
-    "client/cli/commands/map": FLOOR_4 + COMMAND_ROOMS + ["core/planning", "client/cli/map_input", "client/map", "client/render", "client/score"],
+    "client/cli/commands/map": FLOOR_4 + COMMAND_ROOMS + ["core/planning", "client/cli/map_input", "client/export", "client/map", "client/render", "client/score"],
     "client/cli/commands/drive": FLOOR_4 + COMMAND_ROOMS + ["core/simulation", "core/simulation/city",
                                                             "core/simulation/mesh", "client/cli/map_input",
-                                                            "client/drive", "client/map", "client/score",
+                                                            "client/drive", "client/map", "client/render",
+                                                            "client/render/plot", "client/score",
                                                             "client/vehicle/atlas_link.h"],
     "client/cli/commands": ["client/cli/command_line", "client/cli/commands/atlas", "client/cli/commands/drive",
                             "client/cli/commands/map"],
@@ -138,6 +142,7 @@ FENCED = {
     r"<spdlog": NET_ROOMS + ["server", "server/base", "server/config", "server/http"],
     r"<zstd|<xxhash": ["core/base"],
     r"<png": ["client/render"],
+    r"<nanoflann": ["core/localization/icp"],
 }
 # core is pure: what its files may include in angle brackets. No clock, thread, lock, randomness, socket, process,
 # nor anything of the operating system; files only where scans and meshes are read and written.
@@ -149,6 +154,7 @@ PURE = set("""
     """.split())
 DOORS = {
     "core/base": {"cerrno", "filesystem", "xxhash.h", "zstd.h"},  # names of files and errors of them
+    "core/localization/icp": {"nanoflann.hpp"},
     "core/scan": {"filesystem", "fstream"},
     "core/simulation": {"cerrno", "cstdio", "filesystem"},
     "core/simulation/city": {"atomic"},  # a cache of chunks, whichever thread casts

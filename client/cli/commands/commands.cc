@@ -33,6 +33,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeLocalizeCommand());
   commands.push_back(MakePlanCommand());
   commands.push_back(MakeRenderCommand());
+  commands.push_back(MakeExportCommand());
   commands.push_back(MakeSimulateCommand());
   return commands;
 }

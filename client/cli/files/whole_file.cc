@@ -44,6 +44,11 @@ Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {
   return DiskError("cannot write", path, failed);
 }
 
+Status WriteTextFile(const std::filesystem::path& path, std::string_view text) {
+  return WriteWholeFile(path,
+                        ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
 Result<std::string> ReadWholeFile(const std::filesystem::path& path, std::uint64_t max_bytes) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <string_view>
 
 #include "core/base/bytes.h"
 #include "core/base/status.h"
@@ -13,6 +15,7 @@ Status MakeDirectory(const std::filesystem::path& directory);
 
 // Written beside `path` and renamed over it.
 Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes);
+Status WriteTextFile(const std::filesystem::path& path, std::string_view text);
 
 // Also of a pipe. kNotFound, kPermissionDenied, kInvalidData for a folder; kResourceExhausted above
 // `max_bytes`.

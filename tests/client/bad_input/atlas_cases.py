@@ -161,6 +161,17 @@ def target_cases(cases, drives, work):
     cases.refused("render over a folder", ["render", "-o", drives.good], "conflict", "good")
     cases.refused("render into a file", ["render", "-o", file / "map.png"], "conflict", "map.png")
     cases.forbidden("render into a closed folder", ["render", "-o", closed / "map.png"], "map.png")
+    for line in (["localize", drives.good, "--output"], ["localize", drives.good, "--plot"], ["export", "--points"]):
+        ending = {"--output": "csv", "--plot": "svg", "--points": "ply"}[line[-1]]
+        cases.refused(f"{line[-1]} into a missing folder", [*line, closed / f"nowhere/map.{ending}"], "not_found",
+                      "nowhere")
+        cases.refused(f"{line[-1]} into a file", [*line, file / f"map.{ending}"], "conflict", f"map.{ending}")
+        folder = drives.folder / f"folder.{ending}"
+        folder.mkdir()
+        cases.refused(f"{line[-1]} over a folder", [*line, folder], "conflict", f"folder.{ending}")
+        cases.forbidden(f"{line[-1]} into a closed folder", [*line, closed / f"map.{ending}"], f"map.{ending}")
+    cases.refused("export where nothing is", ["export", "--points", drives.folder / "far.pcd", "--center", "9000,0",
+                                              "--radius", "1"], "not_found", "nothing to export")
     cases.refused("query into a file", ["query", *near, "-o", file], "conflict", "poses.txt", is_stream=True)
     cases.forbidden("query into a closed folder", ["query", *near, "-o", closed / "tiles"], "tiles", is_stream=True)
     cases.refused("simulate over a drive", ["simulate", "street", "-o", drives.good], "conflict", "good")
@@ -195,6 +206,8 @@ def empty_atlas_cases(cases, drives, work):
         empty = type(cases)(cases.report, cases.bin_dir, daemon.server)
         empty.refused("render an empty atlas", ["render", "-o", drives.folder / "empty.png"], "not_found", "empty")
         cases.report.check("no picture of an empty atlas", not (drives.folder / "empty.png").exists())
+        empty.refused("export an empty atlas", ["export", "--points", drives.folder / "empty.pcd"], "not_found",
+                      "nothing to export")
         cases.report.equal("digest of an empty atlas", empty.run("digest")["tiles"], 0)
         lost = empty.run("localize", drives.good)
         cases.report.equal("localize in an empty atlas", [lost["failures"], lost["translation_rmse_m"]], [5, None])

@@ -67,6 +67,8 @@ USAGE = {
         ["DRIVE", "--trials", "5"], ["DRIVE", "--perturb", "1,1", "--trials", "0"],
         ["DRIVE", "--max-range", "0"], ["DRIVE", "--max-range", "1e6"], ["DRIVE", "--rings", "0"],
         ["DRIVE", "--scans", "none"], ["DRIVE", "--seed", "-1"], ["DRIVE", "--mode", "guess"],
+        ["DRIVE", "--output", "WORK/x.txt"], ["DRIVE", "--output", "WORK/x"], ["DRIVE", "--plot", "WORK/x.jpg"],
+        ["DRIVE", "--output", "WORK/x.tum", "--perturb", "1,1"], ["DRIVE", "--mode", "paper", "--max-range", "150"],
     ],
     "plan": [
         [], ["--from", "0,0,0"], ["--from", "0,0", "--to", "1,1,1"], ["--from", "0,0,0", "--to", "nan,0,0"],
@@ -78,6 +80,10 @@ USAGE = {
             ["--max-gap", "9"], ["--comfort", "-1"], ["--comfort-weight", "1e9"], ["--max-expansions", "-1"],
             ["--max-time", "-1"], ["--max-memory", "much"], ["-o", "WORK/route.txt"])),
     ],
+    "export": [[], ["--points"], ["--points", "WORK/x.las"], ["--points", "WORK/x"],
+               ["--points", "WORK/x.pcd", "--center", "0,0"], ["--points", "WORK/x.pcd", "--radius", "5"],
+               ["--points", "WORK/x.ply", "--center", "0,0", "--radius", "-5"],
+               ["--points", "WORK/x.ply", "--center", "0,nan", "--radius", "5"]],
     "render": [[], ["-o"], ["-o", "WORK/x.png", "--layer", "middle"], ["-o", "WORK/x.png", "--layer", "-1"],
                ["-o", "WORK/x.png", "--color", "pink"]],
     "simulate": [[], ["street"], ["moon", "-o", "WORK/moon"], ["street", "-o", "WORK/s", "--sensor", "sonar"],
@@ -108,7 +114,8 @@ def usage_before_the_daemon_cases(cases, drives):
     nobody = type(cases)(cases.report, cases.bin_dir, "127.0.0.1:9")
     for line in (["ingest", drives.good, "--rings", "0"], ["ingest", drives.good, "--every", "-1"],
                  ["ingest", drives.good, "--batch", "0"], ["localize", drives.good, "--rings", "0"],
-                 ["localize", drives.good, "--max-range", "0"], ["query", "--center", "0,0", "--radius", "-1"],
+                 ["localize", drives.good, "--max-range", "0"], ["localize", drives.good, "--output", "x.txt"],
+                 ["export", "--points", "x.txt"], ["query", "--center", "0,0", "--radius", "-1"],
                  ["query", "--center", "0,0", "--radius", "1", "--budget", "0"]):
         done = nobody.call(*line, "--json")
         cases.report.equal(f"{line} without a daemon", done.returncode, 2)

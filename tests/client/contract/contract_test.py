@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -41,6 +42,7 @@ KEYS = {
                 "bytes_received",
     "plan": "found length_m cost searched_cost waypoints clearance_m slope_deg tiles_loaded expansions ms",
     "render": "width height metres_per_pixel",
+    "export": "points",
     "simulate": "scans metres",
 }
 LAYER = "z_m sigma_m occupancy traversable measured observations confirmed column"
@@ -72,6 +74,7 @@ def lines_of(cases, work, drive):
         "localize": ["localize", drive, "--perturb", "0.2,1", "--trials", "2", "--max-range", "12"],
         "plan": ["plan", "--from", "0,-1.6,0", "--to", "4,-1.6,0"],
         "render": ["render", "-o", f"{work}/map.png"],
+        "export": ["export", "--points", f"{work}/map.pcd"],
     }
 
 
@@ -138,6 +141,43 @@ def stream_cases(cases, found, work):
         has_keys(cases, "scan", scan, SCAN)
         cases.report.check("scan: values", scan["type"] == "scan" and len(scan["pose"]) == 12 and
                            scan["health"] in ("good", "weak", "lost"), scan)
+
+
+def track_cases(cases, work, drive):
+    """What `localize` writes beside what it prints, by either method."""
+    for mode in ("atlas", "paper"):
+        for ending, fields, separator in (("csv", 24, ","), ("tum", 8, " "), ("kitti", 12, " ")):
+            file, picture = pathlib.Path(work) / f"{mode}.{ending}", pathlib.Path(work) / f"{mode}.svg"
+            found = cases.run("localize", drive, "--max-range", "12", "--mode", mode, "--output", file, "--plot",
+                              picture)
+            lines = file.read_text(encoding="ascii").splitlines()
+            cases.report.equal(f"{file.name}: lines", len(lines), found["scans"] + (ending == "csv"))
+            cases.report.equal(f"{file.name}: fields", {len(line.split(separator)) for line in lines}, {fields})
+            cases.report.check(f"{picture.name}: a picture", picture.read_text(encoding="ascii").endswith("</svg>\n"))
+        cases.report.equal(f"localize --mode {mode}: failures", found["failures"], 0)
+    cases.run("localize", drive, "--max-range", "12", "--plot", f"{work}/track.png")
+    cases.report.equal("track.png: a picture", pathlib.Path(work, "track.png").read_bytes()[:4], b"\x89PNG")
+
+
+def export_cases(cases, work):
+    """Of an area, and from a file: the same points."""
+    area = ["--center", "0,0", "--radius", "8"]
+    some = cases.run("export", "--points", f"{work}/some.ply", *area)["points"]
+    every = cases.run("export", "--points", f"{work}/every.ply")["points"]
+    cases.report.check("export: an area is less than all", 0 < some < every, (some, every))
+    cases.run("backup", "export")
+    copy = pathlib.Path(work) / "backups/export"
+    done = subprocess.run([cases.bin_dir / "atlas", "export", "--points", f"{work}/file.ply", *area, "--atlas", copy],
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+    cases.report.equal("export --atlas: exit code", done.returncode, 0)
+    read = [sorted(points_of(pathlib.Path(work) / f"{name}.ply")) for name in ("some", "file")]
+    cases.report.equal("export --atlas: the same points", read[0], read[1])
+
+
+def points_of(file):
+    data = file.read_bytes()
+    body = data[data.index(b"end_header\n") + len(b"end_header\n"):]
+    return list(struct.iter_unpack("<dddf", body))
 
 
 def backup_cases(cases, work):
@@ -253,6 +293,8 @@ def main():
             found = key_cases(cases, lines)
             content_cases(cases, found)
             stream_cases(cases, found, work)
+            track_cases(cases, work, drives.good)
+            export_cases(cases, work)
             backup_cases(cases, work)
             unlabelled_case(cases, drives)
             progress_cases(cases, lines, work)

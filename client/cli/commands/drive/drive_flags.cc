@@ -9,12 +9,16 @@ void DriveFlags::Declare(ArgumentSet& arguments, const std::string& contents) {
   arguments.Optional("--rings", "N", rings_, "Use about so many of the rings [all]");
 }
 
+void DriveFlags::DeclareScans(ArgumentSet& arguments) {
+  arguments.Choice("--scans", {"even", "odd", "all"}, scans_, "Parity of the scans' numbers");
+}
+
 void DriveFlags::DeclareSelection(ArgumentSet& arguments,
                                   double& max_range_m,
                                   const std::string& reach) {
   arguments.Optional("--max-range", "M", max_range_m,
                      StrCat("Reach of ", reach, " [", max_range_m, "]"));
-  arguments.Choice("--scans", {"even", "odd", "all"}, scans_, "Parity of the scans' numbers");
+  DeclareScans(arguments);
 }
 
 }  // namespace atlas

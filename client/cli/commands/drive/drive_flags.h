@@ -15,6 +15,7 @@ class DriveFlags {
  public:
   // DIR and --rings. `contents`: what the folder must hold.
   void Declare(ArgumentSet& arguments, const std::string& contents);
+  void DeclareScans(ArgumentSet& arguments);  // --scans
   // --scans, and --max-range, whose default `max_range_m` holds; `reach`: of what.
   void DeclareSelection(ArgumentSet& arguments, double& max_range_m, const std::string& reach);
 

@@ -1,15 +1,17 @@
 // `atlas localize DIR`: where a drive's scans lie in the map, scored against the drive's poses.
+#include <filesystem>
 #include <numbers>
 
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/commands/drive/relocalization_text.h"
+#include "client/cli/commands/drive/track_output.h"
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
 #include "client/drive/drive_localization.h"
 #include "client/drive/drive_relocalization.h"
-#include "client/drive/place_reader.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -17,14 +19,14 @@ namespace {
 
 boost::json::object ScanJson(const LocalizedScan& scan) {
   boost::json::array pose;
-  for (const double number : PoseToRowMajor(scan.T_world_sensor)) {
+  for (const double number : PoseToRowMajor(scan.located.T_world_sensor)) {
     pose.emplace_back(number);
   }
   return {{"type", "scan"},
           {"scan", scan.scan},
           {"trial", scan.trial},
           {"pose", std::move(pose)},
-          {"health", LocalizationHealthName(scan.health)},
+          {"health", LocalizationHealthName(scan.located.health)},
           {"error_m", Rounded(scan.error.translation_m, 5)},
           {"error_deg", Rounded(scan.error.rotation_deg, 5)}};
 }
@@ -67,39 +69,6 @@ void PrintSummary(const DriveLocalizationReport& report,
   facts.Print(out);
 }
 
-boost::json::object RelocalizedJson(const RelocalizedScan& scan) {
-  boost::json::object json{{"type", "scan"}, {"scan", scan.scan}};
-  if (!scan.found.T_world_sensor) json["pose"] = nullptr;
-  boost::json::array places;
-  for (const RelocalizedPlace& place : scan.found.places) {
-    places.push_back(boost::json::object{{"fit", Rounded(place.registration.fit, 3)},
-                                         {"column_fit", Rounded(place.registration.column_fit, 3)},
-                                         {"columns", Rounded(place.registration.column_inliers, 3)},
-                                         {"explained", Rounded(place.explained, 3)},
-                                         {"sigma", Rounded(WorstSigma(place.registration), 4)},
-                                         {"x", Rounded(place.registration.T_world_level.translation().x(), 2)},
-                                         {"y", Rounded(place.registration.T_world_level.translation().y(), 2)},
-                                         {"z", Rounded(place.registration.T_world_level.translation().z(), 2)}});
-  }
-  json["places"] = std::move(places);
-  json["margin"] = Rounded(scan.found.margin, 3);
-  json["error_m"] = Rounded(scan.error.translation_m, 3);
-  json["error_deg"] = Rounded(scan.error.rotation_deg, 3);
-  return json;
-}
-
-boost::json::object RelocalizationJson(const DriveRelocalizationReport& report) {
-  return {{"type", "summary"},
-          {"scans", report.scans},
-          {"right", report.right},
-          {"wrong", report.wrong},
-          {"unknown", report.unknown},
-          {"places", report.places},
-          {"translation_rmse_m", Rounded(report.score.translation_rmse_m(), 5)},
-          {"cpu_s_per_scan", Rounded(report.cpu_s / static_cast<double>(report.scans), 4)},
-          {"worst_cpu_s", Rounded(report.worst_cpu_s, 4)}};
-}
-
 class LocalizeCommand : public Command {
  public:
   std::string Name() const override { return "localize"; }
@@ -110,14 +79,20 @@ class LocalizeCommand : public Command {
 
   void Declare(ArgumentSet& arguments) override {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt");
-    drive_.DeclareSelection(arguments, options_.max_range_m, "what is matched");
+    drive_.DeclareScans(arguments);
+    arguments.Optional("--max-range", "M", options_.max_range_m,
+                       "Reach of what is matched [100; paper: 40]");
     arguments.Optional("--perturb", "T_M,R_DEG", perturbation_,
                        "Single shots from starts so far off; else the drive is tracked");
     arguments.Optional("--trials", "N", trials_, "Single shots a scan [10]");
     arguments.Optional("--seed", "K", options_.seed, "Of the disturbances [0]");
+    arguments.Flag("--no-restart", no_restart_, "After a jump it has to find itself");
     arguments.Flag("--relocalize", relocalize_, "Find each scan alone, with no start");
-    arguments.Optional("--prior-radius", "M", prior_radius_m_, "... within so far of a position");
-    arguments.Choice("--mode", {"atlas"}, mode_, "How scans are matched");
+    arguments.Optional("--prior-radius", "M", prior_radius_m_,
+                       "With --relocalize: within so far of a position that is given");
+    arguments.Choice("--mode", {"atlas", "paper"}, mode_,
+                     "How scans are matched; paper: its encode, decode and ICP, to compare with");
+    track_.Declare(arguments);
   }
 
   Status Run(CommandContext& context) override {
@@ -129,6 +104,7 @@ class LocalizeCommand : public Command {
     if (relocalize_) return Relocalize(*drive, map->source(), context);
     const auto report = Localize(*drive, map->source(), context);
     if (!report) return report.error();
+    ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
     if (context.is_json) {
       context.PrintJson(SummaryJson(*report, map->bytes_received()));
     } else {
@@ -142,21 +118,38 @@ class LocalizeCommand : public Command {
     const Result<ScanParity> parity = drive_.parity();
     if (!parity) return parity.error();
     options_.rings = drive_.rings();
+    options_.mode = mode_ == "paper" ? LocalizationMode::kPaper : LocalizationMode::kAtlas;
     options_.selection.parity = *parity;
     if (trials_ && !perturbation_) {
       return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
+    }
+    options_.is_restarted = !no_restart_;
+    if (prior_radius_m_ && !relocalize_) {
+      return {StatusCode::kInvalidArgument, "--prior-radius needs --relocalize"};
+    }
+    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || track_.is_wanted())) {
+      return {StatusCode::kInvalidArgument,
+              "--relocalize takes no start and no track: without --perturb, --no-restart, --mode "
+              "paper, --output and --plot"};
     }
     if (perturbation_) {
       options_.shots = {perturbation_->translation_m,
                         perturbation_->rotation_deg * std::numbers::pi / 180.0,
                         trials_.value_or(10)};
     }
+    ATLAS_RETURN_IF_ERROR(track_.Check(!perturbation_));
     return options_.Validate();
+  }
+
+  // Of the picture: the folder's own name.
+  std::string Title(const DriveFolder& drive) const {
+    const std::filesystem::path folder = std::filesystem::absolute(drive.path).lexically_normal();
+    return StrCat((folder / ".").parent_path().filename().string(), ", mode ", mode_);
   }
 
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,
                                            MapSource& source,
-                                           const CommandContext& context) const {
+                                           const CommandContext& context) {
     MapView view(source);
     // Lines of a stream would run into the bar on the same terminal.
     const bool is_stream_seen = context.is_json && context.is_out_terminal;
@@ -165,6 +158,7 @@ class LocalizeCommand : public Command {
                     drive.scans.back().number - first + 1);
     return LocalizeDrive(drive, options_, view, [&](const LocalizedScan& scan) {
       if (context.is_json) context.PrintJson(ScanJson(scan));
+      if (track_.is_wanted()) track_.Add(scan);
       bar.Update(scan.scan - first + 1);
     });
   }
@@ -173,24 +167,27 @@ class LocalizeCommand : public Command {
     DriveRelocalizationOptions options;
     options.selection = options_.selection;
     options.rings = options_.rings;
-    options.max_range_m = std::min(options_.max_range_m, 40.0);
+    options.max_range_m = options_.max_range_m.value_or(options.max_range_m);
     options.prior_radius_m = prior_radius_m_;
     options.seed = options_.seed;
-    const auto places = ReadPlaces(source);
-    if (!places) return places.error();
     MapView view(source);
-    const auto report =
-        RelocalizeDrive(drive, options, *places, view, [&](const RelocalizedScan& scan) {
-          if (context.is_json) context.PrintJson(RelocalizedJson(scan));
-        });
+    const auto report = RelocalizeDrive(drive, options, view, [&](const RelocalizedScan& scan) {
+      if (context.is_json) context.PrintJson(RelocalizedScanJson(scan));
+    });
     if (!report) return report.error();
-    context.PrintJson(RelocalizationJson(*report));
+    if (context.is_json) {
+      context.PrintJson(RelocalizationJson(*report));
+    } else {
+      PrintRelocalization(*report, context.out);
+    }
     return {};
   }
 
   DriveFlags drive_;
   bool relocalize_ = false;
+  bool no_restart_ = false;
   std::optional<double> prior_radius_m_;
+  TrackOutput track_;
   std::string mode_ = "atlas";
   std::optional<Perturbation> perturbation_;
   std::optional<std::uint32_t> trials_;

@@ -1,4 +1,4 @@
-// Commands that read tiles: a place, an area, a route, a picture.
+// Commands that read tiles: a place, an area, a route, a picture, points.
 #pragma once
 
 #include <memory>
@@ -7,6 +7,7 @@
 
 namespace atlas {
 
+std::unique_ptr<Command> MakeExportCommand();
 std::unique_ptr<Command> MakePlanCommand();
 std::unique_ptr<Command> MakePointCommand();
 std::unique_ptr<Command> MakeQueryCommand();

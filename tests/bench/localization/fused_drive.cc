@@ -1,0 +1,94 @@
+#include "tests/bench/localization/fused_drive.h"
+
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "client/map/cell_address.h"
+#include "core/fusion/tile_fusion.h"
+#include "core/keyframe/keyframe_builder.h"
+#include "core/keyframe/vehicle_trail.h"
+#include "core/scan/scan_reader.h"
+#include "core/tile/tile_codec.h"
+
+namespace atlas::testing {
+namespace {
+
+constexpr std::int64_t kScan_ms = 100;
+
+std::vector<Pose> PosesUntil(const DriveFolder& drive, std::size_t index) {
+  constexpr std::size_t kTrailScans = 32;
+  std::vector<Pose> poses;
+  for (std::size_t i = index - std::min(index, kTrailScans); i <= index; ++i) {
+    poses.push_back(drive.scans[i].T_world_sensor);
+  }
+  return poses;
+}
+
+Result<PlacedKeyframe> Place(const DriveFolder& drive,
+                             const SelectedScan& selected,
+                             const KeyframeBuilder& builder) {
+  const DriveScan& scan = drive.scans[selected.index];
+  const auto cloud = ReadScan(scan.scan);
+  if (!cloud) return Error(cloud.error());
+  const YawAndLevel split = SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear()));
+  auto keyframe = std::make_shared<const Keyframe>(
+      builder.Build(*cloud, split.R_level_sensor,
+                    TrailBefore(PosesUntil(drive, selected.index), builder.mount())));
+  const auto placement =
+      PlaceKeyframe(QuantizedPose::FromPose(scan.T_world_sensor), keyframe->level_quaternion);
+  if (!placement) return Error(placement.error());
+  const KeyframeKey key{{"car", SessionPartName("drive", selected.session_part)}, scan.number};
+  return PlacedKeyframe{key, kScan_ms * scan.number, *placement, std::move(keyframe)};
+}
+
+}  // namespace
+
+Result<FusedDrive> FusedDrive::Fuse(const DriveFolder& drive,
+                                    const DriveSurvey& survey,
+                                    const FusedDriveOptions& options) {
+  KeyframeBuilderOptions builder_options;
+  builder_options.max_range_m = options.max_range_m;
+  builder_options.mount = survey.mount;
+  builder_options.ring_step = survey.ring_step;
+  if (Status status = builder_options.Validate(options.profile); !status.ok()) {
+    return Error(std::move(status));
+  }
+  const KeyframeBuilder builder(options.profile, survey.layout, builder_options);
+  std::map<TileId, std::vector<PlacedKeyframe>> by_tile;
+  for (const SelectedScan& selected : SelectScans(drive, options.selection)) {
+    const auto placed = Place(drive, selected, builder);
+    if (!placed) return Error(placed.error());
+    for (const TileId& id :
+         FootprintTiles(placed->placement, placed->keyframe->grid, options.profile)) {
+      by_tile[id].push_back(*placed);
+    }
+  }
+  FusedDrive map(options.profile);
+  for (const auto& [id, keyframes] : by_tile) {
+    EncodedTile encoded = EncodeTile(FuseTile(id, keyframes, options.profile), options.profile);
+    map.tiles_.push_back({id, 1, encoded.payload_hash, std::move(encoded.blob)});
+  }
+  return map;
+}
+
+Status FusedDrive::ReadLevel(std::uint8_t level,
+                             const std::optional<DiscArea>& disc,
+                             const OnTile& on_tile) {
+  if (level != 0) return {};
+  const double side_m = TileSideMetres(0, profile_);
+  for (const TileBlob& tile : tiles_) {
+    const bool is_near =
+        !disc || (TileCenter(tile.id, profile_) - disc->center_m).norm() < disc->radius_m + side_m;
+    if (is_near) ATLAS_RETURN_IF_ERROR(on_tile(tile));
+  }
+  return {};
+}
+
+std::uint64_t FusedDrive::blob_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const TileBlob& tile : tiles_) bytes += tile.blob.size();
+  return bytes;
+}
+
+}  // namespace atlas::testing

@@ -1,0 +1,136 @@
+// A drive of three scans before a jump and two after it, localized by a method that is told what to
+// answer.
+#include "client/drive/drive_localization.h"
+
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace atlas {
+namespace {
+
+// Answers the start, moved by what the script says next.
+class ScriptedLocalizer : public ScanLocalizer {
+ public:
+  struct Answer {
+    Eigen::Vector3d moved_m = Eigen::Vector3d::Zero();
+    LocalizationHealth health = LocalizationHealth::kGood;
+  };
+  explicit ScriptedLocalizer(std::vector<Answer> script) : script_(std::move(script)) {}
+
+  void Start(const Pose& T_world_sensor) override { starts.push_back(T_world_sensor); }
+  Result<LocatedScan> Locate(const PointCloud&, const Eigen::Quaterniond&) override {
+    if (next_ == script_.size()) return Error(StatusCode::kUnavailable, "gone");
+    const Answer& answer = script_[next_++];
+    LocatedScan located;
+    located.T_world_sensor = starts.back();
+    located.T_world_sensor.translation() += answer.moved_m;
+    located.health = answer.health;
+    located.covariance = 0.01 * Eigen::Matrix4d::Identity();
+    return located;
+  }
+
+  std::vector<Pose> starts;
+
+ private:
+  std::vector<Answer> script_;
+  std::size_t next_ = 0;
+};
+
+class DriveLocalizationTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::path(::testing::TempDir()) / (std::string("drive_") + test->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    const float point[4] = {5.0F, 0.0F, 0.0F, 0.0F};
+    for (std::uint32_t i = 0; i < 5; ++i) {
+      DriveScan scan;
+      scan.number = i;
+      scan.scan = folder_ / ("00000" + std::to_string(i) + ".bin");
+      scan.T_world_sensor.translation().x() = i + (i >= 3 ? 100.0 : 0.0);
+      std::ofstream(scan.scan, std::ios::binary)
+          .write(reinterpret_cast<const char*>(point), sizeof(point));
+      drive_.scans.push_back(scan);
+    }
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Result<DriveLocalizationReport> Run(ScanLocalizer& localizer) {
+    return LocalizeDrive(drive_, options_, localizer,
+                         [this](const LocalizedScan& scan) { scans_.push_back(scan); });
+  }
+
+  std::filesystem::path folder_;
+  DriveFolder drive_;
+  DriveLocalizationOptions options_;
+  std::vector<LocalizedScan> scans_;
+};
+
+TEST_F(DriveLocalizationTest, JumpsBeginAnew) {
+  ScriptedLocalizer localizer({{{0, 0, 0}}, {{1, 0, 0}}, {{2, 0, 0}}, {{0, 0, 0}}, {{1, 0, 0}}});
+  const auto report = Run(localizer);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->restarts, 1U);
+  EXPECT_EQ(report->scans, 5U);
+  EXPECT_EQ(report->score.failures(), 0U);
+  ASSERT_EQ(localizer.starts.size(), 2U);
+  EXPECT_DOUBLE_EQ(localizer.starts[1].translation().x(), 103.0);
+  std::vector<bool> restarted;
+  for (const LocalizedScan& scan : scans_) restarted.push_back(scan.is_after_jump);
+  EXPECT_EQ(restarted, (std::vector<bool>{false, false, false, true, false}));
+}
+
+TEST_F(DriveLocalizationTest, ErrorsAreSplitAndMeasuredInSigmas) {
+  options_.selection.end = 1;
+  ScriptedLocalizer localizer({{{0.2, 0.1, -0.3}}});
+  ASSERT_TRUE(Run(localizer).has_value());
+  ASSERT_EQ(scans_.size(), 1U);
+  EXPECT_NEAR(scans_[0].offset.along_m, 0.2, 1e-12);
+  EXPECT_NEAR(scans_[0].offset.left_m, 0.1, 1e-12);
+  EXPECT_NEAR(scans_[0].offset.up_m, -0.3, 1e-12);
+  EXPECT_NEAR(scans_[0].normalized_square.value(), 4.0 + 1.0 + 9.0, 1e-6);
+  EXPECT_FALSE(scans_[0].is_failure);
+}
+
+TEST_F(DriveLocalizationTest, LostAndFarOffAreFailures) {
+  options_.selection.end = 2;
+  ScriptedLocalizer localizer({{{0, 0, 0}, LocalizationHealth::kLost}, {{2.5, 0, 0}}});
+  const auto report = Run(localizer);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->score.failures(), 2U);
+  EXPECT_EQ(report->score.lost(), 1U);
+  EXPECT_TRUE(scans_[0].is_failure && scans_[1].is_failure);
+}
+
+TEST_F(DriveLocalizationTest, ShotsStartAnewEachTime) {
+  options_.selection.end = 1;
+  options_.shots = {0.4, 0.02, 3};
+  ScriptedLocalizer localizer({{}, {}, {}});
+  ASSERT_TRUE(Run(localizer).has_value());
+  ASSERT_EQ(localizer.starts.size(), 3U);
+  EXPECT_FALSE(localizer.starts[0].isApprox(localizer.starts[1]));
+  EXPECT_EQ(scans_[2].trial, 2U);
+}
+
+TEST_F(DriveLocalizationTest, AnErrorNamesTheScan) {
+  ScriptedLocalizer localizer({{}, {}});
+  const auto report = Run(localizer);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(report.error().message(), "scan 2: gone");
+}
+
+TEST_F(DriveLocalizationTest, ThePapersReachIsItsOwn) {
+  EXPECT_DOUBLE_EQ(options_.range_m(), 100.0);
+  options_.mode = LocalizationMode::kPaper;
+  EXPECT_DOUBLE_EQ(options_.range_m(), 40.0);
+  options_.max_range_m = 0.5;
+  EXPECT_EQ(options_.Validate().code(), StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace atlas
