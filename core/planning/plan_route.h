@@ -39,11 +39,11 @@ struct Route {
 };
 
 // The cheapest route for the vehicle that the options describe, to within 2 % of what a search over
-// everything finds, over tiles loaded as needed: level 0, and two coarser levels for a corridor
-// (docs/algorithms/planning.md). found = false when the surfaces that start and goal stand on are
-// not joined for this vehicle. kNotFound: no traversable surface near start or goal;
-// kInvalidArgument: options out of range, or a point outside the world; kResourceExhausted: the
-// limit of expansions or memory; kTimeout: that of time; tiles' errors.
+// everything finds (as measured, docs/results.md), over tiles loaded as needed: level 0, and two
+// coarser levels for a corridor (docs/algorithms/planning.md). found = false when the surfaces that
+// start and goal stand on are not joined for this vehicle. kNotFound: no traversable surface near
+// start or goal; kInvalidArgument: options out of range, or a point outside the world;
+// kResourceExhausted: the limit of expansions or memory; kTimeout: that of time; tiles' errors.
 Result<Route> PlanRoute(TileSource& tiles, const MapProfile& profile, const PlanRequest& request);
 
 }  // namespace atlas
