@@ -33,7 +33,7 @@ Result<PlacedKeyframe> Place(const DriveFolder& drive,
   if (!cloud) return Error(cloud.error());
   const YawAndLevel split = SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear()));
   auto keyframe = std::make_shared<const Keyframe>(
-      builder.Build(*cloud, split.R_level_sensor,
+      builder.Build(*cloud, {split.R_level_sensor, GridYaw(drive.scans[selected.index].number)},
                     TrailBefore(PosesUntil(drive, selected.index), builder.mount())));
   const auto placement =
       PlaceKeyframe(QuantizedPose::FromPose(scan.T_world_sensor), keyframe->level_quaternion);
