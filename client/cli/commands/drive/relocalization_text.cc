@@ -1,6 +1,6 @@
 #include "client/cli/commands/drive/relocalization_text.h"
 
-#include <string>
+#include <optional>
 
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
@@ -11,6 +11,11 @@ namespace {
 
 double CpuPerScan(const DriveRelocalizationReport& report) {
   return report.scans == 0 ? 0.0 : report.cpu_s / static_cast<double>(report.scans);
+}
+
+// An error over no scan at all is no error of 0.
+boost::json::value ErrorJson(const LocalizationScore& score, double error) {
+  return score.successes() == 0 ? boost::json::value(nullptr) : Rounded(error, 5);
 }
 
 boost::json::value PoseJson(const std::optional<Pose>& pose) {
@@ -48,8 +53,8 @@ boost::json::object RelocalizationJson(const DriveRelocalizationReport& report) 
           {"wrong", report.wrong},
           {"unknown", report.unknown},
           {"places", report.places},
-          {"translation_rmse_m", Rounded(report.score.translation_rmse_m(), 5)},
-          {"rotation_rmse_deg", Rounded(report.score.rotation_rmse_deg(), 5)},
+          {"translation_rmse_m", ErrorJson(report.score, report.score.translation_rmse_m())},
+          {"rotation_rmse_deg", ErrorJson(report.score, report.score.rotation_rmse_deg())},
           {"cpu_s_per_scan", Rounded(CpuPerScan(report), 4)},
           {"worst_cpu_s", Rounded(report.worst_cpu_s, 4)}};
 }
