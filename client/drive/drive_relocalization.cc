@@ -67,12 +67,12 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
     const TrialSeed seed{options.seed, scan.number, 0};
     const Eigen::Quaterniond R_level_sensor =
         DisturbedLevel(scan.T_world_sensor, options.tilt_error_rad, seed);
-    std::optional<PositionPrior> prior;
+    std::optional<PlacePrior> prior;
     if (options.prior_radius_m) {
       // Within the square in the circle.
       const double reach_m = *options.prior_radius_m / std::numbers::sqrt2;
       const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
-      prior = PositionPrior{start.translation().head<2>(), *options.prior_radius_m};
+      prior = PlacePrior{start.translation().head<2>(), *options.prior_radius_m};
     }
     const CpuTimer timer;
     const LeveledScan leveled =

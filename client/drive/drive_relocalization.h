@@ -12,7 +12,7 @@
 #include "client/map/map_view.h"
 #include "client/score/localization_score.h"
 #include "core/base/status.h"
-#include "core/localization/places/relocalizer.h"
+#include "core/localization/relocalizer.h"
 #include "core/scan/drive_folder.h"
 
 namespace atlas {

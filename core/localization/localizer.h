@@ -13,9 +13,9 @@
 #include "core/base/status.h"
 #include "core/localization/local_map.h"
 #include "core/localization/motion_model.h"
-#include "core/localization/places/relocalizer.h"
 #include "core/localization/pose_search.h"
 #include "core/localization/registration.h"
+#include "core/localization/relocalizer.h"
 #include "core/localization/scan_features.h"
 
 namespace atlas {

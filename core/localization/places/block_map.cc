@@ -9,7 +9,7 @@
 namespace atlas {
 namespace {
 
-// Segments below the first column that a chunk gets to know; above there are 32. Structure beyond is
+// Segments below the first column that a chunk gets to know; above there are 32. What is beyond is
 // left out: hills within 26 m.
 constexpr std::int64_t kBelow = 31;
 

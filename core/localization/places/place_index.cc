@@ -113,7 +113,7 @@ std::vector<double> PlaceIndex::OtherDecks(const Eigen::Vector2d& p, double grou
 }
 
 std::vector<PlaceCandidate> PlaceIndex::Find(const RangeProfile& scan,
-                                             const std::optional<PositionPrior>& prior,
+                                             const std::optional<PlacePrior>& prior,
                                              std::size_t count,
                                              double apart_m) const {
   constexpr double kApart_rad = 20.0 * std::numbers::pi / 180.0;

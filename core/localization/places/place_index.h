@@ -25,7 +25,7 @@ struct PlaceIndexOptions {
 };
 
 // Where the vehicle is for certain: within `radius_m` of `center`, in the plane.
-struct PositionPrior {
+struct PlacePrior {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
 };
@@ -55,7 +55,7 @@ class PlaceIndex {
   // The `count` places and headings that look most like `scan`, the best first, no two of them
   // within `apart_m` and 20 degrees of each other. Requires Finish.
   std::vector<PlaceCandidate> Find(const RangeProfile& scan,
-                                   const std::optional<PositionPrior>& prior,
+                                   const std::optional<PlacePrior>& prior,
                                    std::size_t count,
                                    double apart_m) const;
 

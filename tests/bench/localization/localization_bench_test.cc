@@ -2,8 +2,10 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <string>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "client/drive/drive_localization.h"
 #include "core/simulation/simulated_drive.h"
@@ -19,7 +21,9 @@ constexpr std::size_t kScans = 8;
 class LocalizationBenchTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = std::filesystem::path(::testing::TempDir()) / "localization_bench_test";
+    // Each test is a process of its own, and they run side by side.
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              ("localization_bench_test_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
     const auto simulated = SimulatedDrive::Create(MakeWorld(WorldKind::kStreet).value(), {});
     ASSERT_TRUE(simulated.has_value());

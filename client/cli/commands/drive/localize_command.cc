@@ -138,7 +138,7 @@ class LocalizeCommand : public Command {
                         trials_.value_or(10)};
     }
     ATLAS_RETURN_IF_ERROR(track_.Check(!perturbation_));
-    return options_.Validate();
+    return relocalize_ ? RelocalizationOptions().Validate() : options_.Validate();
   }
 
   // Of the picture: the folder's own name.
@@ -163,13 +163,18 @@ class LocalizeCommand : public Command {
     });
   }
 
-  Status Relocalize(const DriveFolder& drive, MapSource& source, const CommandContext& context) {
+  DriveRelocalizationOptions RelocalizationOptions() const {
     DriveRelocalizationOptions options;
     options.selection = options_.selection;
     options.rings = options_.rings;
     options.max_range_m = options_.max_range_m.value_or(options.max_range_m);
     options.prior_radius_m = prior_radius_m_;
     options.seed = options_.seed;
+    return options;
+  }
+
+  Status Relocalize(const DriveFolder& drive, MapSource& source, const CommandContext& context) {
+    const DriveRelocalizationOptions options = RelocalizationOptions();
     MapView view(source);
     const auto report = RelocalizeDrive(drive, options, view, [&](const RelocalizedScan& scan) {
       if (context.is_json) context.PrintJson(RelocalizedScanJson(scan));

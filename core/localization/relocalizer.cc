@@ -1,4 +1,4 @@
-#include "core/localization/places/relocalizer.h"
+#include "core/localization/relocalizer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -98,7 +98,7 @@ Relocalizer::Relocalizer(const MapProfile& profile,
 
 Result<Relocalization> Relocalizer::Find(const LeveledScan& scan,
                                          const Eigen::Quaterniond& R_level_sensor,
-                                         const std::optional<PositionPrior>& prior) const {
+                                         const std::optional<PlacePrior>& prior) const {
   Relocalization result;
   const std::optional<double> ground_z_m = GroundBelow(scan);
   const ScanFeatures features = ExtractFeatures(scan, options_.features);

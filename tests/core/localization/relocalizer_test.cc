@@ -1,5 +1,5 @@
 // Scans found in small worlds without a start.
-#include "core/localization/places/relocalizer.h"
+#include "core/localization/relocalizer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -42,7 +42,7 @@ Relocalizer RelocalizerIn(const PaintedMap& map) {
 Relocalization Find(const Relocalizer& relocalizer,
                     const ShapeWorld& world,
                     const Pose& truth,
-                    const std::optional<PositionPrior>& prior = std::nullopt) {
+                    const std::optional<PlacePrior>& prior = std::nullopt) {
   return relocalizer.Find(CastLeveledScan(testing::QuickSensor(), world, truth), kLevel, prior)
       .value();
 }
@@ -107,7 +107,7 @@ TEST(RelocalizerTest, WhereTwoPlacesLookTheSameItDoesNotKnowUnlessItIsToldWhereA
   for (const double yaw_rad : {0.3, -2.0}) {
     const Pose truth = UprightPose({-19.0, 0.5, 1.8}, yaw_rad);
     EXPECT_FALSE(Find(relocalizer, yard, truth).T_world_sensor) << "as good as 40 m away";
-    const PositionPrior prior{truth.translation().head<2>() + Eigen::Vector2d(3.0, -2.0), 10.0};
+    const PlacePrior prior{truth.translation().head<2>() + Eigen::Vector2d(3.0, -2.0), 10.0};
     const Relocalization told = Find(relocalizer, yard, truth, prior);
     ASSERT_TRUE(told.T_world_sensor);
     EXPECT_LT(ErrorOf(*told.T_world_sensor, truth).horizontal_m, 0.1);

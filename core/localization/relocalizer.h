@@ -36,7 +36,7 @@ struct RelocalizerOptions {
   double min_fit = 0.6;
   double min_columns = 0.3;
   double min_explained = 0.15;
-  double max_sigma_m = 0.015; // of the worst horizontal direction
+  double max_sigma_m = 0.015;  // of the worst horizontal direction
   double min_margin = 0.04;
 };
 
@@ -64,7 +64,7 @@ class Relocalizer {
   // `scan` is levelled by `R_level_sensor`. Errors are those of the tiles' source.
   Result<Relocalization> Find(const LeveledScan& scan,
                               const Eigen::Quaterniond& R_level_sensor,
-                              const std::optional<PositionPrior>& prior = std::nullopt) const;
+                              const std::optional<PlacePrior>& prior = std::nullopt) const;
 
  private:
   struct Start {
