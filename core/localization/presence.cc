@@ -51,6 +51,7 @@ PresenceSum SumPresence(const MapWindow& map,
       continue;  // one of an outlier: log(1)
     }
     const float scale = 1.0F / (at.value + kOutlier);
+    result.present += static_cast<double>(at.value);
     likelihood *= static_cast<double>(1.0F + at.value / kOutlier);
     if (likelihood > kMuch) {
       result.log_likelihood += std::log(likelihood);

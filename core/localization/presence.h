@@ -15,6 +15,7 @@ namespace atlas {
 
 struct PresenceSum {
   double log_likelihood = 0.0;  // up to a constant
+  double present = 0.0;         // how many returns lie in occupied segments
   // Of its change with the pose (Newton: the curvature of each return, where it is one of a
   // maximum).
   NormalEquations equations;

@@ -64,7 +64,12 @@ class ReturnAlignment {
 
   Alignment From(const Pose& start) const {
     const std::span all(scan_.returns);
-    const Alignment near = Descend(start, all.first(all.size() / kFew), kNear);
+    const auto few = all.first(all.size() / kFew);
+    const double present = SumPresence(map_, few, start).present;
+    if (present < options_.min_present * static_cast<double>(few.size())) {
+      return AlongLines(start);
+    }
+    const Alignment near = Descend(start, few, kNear);
     return Descend(near.pose, all, {options_.converged_m, options_.converged_rad});
   }
 
@@ -75,6 +80,27 @@ class ReturnAlignment {
     double rotation_rad;
   };
   static constexpr Small kNear{0.01, 0.001};
+
+  // Where hardly anything of the scan lies on what was mapped, there is nothing to count: what is
+  // seen is the far edge of it.
+  Alignment AlongLines(const Pose& start) const {
+    Alignment result{start, false};
+    for (int iteration = 0; iteration < options_.max_iterations && !result.is_converged;
+         ++iteration) {
+      NormalEquations equations =
+          features_.At(result.pose, {options_.fine_radius_m, options_.fine_reach_m}).equations;
+      known_.AddTo(result.pose, equations);
+      const NormalEquations::Vector6 step = equations.Solve();
+      result.pose = Moved(result.pose, step);
+      result.is_converged = IsSmall(step, {options_.converged_m, options_.converged_rad});
+    }
+    return result;
+  }
+
+  static bool IsSmall(const NormalEquations::Vector6& step, const Small& small) {
+    return step.head<3>().norm() < small.translation_m &&
+           step.tail<3>().norm() < small.rotation_rad;
+  }
 
   Alignment Descend(const Pose& start,
                     std::span<const Eigen::Vector3f> returns,

@@ -27,6 +27,8 @@ struct RegistrationOptions {
   int coarse_iterations = 5;
   std::size_t coarse_stride = 3;  // of the features looked at until then
   int max_iterations = 15;        // of the last stage
+  // Of the returns, in occupied segments where the last stage begins; with less it goes by lines.
+  double min_present = 0.2;
   double converged_m = 1e-3;
   double converged_rad = 1e-4;
 };
