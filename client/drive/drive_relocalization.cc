@@ -54,12 +54,8 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
   if (!places) return Error(places.error());
   DriveRelocalizationReport report;
   report.places = (*places)->places();
-  const Relocalizer relocalizer(
-      view.profile(), *std::move(places),
-      [&view](const Eigen::Vector3d& center, double radius_m) {
-        return TilesAroundPlace(view, center, radius_m);
-      },
-      RelocalizerOptionsFor(options));
+  const Relocalizer relocalizer(view.profile(), *std::move(places), TilesOf(view),
+                                RelocalizerOptionsFor(options));
   for (const SelectedScan& selected : SelectScans(drive, options.selection)) {
     const DriveScan& scan = drive.scans[selected.index];
     const Result<PointCloud> cloud = ReadScan(scan.scan);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <string>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -24,8 +25,9 @@ Status LastingUpload::Run(AtlasLink& link) {
   Result<AtlasClient*> client = link.Wait(options_.patience);
   while (client) {
     const std::uint64_t acked_before = report_.totals.acked;
-    const Status status = RunOn(**client);
-    if (status.ok()) return ReadSessions(**client);
+    Status status = RunOn(**client);
+    if (status.ok()) status = ReadSessions(**client);
+    if (status.ok()) return status;
     if (!(*client)->is_broken()) return Refused(status);
     if (report_.totals.acked > acked_before) {
       link.Report({});  // it worked: the next attempt is a first one
@@ -41,6 +43,7 @@ Status LastingUpload::ReadSessions(AtlasClient& client) {
   if (planned_.empty()) return {};
   auto sessions = client.ListSessions(planned_.front().key.session.vehicle);
   if (!sessions) return sessions.error();
+  report_.sessions.clear();
   std::map<SessionKey, std::uint64_t> planned;
   for (const PlannedKeyframe& keyframe : planned_) {
     ++planned[keyframe.key.session];
@@ -75,11 +78,13 @@ Status LastingUpload::GivenUp(const Status& broke, const Status& failure) const 
   const auto lost_for =
       std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - acknowledged_);
   const bool may_pass = IsTemporary(failure.code());
+  const std::string where = next_ < planned_.size()
+                                ? StrCat("keyframe ", planned_[next_].key)
+                                : "all keyframes were acknowledged; their sessions";
   return {
       failure.code(),
-      StrCat("keyframe ", planned_[next_].key, ": the connection broke (", broke.message(),
-             "), and ", lost_for.count(), " s after the ",
-             report_.totals.acked > 0 ? "last acknowledgement" : "beginning", ": ",
+      StrCat(where, ": the connection broke (", broke.message(), "), and ", lost_for.count(),
+             " s after the ", report_.totals.acked > 0 ? "last acknowledgement" : "beginning", ": ",
              failure.message(),
              may_pass ? "; the same command goes on there once the daemon can be reached" : "")};
 }

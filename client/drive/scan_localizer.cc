@@ -11,12 +11,6 @@
 namespace atlas {
 namespace {
 
-TilesAround TilesOf(MapView& view) {
-  return [&view](const Eigen::Vector3d& center, double radius_m) {
-    return TilesAroundPlace(view, center, radius_m);
-  };
-}
-
 // Reads the whole map when a vehicle is lost for the first time.
 RelocalizerSource RelocalizerOf(MapView& view, const RelocalizerOptions& options) {
   return [&view, options, made = std::shared_ptr<const Relocalizer>()]() mutable

@@ -25,4 +25,10 @@ Result<std::vector<std::shared_ptr<const Tile>>> TilesAroundPlace(MapView& view,
   return tiles;
 }
 
+TilesAround TilesOf(MapView& view) {
+  return [&view](const Eigen::Vector3d& center, double radius_m) {
+    return TilesAroundPlace(view, center, radius_m);
+  };
+}
+
 }  // namespace atlas

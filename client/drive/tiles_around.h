@@ -8,6 +8,7 @@
 
 #include "client/map/map_view.h"
 #include "core/base/status.h"
+#include "core/localization/local_map.h"
 #include "core/tile/tile.h"
 
 namespace atlas {
@@ -17,5 +18,8 @@ namespace atlas {
 Result<std::vector<std::shared_ptr<const Tile>>> TilesAroundPlace(MapView& view,
                                                                   const Eigen::Vector3d& center,
                                                                   double radius_m);
+
+// The same as what a localizer takes; the view outlives it.
+TilesAround TilesOf(MapView& view);
 
 }  // namespace atlas

@@ -58,6 +58,27 @@ TEST_F(IngestResumeTest, AConnectionThatBreaksInTheMiddleIsMadeAgain) {
   }
 }
 
+TEST_F(IngestResumeTest, ALinkThatBreaksOnceAllIsThereIsMadeAgainForTheLastQuestion) {
+  std::int64_t bytes_up = 0;
+  {
+    const DaemonProcess daemon(NewData(), kSmall);
+    LinkProxy proxy(*Endpoint::Parse(daemon.address()), LinkPlan{});
+    ASSERT_EQ(IngestOver(proxy.endpoint(), {"--range", "0:3"}).exit_code, 0);
+    bytes_up = static_cast<std::int64_t>(proxy.totals().bytes_up);
+  }
+  const DaemonProcess daemon(NewData(), kSmall);
+  std::atomic<int> connections = 0;
+  LinkProxy proxy(*Endpoint::Parse(daemon.address()), [&connections, bytes_up] {
+    // Within the question what the sessions hold, which is the last.
+    return connections++ == 0 ? LinkPlan{.up = {.after_bytes = bytes_up - 10}} : LinkPlan{};
+  });
+  const CommandRun run = IngestOver(proxy.endpoint(), {"--range", "0:3"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.Get<int>("reconnections"), 1);
+  EXPECT_EQ(run.Get<int>("acked"), 3);
+  EXPECT_EQ(run.Get<int>("duplicates"), 0) << "nothing was sent again";
+}
+
 TEST_F(IngestResumeTest, ADaemonThatIsStartedAgainGetsTheRest) {
   const fs::path data = NewData();
   auto daemon = std::make_unique<DaemonProcess>(data, kSmall);
