@@ -40,7 +40,7 @@ class AtlasScanLocalizer : public ScanLocalizer {
     const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor);
     if (!result) return Error(result.error());
     return LocatedScan{result->T_world_sensor, result->health, result->registration.fit,
-                       result->covariance};
+                       result->covariance, result->cover};
   }
 
  private:
@@ -62,7 +62,7 @@ class PaperScanLocalizer : public ScanLocalizer {
     if (!result) return Error(result.error());
     const LocalizationHealth health =
         result->is_lost ? LocalizationHealth::kLost : LocalizationHealth::kGood;
-    return LocatedScan{result->T_world_sensor, health, result->fit, std::nullopt};
+    return LocatedScan{result->T_world_sensor, health, result->fit, std::nullopt, std::nullopt};
   }
 
  private:

@@ -17,6 +17,7 @@ struct LocatedScan {
   LocalizationHealth health = LocalizationHealth::kLost;
   double fit = 0.0;                          // 0..1, as the method understands it
   std::optional<PoseCovariance> covariance;  // of methods that know how sure they are
+  std::optional<MapCover> cover;             // of methods that look
 };
 
 class ScanLocalizer {

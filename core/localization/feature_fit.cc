@@ -45,12 +45,12 @@ void FeatureFit::AddColumn(const Eigen::Vector3f& arm,
                            FeatureEvidence& evidence,
                            PlanarSums& sums) const {
   const Eigen::Vector3f p = arm + t;
-  const ColumnLine* line = map_.NearestLine(p, radius_m);
-  if (line != nullptr && !line->CanBeSeenFrom(t.head<2>())) {
-    line = nullptr;
+  std::optional<ColumnLine> line = map_.NearestLine(p, radius_m);
+  if (line && !line->CanBeSeenFrom(t.head<2>())) {
+    line.reset();
   }
-  evidence.mapped_columns += line != nullptr || map_.IsFree(p) ? 1 : 0;
-  if (line == nullptr) {
+  evidence.mapped_columns += line || map_.IsFree(p) ? 1 : 0;
+  if (!line) {
     return;
   }
   const Eigen::Vector2f offset = p.head<2>() - line->center;

@@ -5,11 +5,11 @@
 namespace atlas {
 
 LocalMap::LocalMap(const MapProfile& profile, TilesAround tiles, const LocalMapOptions& options)
-    : profile_(profile), tiles_(std::move(tiles)), options_(options) {}
+    : tiles_(std::move(tiles)), options_(options), window_(profile, options.window) {}
 
 Status LocalMap::Renew(const Eigen::Vector3d& center, double radius_m) {
   const bool is_near = (center - center_).norm() < 0.5 * options_.margin_m;
-  if (window_ && is_near && radius_m <= radius_m_) {
+  if (is_near && radius_m <= radius_m_) {
     return {};
   }
   const double with_margin_m = radius_m + options_.margin_m;
@@ -17,12 +17,7 @@ Status LocalMap::Renew(const Eigen::Vector3d& center, double radius_m) {
   if (!tiles) {
     return tiles.error();
   }
-  std::vector<const Tile*> views;
-  views.reserve(tiles->size());
-  for (const auto& tile : *tiles) {
-    views.push_back(tile.get());
-  }
-  window_.emplace(profile_, views, center, with_margin_m, options_.window);
+  window_.Renew(*tiles, center, with_margin_m);
   coarse_.reset();
   center_ = center;
   radius_m_ = radius_m;
@@ -31,7 +26,7 @@ Status LocalMap::Renew(const Eigen::Vector3d& center, double radius_m) {
 
 const CoarseOccupancy& LocalMap::coarse() {
   if (!coarse_) {
-    coarse_.emplace(*window_, options_.coarse_block_m);
+    coarse_.emplace(window_, options_.coarse_block_m);
   }
   return *coarse_;
 }

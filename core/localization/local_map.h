@@ -12,13 +12,13 @@
 
 namespace atlas {
 
-// Level-0 tiles that touch the square of `radius_m` around a place; they live as long as the
-// result.
+// The tiles that touch the square of `radius_m` around a place: of level 0, and where one is not
+// there (yet), coarser ones over it.
 using TilesAround = std::function<Result<std::vector<std::shared_ptr<const Tile>>>(
     const Eigen::Vector3d& center, double radius_m)>;
 
 struct LocalMapOptions {
-  MapWindowOptions window;
+  PlaceOptions window;
   double margin_m = 12.0;       // beyond what is asked for; the window is renewed half-way
   float coarse_block_m = 0.8F;  // of coarse()
 };
@@ -30,19 +30,20 @@ class LocalMap {
   // Makes window() hold `radius_m` around `center`. Errors are those of the tiles' source; the
   // window stays then.
   Status Renew(const Eigen::Vector3d& center, double radius_m);
+  // The next Renew() asks for tiles wherever it is: others may have come.
+  void Expire() { radius_m_ = -1.0; }
 
   // Both require Renew().
-  const MapWindow& window() const { return *window_; }
+  const MapWindow& window() const { return window_; }
   const CoarseOccupancy& coarse();  // made when first asked for
 
  private:
-  MapProfile profile_;
   TilesAround tiles_;
   LocalMapOptions options_;
-  std::optional<MapWindow> window_;
+  MapWindow window_;
   std::optional<CoarseOccupancy> coarse_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
-  double radius_m_ = 0.0;
+  double radius_m_ = -1.0;  // nothing yet
 };
 
 }  // namespace atlas

@@ -31,6 +31,18 @@ bool AreApart(const Pose& a, const Pose& b, const PoseSearchOptions& options) {
 
 }  // namespace
 
+std::string_view MapCoverName(MapCover cover) {
+  switch (cover) {
+    case MapCover::kNone:
+      return "none";
+    case MapCover::kCoarse:
+      return "coarse";
+    case MapCover::kFine:
+      return "fine";
+  }
+  return "none";
+}
+
 std::string_view LocalizationHealthName(LocalizationHealth health) {
   switch (health) {
     case LocalizationHealth::kGood:
@@ -48,6 +60,7 @@ Localizer::Localizer(const MapProfile& profile,
                      const LocalizerOptions& options,
                      RelocalizerSource relocalizer)
     : options_(options),
+      features_(options.features),
       map_(profile, std::move(tiles), options.map),
       motion_(options.motion),
       relocalizer_(std::move(relocalizer)) {}
@@ -58,6 +71,7 @@ void Localizer::Start(const Pose& T_world_sensor) {
   usual_fit_ = 0.0;
   lost_ = 0;
   astray_ = 0;
+  without_map_ = 0;
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
@@ -71,13 +85,15 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
     motion_ = before;
     return Error(std::move(status));
   }
-  const ScanFeatures features = ExtractFeatures(scan, options_.features);
+  const ScanFeatures& features = features_.Extract(scan);
   LocalizationResult result;
-  result.registration = Track(features).registration;
+  Tracked tracked = Track(features);
+  result.registration = std::move(tracked.place.registration);
   bool is_found = false;
   if (IsDoubtful(result.registration) || IsAdrift()) {
     if (auto found = Search(features, result.registration)) {
       result.registration = *std::move(found);
+      tracked.rival.reset();
       is_found = true;
     }
   }
@@ -91,18 +107,72 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
     result.registration = **elsewhere;
     result.health = Judge(result.registration);
     lost_ = std::max(lost_, 1);  // its motion until now says nothing
+    tracked.rival.reset();
     is_found = true;
   }
   result.T_world_sensor = result.health == LocalizationHealth::kLost
                               ? Prior().T_world_level
                               : result.registration.T_world_level;
   result.T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
-  Remember(result, is_found);
+  const Cover cover = CoverAt(features, result.registration.T_world_level);
+  result.cover = cover.map;
+  NoteCover(cover.map);
+  if (result.health == LocalizationHealth::kGood &&
+      (tracked.rival || cover.map != MapCover::kFine)) {
+    result.health = LocalizationHealth::kWeak;
+  }
+  Remember(result, cover.detail * Seen(result.registration, tracked.rival), is_found);
   result.covariance = motion_.covariance();
   return result;
 }
 
-void Localizer::Remember(const LocalizationResult& result, bool is_found) {
+// Tiles that are on their way come to a vehicle that stands, too.
+void Localizer::NoteCover(MapCover cover) {
+  without_map_ = cover == MapCover::kFine ? 0 : without_map_ + 1;
+  if (without_map_ == options_.asked_again_after) {
+    without_map_ = 0;
+    map_.Expire();
+  }
+}
+
+Localizer::Cover Localizer::CoverAt(const ScanFeatures& features, const Pose& T_world_level) const {
+  constexpr std::size_t kStride = 4;
+  constexpr double kMapped = 0.05;  // of the ground: less is the edge of a map elsewhere
+  const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
+  const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
+  int looked_at = 0;
+  int mapped = 0;
+  int fine = 0;
+  double detail = 0.0;
+  for (std::size_t i = 0; i < features.ground.size(); i += kStride) {
+    const std::optional<int> level = map_.window().LevelAt(R * features.ground[i] + t);
+    ++looked_at;
+    mapped += level ? 1 : 0;
+    fine += level == 0 ? 1 : 0;
+    detail += level ? std::pow(0.25, *level) : 0.0;
+  }
+  if (mapped == 0 || mapped < kMapped * looked_at) {
+    return {MapCover::kNone, 1.0};
+  }
+  return {2 * fine >= mapped ? MapCover::kFine : MapCover::kCoarse, detail / mapped};
+}
+
+// What the scan says about (x, y, z, yaw); between two places it does not know which.
+Eigen::Matrix4d Localizer::Seen(const RegistrationResult& registration,
+                                const std::optional<Eigen::Vector2d>& rival) const {
+  Eigen::Matrix4d seen = options_.information_share * PoseInformation(registration.information);
+  if (rival) {
+    Eigen::Vector4d towards = Eigen::Vector4d::Zero();
+    towards.head<2>() = rival->normalized();
+    const Eigen::Matrix4d beside = Eigen::Matrix4d::Identity() - towards * towards.transpose();
+    seen = (beside * seen * beside).eval();
+  }
+  return seen;
+}
+
+void Localizer::Remember(const LocalizationResult& result,
+                         const Eigen::Matrix4d& seen,
+                         bool is_found) {
   const bool is_next = !is_first_ && lost_ == 0;
   is_first_ = false;
   if (result.health == LocalizationHealth::kGood) {
@@ -116,8 +186,6 @@ void Localizer::Remember(const LocalizationResult& result, bool is_found) {
     }
     return;
   }
-  const Eigen::Matrix4d seen =
-      options_.information_share * PoseInformation(result.registration.information);
   if (!is_found ||
       LogDensity(Prior(), result.registration.T_world_level) > options_.surprising_log_density) {
     motion_.Correct(result.T_world_sensor, seen);
@@ -138,11 +206,11 @@ Localizer::Place Localizer::At(const RegistrationResult& registration, bool has_
   return {registration, options_.evidence_share * registration.evidence + prior};
 }
 
-std::vector<Pose> Localizer::Fan(const PosePrior& prior) const {
-  std::vector<Pose> starts{prior.T_world_level};
+void Localizer::SpreadStarts(const PosePrior& prior) {
+  starts_.assign(1, prior.T_world_level);
   const HorizontalSpread spread = SpreadOf(prior.covariance);
   if (is_first_ || spread.along_m < options_.fan_sigma_m) {
-    return starts;
+    return;
   }
   const double reach_m = 2.0 * std::min(spread.along_m, options_.adrift_sigma_m);
   const int steps = static_cast<int>(reach_m / options_.fan_step_m);
@@ -150,28 +218,43 @@ std::vector<Pose> Localizer::Fan(const PosePrior& prior) const {
     if (step == 0) {
       continue;  // is the first of all
     }
-    starts.push_back(prior.T_world_level);
-    starts.back().translation().head<2>() += step * options_.fan_step_m * spread.direction;
+    starts_.push_back(prior.T_world_level);
+    starts_.back().translation().head<2>() += step * options_.fan_step_m * spread.direction;
   }
-  return starts;
 }
 
-Localizer::Place Localizer::Track(const ScanFeatures& features) const {
+Localizer::Tracked Localizer::Track(const ScanFeatures& features) {
   const PosePrior prior = Prior();
   if (is_first_) {
-    return At(Register(map_.window(), features, prior.T_world_level, options_.registration), false);
+    return {
+        At(Register(map_.window(), features, prior.T_world_level, options_.registration), false),
+        std::nullopt};
   }
   const PosePrior among_features{prior.T_world_level,
                                  options_.information_share * prior.covariance};
-  std::optional<Place> best;
-  for (const Pose& start : Fan(prior)) {
-    Place place =
-        At(Register(map_.window(), features, start, among_features, options_.registration), true);
-    if (!best || place.log_likelihood > best->log_likelihood) {
-      best = std::move(place);
+  SpreadStarts(prior);
+  places_.clear();
+  for (const Pose& start : starts_) {
+    places_.push_back(
+        At(Register(map_.window(), features, start, among_features, options_.registration), true));
+  }
+  const auto best = std::max_element(places_.begin(), places_.end(), IsLessLikely);
+  return {*best, RivalOf(places_, *best)};
+}
+
+std::optional<Eigen::Vector2d> Localizer::RivalOf(const std::vector<Place>& places,
+                                                  const Place& best) const {
+  const Pose& pose = best.registration.T_world_level;
+  std::optional<Eigen::Vector2d> rival;
+  double likeliest = best.log_likelihood - options_.unique_log_ratio;
+  for (const Place& other : places) {
+    const Pose& elsewhere = other.registration.T_world_level;
+    if (other.log_likelihood > likeliest && AreApart(elsewhere, pose, options_.search)) {
+      likeliest = other.log_likelihood;
+      rival = (elsewhere.translation() - pose.translation()).head<2>();
     }
   }
-  return *best;
+  return rival && rival->norm() > 0.0 ? rival : std::nullopt;
 }
 
 bool Localizer::IsDoubtful(const RegistrationResult& result) const {
@@ -223,9 +306,7 @@ std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features
     places.push_back(
         At(Register(map_.window(), features, start, options_.registration), is_as_expected));
   }
-  const auto best = std::max_element(
-      places.begin() + 1, places.end(),
-      [](const auto& a, const auto& b) { return a.log_likelihood < b.log_likelihood; });
+  const auto best = std::max_element(places.begin() + 1, places.end(), IsLessLikely);
   if (best == places.end() || !StandsOut(places, *best)) {
     return std::nullopt;
   }

@@ -22,10 +22,18 @@ namespace atlas {
 
 enum class LocalizationHealth : std::uint8_t {
   kGood,
-  kWeak,  // one horizontal direction is not held by anything seen
+  kWeak,  // one horizontal direction is not held by anything seen, or in two places
   kLost,  // the scan does not fit the map here: the pose is the predicted one
 };
 std::string_view LocalizationHealthName(LocalizationHealth health);
+
+// What the map has of the ground that a scan saw.
+enum class MapCover : std::uint8_t {
+  kNone,    // (nearly) nothing: it was never mapped, or its tiles have not arrived
+  kCoarse,  // most of it from tiles above level 0: the finer ones have not arrived
+  kFine,
+};
+std::string_view MapCoverName(MapCover cover);
 
 struct LocalizerOptions {
   FeatureOptions features;
@@ -70,6 +78,10 @@ struct LocalizerOptions {
   SearchReach search_reach;  // of the first search; each lost scan adds as much
   SearchReach max_search_reach{8.0, 8.0, std::numbers::pi};
 
+  // Where the map is not all there, it is asked for again after so many scans, at a standstill,
+  // too.
+  int asked_again_after = 5;
+
   // Lost for so many scans, or adrift this far, it is looked for in the whole map, again after as
   // many scans as it was not found.
   int relocalized_after = 5;
@@ -84,6 +96,7 @@ using RelocalizerSource = std::function<Result<std::shared_ptr<const Relocalizer
 struct LocalizationResult {
   Pose T_world_sensor = Pose::Identity();
   LocalizationHealth health = LocalizationHealth::kLost;
+  MapCover cover = MapCover::kNone;                    // anything but fine is never good
   PoseCovariance covariance = PoseCovariance::Zero();  // of the pose, all that is known considered
   RegistrationResult registration;
 };
@@ -111,12 +124,22 @@ class Localizer {
     RegistrationResult registration;
     double log_likelihood = 0.0;
   };
+  static bool IsLessLikely(const Place& a, const Place& b) {
+    return a.log_likelihood < b.log_likelihood;
+  }
+  struct Tracked {
+    Place place;
+    // From there to another place that is about as likely: the vehicle may have moved on by one of
+    // a row of posts.
+    std::optional<Eigen::Vector2d> rival;
+  };
 
   PosePrior Prior() const;
   Place At(const RegistrationResult& registration, bool has_prior) const;
-  // What is tried first: the prediction, and others where it is uncertain.
-  std::vector<Pose> Fan(const PosePrior& prior) const;
-  Place Track(const ScanFeatures& features) const;
+  // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
+  void SpreadStarts(const PosePrior& prior);
+  Tracked Track(const ScanFeatures& features);
+  std::optional<Eigen::Vector2d> RivalOf(const std::vector<Place>& places, const Place& best) const;
   bool IsDoubtful(const RegistrationResult& result) const;
   bool IsAdrift() const;
   double AdriftReach() const;
@@ -131,16 +154,29 @@ class Localizer {
                                                        const Eigen::Quaterniond& R_level_sensor,
                                                        LocalizationHealth health);
   LocalizationHealth Judge(const RegistrationResult& result) const;
-  void Remember(const LocalizationResult& result, bool is_found);
+  struct Cover {
+    MapCover map = MapCover::kNone;
+    double detail = 1.0;  // cells that are twice as large say a quarter as much
+  };
+  void NoteCover(MapCover cover);
+  Cover CoverAt(const ScanFeatures& features, const Pose& T_world_level) const;
+  Eigen::Matrix4d Seen(const RegistrationResult& registration,
+                       const std::optional<Eigen::Vector2d>& rival) const;
+  void Remember(const LocalizationResult& result, const Eigen::Matrix4d& seen, bool is_found);
 
   LocalizerOptions options_;
+  FeatureExtractor features_;
   LocalMap map_;
   MotionModel motion_;
   bool is_first_ = true;
   double usual_fit_ = 0.0;  // of good results, exponentially forgotten
   int lost_ = 0;            // scans in a row
   RelocalizerSource relocalizer_;
-  int astray_ = 0;  // scans in a row in which it was lost or adrift too far
+  int without_map_ = 0;  // scans in a row on which the map was not all there
+  int astray_ = 0;       // scans in a row in which it was lost or adrift too far
+  // Of the scan at hand; kept for their memory.
+  std::vector<Pose> starts_;
+  std::vector<Place> places_;
 };
 
 }  // namespace atlas

@@ -1,6 +1,7 @@
 #include "core/localization/registration.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -156,9 +157,17 @@ double Share(int part, std::size_t whole) {
 }  // namespace
 
 double WorstSigma(const RegistrationResult& result) {
-  const Eigen::Matrix2d horizontal = result.information.topLeftCorner<2, 2>();
-  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues()(0);
-  return least > 0.0 ? 1.0 / std::sqrt(least) : 1e9;
+  // What is left of the place's information when height and heading are free.
+  constexpr std::array<int, 2> kPlace{0, 1};
+  constexpr std::array<int, 2> kOthers{2, 5};
+  constexpr double kLittle = 1e-6;
+  const Eigen::Matrix2d place = result.information(kPlace, kPlace);
+  const Eigen::Matrix2d mixed = result.information(kPlace, kOthers);
+  Eigen::Matrix2d others = result.information(kOthers, kOthers);
+  others.diagonal().array() += kLittle;
+  const Eigen::Matrix2d left = place - mixed * others.inverse() * mixed.transpose();
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(left).eigenvalues()(0);
+  return least > 0.0 ? std::min(1.0 / std::sqrt(least), 1e9) : 1e9;
 }
 
 RegistrationResult Register(const MapWindow& map,

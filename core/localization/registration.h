@@ -50,8 +50,8 @@ struct RegistrationResult {
   bool is_converged = false;
 };
 
-// Standard deviation of the least certain horizontal direction, as far as features are independent,
-// metres; 1e9 where nothing holds it.
+// Standard deviation of the least certain horizontal direction with height and heading as uncertain
+// as they are, as far as features are independent, metres; 1e9 where nothing holds it.
 double WorstSigma(const RegistrationResult& result);
 
 RegistrationResult Register(const MapWindow& map,

@@ -158,15 +158,12 @@ Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& fe
                                                           double sensor_height_m) const {
   const auto radius_m = static_cast<double>(options_.features.max_range_m) + 3.0;
   std::vector<RelocalizedPlace> places;
+  MapWindow window(profile_, options_.window);
   for (const Start& start : starts) {
     const Eigen::Vector3d& center = start.T_world_level.translation();
     const auto tiles = tiles_(center, radius_m);
     if (!tiles) return Error(tiles.error());
-    std::vector<const Tile*> views;
-    for (const auto& tile : *tiles) {
-      views.push_back(tile.get());
-    }
-    const MapWindow window(profile_, views, center, radius_m, options_.window);
+    window.Renew(*tiles, center, radius_m);
     Add(Placed(window, features, start.T_world_level), places);
     for (const double ground_m :
          places_->OtherDecks(center.head<2>(), center.z() - sensor_height_m)) {
@@ -203,6 +200,7 @@ void Relocalizer::Add(RelocalizedPlace place, std::vector<RelocalizedPlace>& pla
 bool Relocalizer::IsBelieved(const Relocalization& found) const {
   const RelocalizedPlace& best = found.places.front();
   return best.registration.fit >= options_.min_fit &&
+         WorstSigma(best.registration) <= options_.max_sigma_m &&
          best.registration.column_inliers >= options_.min_columns &&
          best.explained >= options_.min_explained && found.margin >= options_.min_margin;
 }

@@ -20,7 +20,7 @@ namespace atlas {
 
 struct RelocalizerOptions {
   FeatureOptions features;
-  MapWindowOptions window;
+  PlaceOptions window;
   RegistrationOptions registration;
 
   std::size_t candidates = 80;  // places that are checked ...

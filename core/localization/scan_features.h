@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,6 +28,46 @@ struct ScanFeatures {
   std::vector<Eigen::Vector3f> returns;
 };
 
+// Averages points that share a voxel; voxels in a fixed order.
+class VoxelAverager {
+ public:
+  VoxelAverager(float side_m, float height_m);
+
+  void Clear() { sums_.clear(); }
+  void Add(const Eigen::Vector3f& p);
+  // Of what was added since Clear().
+  void Means(std::vector<Eigen::Vector3f>& means);
+
+ private:
+  struct Sum {
+    std::uint64_t voxel;  // and, below it, the order in which it was begun
+    Eigen::Vector3f sum;
+    float count;
+  };
+
+  std::uint64_t Voxel(const Eigen::Vector3f& p) const;
+
+  Eigen::Vector3f voxels_per_m_;
+  std::vector<Sum> sums_;
+};
+
+// Keeps its memory from scan to scan.
+class FeatureExtractor {
+ public:
+  explicit FeatureExtractor(const FeatureOptions& options);
+
+  // Valid until the next scan.
+  const ScanFeatures& Extract(const LeveledScan& scan);
+
+ private:
+  FeatureOptions options_;
+  VoxelAverager columns_;
+  VoxelAverager ground_;
+  std::vector<Eigen::Vector3f> obstacles_;
+  ScanFeatures features_;
+};
+
+// Of one scan.
 ScanFeatures ExtractFeatures(const LeveledScan& scan, const FeatureOptions& options);
 
 }  // namespace atlas

@@ -11,7 +11,7 @@ namespace atlas {
 namespace {
 
 constexpr int kTriples = 32;
-constexpr std::uint32_t kLanes = 16;
+constexpr std::size_t kLanes = 16;
 
 // Where in its ring (or in the window) each corner of a triple lies, 0..1: the additive recurrence
 // of the golden ratio and its relatives fills the unit cube evenly.
@@ -66,19 +66,21 @@ std::uint32_t CountInliers(const WindowReturns& window,
                            const Plane& plane,
                            float threshold_m,
                            std::uint32_t least) {
-  constexpr std::uint32_t kBlock = 4 * kLanes;
+  constexpr std::size_t kBlock = 4 * kLanes;
   const float nx = plane.normal.x();
   const float ny = plane.normal.y();
   const float nz = plane.normal.z();
   const float* x = window.x.data();
   const float* y = window.y.data();
   const float* z = window.z.data();
+  const std::size_t size = window.size();
   std::uint32_t total = 0;
-  for (std::uint32_t block = 0; block < window.size(); block += kBlock) {
-    const std::uint32_t end = std::min(block + kBlock, window.size());
+  // Indices of pointers' width: narrower ones may wrap, and each lane is then loaded by itself.
+  for (std::size_t block = 0; block < size; block += kBlock) {
+    const std::size_t end = std::min(block + kBlock, size);
     std::array<std::int32_t, kLanes> count{};
-    for (std::uint32_t i = block; i < end; i += kLanes) {
-      for (std::uint32_t k = 0; k < kLanes; ++k) {
+    for (std::size_t i = block; i < end; i += kLanes) {
+      for (std::size_t k = 0; k < kLanes; ++k) {
         const float distance = nx * x[i + k] + ny * y[i + k] + nz * z[i + k] + plane.offset_m;
         count[k] += static_cast<std::int32_t>(std::abs(distance) < threshold_m);
       }
@@ -86,7 +88,7 @@ std::uint32_t CountInliers(const WindowReturns& window,
     for (const std::int32_t lane : count) {
       total += static_cast<std::uint32_t>(lane);
     }
-    if (total + window.size() - end < least) {
+    if (total + size - end < least) {
       break;
     }
   }

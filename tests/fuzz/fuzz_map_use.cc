@@ -2,6 +2,8 @@
 // the map that a scan is matched with.
 #include <array>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "client/render/map_picture.h"
 #include "core/localization/window/map_window.h"
@@ -74,8 +76,9 @@ void Plan(const Tile& tile) {
 }
 
 void Match(const Tile& tile) {
-  const Tile* const tiles[] = {&tile};
-  const MapWindow window(TileProfile(), tiles, MiddleOf(tile), 4.0, {});
+  const std::vector tiles{std::make_shared<const Tile>(tile)};
+  MapWindow window(TileProfile(), {});
+  window.Renew(tiles, MiddleOf(tile), 4.0);
   for (const float x : {-1.0F, 0.0F, 1.5F}) {
     const Eigen::Vector3f p(x, 0.5F, 0.0F);
     static_cast<void>(window.NearestLine(p, 1.0F));

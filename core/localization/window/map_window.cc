@@ -1,172 +1,213 @@
 #include "core/localization/window/map_window.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
-#include <vector>
-
-#include "core/geometry/nibble.h"
 
 namespace atlas {
 namespace {
 
-struct Corner {
-  std::int64_t x;
-  std::int64_t y;
-};
-
-// Whether a square of cells touches the window's [0, side)^2. Tiles elsewhere may be so far that 32
-// bits would bring their cells back.
-bool Overlaps(const Corner& first, std::int64_t length, std::int64_t side) {
-  return first.x > -length && first.x < side && first.y > -length && first.y < side;
-}
-
-bool IsMeasured(const TileLayer& layer) {
-  return (layer.flags & TileLayer::kMeasured) != 0;
-}
-
-// A cell has one layer for each ground, and what stands on another ground than its own may be left
-// out of it: a wall between two ramps has holes. A gap of kGap_m across which structure stands on
-// both sides is structure, unless rays crossed it.
-void CloseGaps(const WindowGrid& grid, SegmentMasks& masks) {
-  constexpr float kGap_m = 0.25F;
-  const std::ptrdiff_t side = grid.side();
-  const auto reach =
-      static_cast<std::ptrdiff_t>(std::clamp(kGap_m / grid.cell_size_m(), 1.0F, 4.0F));
-  const std::vector<std::uint64_t> occupied = masks.occupied;
-  const auto fill = [&](std::ptrdiff_t cell, std::ptrdiff_t step) {
-    for (std::ptrdiff_t length = 2; length <= 2 * reach; ++length) {
-      const std::uint64_t both = occupied[static_cast<std::size_t>(cell)] &
-                                 occupied[static_cast<std::size_t>(cell + length * step)];
-      for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(1, length - reach);
-           both != 0 && k <= std::min(reach, length - 1); ++k) {
-        const auto between = static_cast<std::size_t>(cell + k * step);
-        masks.occupied[between] |= both & ~masks.free[between];
-      }
-    }
-  };
-  const std::ptrdiff_t margin = 2 * reach;
-  for (std::ptrdiff_t y = 0; y < side - margin; ++y) {
-    for (std::ptrdiff_t x = margin; x < side - margin; ++x) {
-      const std::ptrdiff_t cell = y * side + x;
-      if (occupied[static_cast<std::size_t>(cell)] == 0) {
-        continue;
-      }
-      for (const std::ptrdiff_t step : {std::ptrdiff_t{1}, side, side + 1, side - 1}) {
-        fill(cell, step);
-      }
-    }
-  }
-}
+// How far the window's middle may be from the vehicle's height before everything is read again.
+constexpr std::int64_t kHeightMargin = WindowGrid::kSegments / 8;
 
 }  // namespace
 
-// What the tiles hold of a window.
-struct MapWindow::Content {
-  SegmentMasks masks;
-  std::vector<std::pair<std::uint32_t, float>> surfaces;  // by cell and height
+MapWindow::MapWindow(const MapProfile& profile, const PlaceOptions& options)
+    : profile_(profile),
+      options_(options),
+      grid_(profile, Eigen::Vector2d::Zero(), 0.0, WindowGrid::FirstSegment(profile, 0.0)),
+      slab_m_(static_cast<float>(profile.slab_margin_mm) * 1e-3F),
+      places_(grid_.all_places()) {}
 
-  void AddColumn(const TileLayer& layer,
-                 std::size_t cell,
-                 const WindowGrid& grid,
-                 const MapProfile& profile,
-                 const MapWindowOptions& options) {
-    const std::int64_t base = ColumnBaseIndex(layer.altitude_mm, profile) - grid.first_segment();
-    for (int k = 0; k < profile.column_segments; ++k) {
-      const std::int64_t bit = base + k;
-      const std::uint8_t nibble = NibbleAt(layer.column, k);
-      if (nibble == 0 || bit < 0 || bit >= WindowGrid::kSegments) {
-        continue;
-      }
-      if (nibble >= options.occupied_nibble) {
-        masks.occupied[cell] |= std::uint64_t{1} << bit;
-      } else if (nibble <= options.free_nibble) {
-        masks.free[cell] |= std::uint64_t{1} << bit;
-      }
+WindowGrid MapWindow::GridAround(const Eigen::Vector3d& center, double radius_m) const {
+  const std::int64_t first = WindowGrid::FirstSegment(profile_, center.z());
+  const bool is_near = std::abs(first - grid_.first_segment()) <= kHeightMargin;
+  return {profile_, center.head<2>(), radius_m, is_near ? grid_.first_segment() : first};
+}
+
+void MapWindow::Renew(Tiles tiles, const Eigen::Vector3d& center, double radius_m) {
+  const WindowGrid before = std::exchange(grid_, GridAround(center, radius_m));
+  TakeOver(before, std::move(places_));
+  ReadPlaces(SourcesOf(tiles));
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (places_[i] != nullptr) {
+      places_[i]->Link(Around(i), profile_, options_, scratch_);
     }
   }
+}
 
-  void AddCell(std::span<const TileLayer> layers,
-               std::size_t cell,
-               const WindowGrid& grid,
-               const MapProfile& profile,
-               const MapWindowOptions& options) {
-    const bool is_any_measured = std::any_of(layers.begin(), layers.end(), IsMeasured);
-    for (const TileLayer& layer : layers) {
-      if (is_any_measured && !IsMeasured(layer)) {
-        continue;  // what stands there does so at a guessed height
-      }
-      if (layer.is_traversable() && IsMeasured(layer)) {
-        surfaces.emplace_back(static_cast<std::uint32_t>(cell),
-                              static_cast<float>(layer.altitude_mm * 1e-3 - grid.origin().z()));
-      }
-      AddColumn(layer, cell, grid, profile, options);
-    }
-  }
-};
-
-MapWindow::Content MapWindow::Collect(const WindowGrid& grid,
-                                      const MapProfile& profile,
-                                      std::span<const Tile* const> tiles,
-                                      const MapWindowOptions& options) {
-  Content content;
-  content.masks.occupied.assign(grid.size(), 0);
-  content.masks.free.assign(grid.size(), 0);
-  for (const Tile* tile : tiles) {
-    const std::int64_t left = std::int64_t{tile->id.x} * profile.tile_cells - grid.first_x();
-    const std::int64_t low = std::int64_t{tile->id.y} * profile.tile_cells - grid.first_y();
-    if (!Overlaps({left, low}, profile.tile_cells, grid.side())) {
+void MapWindow::TakeOver(const WindowGrid& before_grid,
+                         std::vector<std::unique_ptr<WindowPlace>> before) {
+  places_ = std::vector<std::unique_ptr<WindowPlace>>(grid_.all_places());
+  const std::int64_t side = before_grid.places();
+  for (std::int64_t i = 0; i < side * side; ++i) {
+    auto& place = before[static_cast<std::size_t>(i)];
+    if (place == nullptr) {
       continue;
     }
-    for (std::int32_t j = 0; j < profile.tile_cells; ++j) {
-      for (std::int32_t i = 0; i < profile.tile_cells; ++i) {
-        const WindowCell cell{static_cast<std::int32_t>(left + i),
-                              static_cast<std::int32_t>(low + j)};
-        if (grid.Contains(cell)) {
-          content.AddCell(tile->Layers(static_cast<std::size_t>(j * profile.tile_cells + i)),
-                          grid.Index(cell), grid, profile, options);
+    const std::int64_t x = before_grid.first_place_x() + i % side - grid_.first_place_x();
+    const std::int64_t y = before_grid.first_place_y() + i / side - grid_.first_place_y();
+    if (x >= 0 && x < grid_.places() && y >= 0 && y < grid_.places()) {
+      places_[static_cast<std::size_t>(y * grid_.places() + x)] = std::move(place);
+    } else {
+      spare_.push_back(std::move(place));
+    }
+  }
+}
+
+// For each place the finest tile that lies over it; null without one.
+std::vector<const std::shared_ptr<const Tile>*> MapWindow::SourcesOf(Tiles tiles) const {
+  std::vector<const std::shared_ptr<const Tile>*> sources(grid_.all_places(), nullptr);
+  const std::int64_t places = grid_.places();
+  for (const std::shared_ptr<const Tile>& tile : tiles) {
+    const std::int64_t side = std::int64_t{1} << tile->id.level;
+    const std::int64_t left = side * tile->id.x - grid_.first_place_x();
+    const std::int64_t low = side * tile->id.y - grid_.first_place_y();
+    for (std::int64_t y = std::max<std::int64_t>(0, low); y < std::min(places, low + side); ++y) {
+      for (std::int64_t x = std::max<std::int64_t>(0, left); x < std::min(places, left + side);
+           ++x) {
+        auto& source = sources[static_cast<std::size_t>(y * places + x)];
+        if (source == nullptr || (*source)->id.level > tile->id.level) {
+          source = &tile;
         }
       }
     }
   }
-  CloseGaps(grid, content.masks);
-  return content;
+  return sources;
 }
 
-MapWindow::MapWindow(const MapProfile& profile,
-                     std::span<const Tile* const> tiles,
-                     const Eigen::Vector3d& center,
-                     double radius_m,
-                     const MapWindowOptions& options)
-    : MapWindow(profile,
-                WindowGrid(profile, center, radius_m),
-                Collect(WindowGrid(profile, center, radius_m), profile, tiles, options),
-                options) {}
+void MapWindow::ReadPlaces(const std::vector<const std::shared_ptr<const Tile>*>& sources) {
+  const auto give_back = [&](std::size_t i) {
+    if (places_[i] != nullptr) spare_.push_back(std::move(places_[i]));
+  };
+  const auto place_at = [&](std::size_t i) -> WindowPlace& {
+    if (places_[i] == nullptr) places_[i] = Spare();
+    return *places_[i];
+  };
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (sources[i] == nullptr) {
+      give_back(i);
+    } else if (places_[i] == nullptr || !places_[i]->IsOf(*sources[i], grid_.first_segment())) {
+      place_at(i).Read(*sources[i], grid_.IdOf(i), profile_, grid_.first_segment(),
+                       options_.content, ++serial_);
+    }
+  }
+  // Beside what stands at a place's edge points find it from outside, too.
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (sources[i] == nullptr && IsBesideOccupied(i)) {
+      place_at(i).ReadNothing();
+    }
+  }
+  constexpr std::size_t kMaxSpare = 64;
+  spare_.resize(std::min(spare_.size(), kMaxSpare));
+}
 
-MapWindow::MapWindow(const MapProfile& profile,
-                     const WindowGrid& grid,
-                     Content content,
-                     const MapWindowOptions& options)
-    : grid_(grid),
-      slab_m_(static_cast<float>(profile.slab_margin_mm) * 1e-3F),
-      columns_(grid_, std::move(content.masks), options.lines),
-      surfaces_(grid_, content.surfaces, options.slope_baseline_m) {}
+std::unique_ptr<WindowPlace> MapWindow::Spare() {
+  if (spare_.empty()) {
+    return std::make_unique<WindowPlace>();
+  }
+  std::unique_ptr<WindowPlace> place = std::move(spare_.back());
+  spare_.pop_back();
+  return place;
+}
+
+WindowPlace::Nine MapWindow::Around(std::size_t place) const {
+  const std::int32_t side = grid_.places();
+  const auto x = static_cast<std::int32_t>(place) % side;
+  const auto y = static_cast<std::int32_t>(place) / side;
+  WindowPlace::Nine nine{};
+  for (std::int32_t n = 0; n < 9; ++n) {
+    const std::int32_t i = x + n % 3 - 1;
+    const std::int32_t j = y + n / 3 - 1;
+    if (i >= 0 && i < side && j >= 0 && j < side) {
+      nine[static_cast<std::size_t>(n)] = places_[static_cast<std::size_t>(j * side + i)].get();
+    }
+  }
+  return nine;
+}
+
+bool MapWindow::IsBesideOccupied(std::size_t place) const {
+  const WindowPlace::Nine nine = Around(place);
+  return std::any_of(nine.begin(), nine.end(), [](const WindowPlace* beside) {
+    return beside != nullptr && beside->content().has_occupied();
+  });
+}
+
+std::size_t MapWindow::lines() const {
+  std::size_t lines = 0;
+  for (const auto& place : places_) {
+    lines += place != nullptr ? place->rows().count() : 0;
+  }
+  return lines;
+}
+
+std::size_t MapWindow::surfaces() const {
+  std::size_t surfaces = 0;
+  for (const auto& place : places_) {
+    surfaces += place != nullptr ? place->content().surfaces() : 0;
+  }
+  return surfaces;
+}
+
+MapWindow::Local MapWindow::At(const Eigen::Vector2f& p) const {
+  const WindowCell cell = grid_.CellAt(p);
+  if (!grid_.Contains(cell)) {
+    return {};
+  }
+  const WindowCell in_place = grid_.InPlace(cell);
+  return {places_[grid_.PlaceOf(cell)].get(),
+          in_place,
+          {cell.x - in_place.x, cell.y - in_place.y},
+          static_cast<std::size_t>(in_place.y * grid_.place_cells() + in_place.x)};
+}
+
+std::optional<ColumnLine> MapWindow::NearestLine(const Eigen::Vector3f& p, float radius_m) const {
+  const int segment = grid_.SegmentAt(p.z());
+  const Local at = At(p.head<2>());
+  if (segment < 0 || at.place == nullptr) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2f corner = grid_.CornerAt(at.first);
+  std::optional<ColumnLine> line = at.place->NearestLine(p.head<2>() - corner, segment, radius_m);
+  if (line) line->center += corner;
+  return line;
+}
+
+std::optional<SurfaceBelow> MapWindow::NearestSurface(const Eigen::Vector3f& p,
+                                                      float reach_m) const {
+  const Local at = At(p.head<2>());
+  if (at.place == nullptr) {
+    return std::nullopt;
+  }
+  Eigen::Vector3f in_place = p;
+  in_place.head<2>() -= grid_.CornerAt(at.first);
+  return at.place->NearestSurface(in_place, at.cell, reach_m);
+}
 
 bool MapWindow::IsMapped(const Eigen::Vector3f& p) const {
-  const WindowCell cell = grid_.CellAt(p.head<2>());
-  return grid_.Contains(cell) && !surfaces_.Of(grid_.Index(cell)).empty();
+  const Local at = At(p.head<2>());
+  return at.place != nullptr && !at.place->content().SurfacesOf(at.index).empty();
+}
+
+std::optional<int> MapWindow::LevelAt(const Eigen::Vector3f& p) const {
+  const Local at = At(p.head<2>());
+  if (at.place == nullptr || at.place->content().SurfacesOf(at.index).empty()) {
+    return std::nullopt;
+  }
+  return at.place->level();
 }
 
 bool MapWindow::IsFree(const Eigen::Vector3f& p) const {
   constexpr float kReach_m = 0.1F;  // what stands at a segment's edge may be counted beside it
-  const WindowCell cell = grid_.CellAt(p.head<2>());
+  const Local at = At(p.head<2>());
   const int lower = grid_.SegmentAt(p.z() - kReach_m);
   const int upper = grid_.SegmentAt(p.z() + kReach_m);
-  if (!grid_.Contains(cell) || lower < 0 || upper < 0) {
+  if (at.place == nullptr || lower < 0 || upper < 0) {
     return false;
   }
-  const std::size_t index = grid_.Index(cell);
-  const auto surfaces = surfaces_.Of(index);
-  return columns_.IsFree(index, lower) && columns_.IsFree(index, upper) &&
+  const PlaceContent& content = at.place->content();
+  const auto surfaces = content.SurfacesOf(at.index);
+  return content.IsFree(at.index, lower) && content.IsFree(at.index, upper) &&
          std::none_of(surfaces.begin(), surfaces.end(), [&](float surface_z_m) {
            return p.z() < surface_z_m && p.z() > surface_z_m - slab_m_;
          });
@@ -174,29 +215,27 @@ bool MapWindow::IsFree(const Eigen::Vector3f& p) const {
 
 bool MapWindow::IsOccupied(const Eigen::Vector3f& p) const {
   const int segment = grid_.SegmentAt(p.z());
-  const WindowCell cell = grid_.CellAt(p.head<2>());
-  return segment >= 0 && grid_.Contains(cell) && columns_.IsOccupied(grid_.Index(cell), segment);
+  const Local at = At(p.head<2>());
+  return segment >= 0 && at.place != nullptr && at.place->rows().IsOccupied(at.cell, segment);
 }
 
 PointPresence MapWindow::PresenceAt(const Eigen::Vector3f& p, const CellKernel& kernel) const {
   PointPresence presence;
   const int segment = grid_.SegmentAt(p.z());
-  const float cells_a_m = 1.0F / grid_.cell_size_m();
-  const Eigen::Vector2f place = p.head<2>() * cells_a_m;
-  const Eigen::Vector2f corner = place.array().floor();
-  const WindowCell cell{static_cast<std::int32_t>(corner.x()),
-                        static_cast<std::int32_t>(corner.y())};
-  const bool is_within =
-      cell.x > 0 && cell.y > 0 && cell.x < grid_.side() - 1 && cell.y < grid_.side() - 1;
-  if (segment < 0 || !is_within) {
+  const Local at = At(p.head<2>());
+  if (segment < 0 || at.place == nullptr) {
     return presence;
   }
-  const CellKernel::Shares& x = kernel.At(place.x() - corner.x());
-  const CellKernel::Shares& y = kernel.At(place.y() - corner.y());
+  const unsigned nine = at.place->rows().Nine(at.cell, segment);
+  if (nine == 0) {
+    return presence;
+  }
+  const float cells_a_m = grid_.cells_a_m();
+  const Eigen::Vector2f place = p.head<2>() * cells_a_m;
+  const CellKernel::Shares& x = kernel.At(place.x() - static_cast<float>(at.first.x + at.cell.x));
+  const CellKernel::Shares& y = kernel.At(place.y() - static_cast<float>(at.first.y + at.cell.y));
   for (std::size_t row = 0; row < 3; ++row) {
-    const unsigned cells =
-        columns_.rows().Three({cell.x - 1, cell.y - 1 + static_cast<std::int32_t>(row)}, segment);
-    const CellKernel::Share& along = x[cells];
+    const CellKernel::Share& along = x[(nine >> (3 * row)) & 7U];
     const CellKernel::Share& across = y[std::size_t{1} << row];
     presence.value += along.value * across.value;
     presence.gradient.x() += along.slope * across.value;

@@ -1,5 +1,5 @@
-// Which cells of a window are occupied at a height, as rows of bits: what stands near a place is
-// found without looking at every cell.
+// Which cells of a place and around it are occupied at a height, as rows of bits: what stands near
+// a point is found without looking at every cell.
 #pragma once
 
 #include <array>
@@ -15,58 +15,79 @@
 
 namespace atlas {
 
+// Cells are counted from the place's lowest one; those of the border are negative or behind its
+// last one.
 class OccupiedRows {
  public:
-  // `masks`: by cell (WindowGrid::Index), bit k its segment k.
-  OccupiedRows(const WindowGrid& grid, std::span<const std::uint64_t> masks);
+  static constexpr std::int32_t kMaxReach = 31;
+  static constexpr std::int32_t kMaxBorder = kMaxReach + 1;
 
-  // The occupied cell of `segment` whose centre is nearest to `p` (window frame, metres), nearer
-  // than `radius_m`; of equals the lowest row's, its first. A radius beyond
-  // kMaxReach cells counts as that.
-  std::optional<WindowCell> Nearest(const WindowGrid& grid,
-                                    const Eigen::Vector2f& p,
-                                    int segment,
-                                    float radius_m) const;
+  // A place of `cells` cells a side with a border of 1 to kMaxBorder on all sides. `masks`: of all
+  // of these, row-major, bit k of a cell its segment k.
+  void Assign(std::int32_t cells, std::int32_t border, std::span<const std::uint64_t> masks);
+  void Clear();
 
-  // The cells up to `width` before and behind `middle` in its row, lowest first; a row outside the
-  // window has none. `middle.x` must be in the window.
-  std::uint64_t Around(WindowCell middle, int segment, std::int32_t width) const {
+  // The occupied cell of `segment` whose centre is nearest to `at` (in cells, within the place),
+  // nearer than `radius`; of equals the lowest row's, its first. A radius beyond the border or
+  // kMaxReach counts as that.
+  std::optional<WindowCell> Nearest(const Eigen::Vector2f& at, int segment, float radius) const;
+
+  // The cells up to `width` before and behind `middle`, a cell of the place, in the row `dy` above
+  // it, lowest first; none beyond the border.
+  std::uint64_t Around(WindowCell middle, std::int32_t dy, int segment, std::int32_t width) const {
+    const std::int32_t y = middle.y + dy;
     const std::uint32_t plane = plane_[static_cast<std::size_t>(segment)];
-    if (plane == kNone || middle.y < 0 || middle.y >= rows_) {
+    if (plane == kNone || y < -border_ || y >= cells_ + border_) {
       return 0;
     }
-    return Bits(plane + static_cast<std::size_t>(middle.y) * row_words_, middle.x - width) &
-           ((std::uint64_t{2} << (2 * width)) - 1);
+    return Bits(plane, y, middle.x - width) & ((std::uint64_t{2} << (2 * width)) - 1);
   }
-  // Whether `first`, which must be in the window, and the two cells behind it are occupied: bits 0
-  // to 2.
-  unsigned Three(WindowCell first, int segment) const {
+  // Of the place's cell `middle` and the eight around it: a row in three bits, the lowest first.
+  unsigned Nine(WindowCell middle, int segment) const {
     const std::uint32_t plane = plane_[static_cast<std::size_t>(segment)];
-    return plane == kNone
-               ? 0U
-               : static_cast<unsigned>(
-                     Bits(plane + static_cast<std::size_t>(first.y) * row_words_, first.x) & 7U);
+    if (plane == kNone) {
+      return 0;
+    }
+    unsigned nine = 0;
+    for (std::int32_t row = 0; row < 3; ++row) {
+      nine |= static_cast<unsigned>(Bits(plane, middle.y - 1 + row, middle.x - 1) & 7U)
+              << (3 * row);
+    }
+    return nine;
+  }
+  bool IsOccupied(WindowCell cell, int segment) const {
+    const std::uint32_t plane = plane_[static_cast<std::size_t>(segment)];
+    return plane != kNone && (Bits(plane, cell.y, cell.x) & 1) != 0;
   }
 
-  static constexpr std::int32_t kMaxReach = 31;
+  // Occupied segments of the place, without its border.
+  std::uint32_t count() const { return count_; }
+  // How many of them come before this one, which is one.
+  std::uint32_t Rank(WindowCell cell, int segment) const;
 
  private:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-  // Bits of the cells from `first` on, which may lie kMaxReach + 1 outside the window.
-  std::uint64_t Bits(std::size_t row, std::int32_t first) const {
-    const auto at = static_cast<std::uint32_t>(first + kPadding);
-    const std::uint64_t* word = &words_[row + at / 64];
+  std::size_t Row(std::uint32_t plane, std::int32_t y) const {
+    return plane + static_cast<std::size_t>(y + border_) * row_words_;
+  }
+  // 64 bits from `first` on, which may lie kMaxBorder outside.
+  std::uint64_t Bits(std::uint32_t plane, std::int32_t y, std::int32_t first) const {
+    const auto at = static_cast<std::uint32_t>(first + kMaxBorder);
+    const std::uint64_t* word = &words_[Row(plane, y) + at / 64];
     const std::uint32_t shift = at % 64;
     return shift == 0 ? word[0] : (word[0] >> shift) | (word[1] << (64 - shift));
   }
+  std::uint32_t CountBefore(std::uint32_t plane, std::int32_t y, std::int32_t end) const;
+  void CountRows();
 
-  static constexpr std::int32_t kPadding = kMaxReach + 1;  // bits before the first cell
-
-  std::int32_t rows_ = 0;
+  std::int32_t cells_ = 0;
+  std::int32_t border_ = 0;
   std::size_t row_words_ = 0;
   std::array<std::uint32_t, WindowGrid::kSegments> plane_{};  // by segment: its first word
   std::vector<std::uint64_t> words_;                          // of segments with anything, by row
+  std::vector<std::uint32_t> before_;  // by such a segment and row: occupied before it
+  std::uint32_t count_ = 0;
 };
 
 }  // namespace atlas

@@ -1,13 +1,17 @@
-// The lattice of cells and segments that a map window lies on.
+// The lattice of tiles, cells and segments that a map window lies on.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include <Eigen/Core>
 
+#include "core/base/fast_floor.h"
 #include "core/geometry/map_profile.h"
+#include "core/geometry/tile_id.h"
 
 namespace atlas {
 
@@ -16,51 +20,74 @@ struct WindowCell {
   std::int32_t y;
 };
 
-// Window frame: axes of the world, origin at `origin` (world, metres), its lowest corner; floats
-// are exact enough. Segments are bits of a word, 64 of them on top of each other.
+// Window frame: axes of the world, origin at `origin` (world, metres), the corner of its lowest
+// tile; floats are exact enough. Segments are bits of a word, 64 of them on top of each other.
+// Whole level-0 tiles, here called places.
 class WindowGrid {
  public:
   static constexpr int kSegments = 64;
 
-  // The square of `radius_m` around `center`, on the map's lattice.
-  WindowGrid(const MapProfile& profile, const Eigen::Vector3d& center, double radius_m)
-      : first_x_(
-            static_cast<std::int64_t>(std::floor((center.x() - radius_m) / profile.cell_size_m()))),
-        first_y_(
-            static_cast<std::int64_t>(std::floor((center.y() - radius_m) / profile.cell_size_m()))),
-        first_segment_(
-            static_cast<std::int64_t>(std::floor(center.z() / profile.segment_height_m())) -
-            kSegments / 2),
-        side_(static_cast<std::int32_t>(std::ceil(2.0 * radius_m / profile.cell_size_m())) + 1),
+  // Segment 0 of a window whose middle is at `z_m`.
+  static std::int64_t FirstSegment(const MapProfile& profile, double z_m) {
+    return static_cast<std::int64_t>(std::floor(z_m / profile.segment_height_m())) - kSegments / 2;
+  }
+
+  // The places that touch the square of `radius_m` around `center`.
+  WindowGrid(const MapProfile& profile,
+             const Eigen::Vector2d& center,
+             double radius_m,
+             std::int64_t first_segment)
+      : first_place_x_(PlaceAt(center.x() - radius_m, profile)),
+        first_place_y_(PlaceAt(center.y() - radius_m, profile)),
+        first_segment_(first_segment),
+        places_(static_cast<std::int32_t>(
+            1 + std::max(PlaceAt(center.x() + radius_m, profile) - first_place_x_,
+                         PlaceAt(center.y() + radius_m, profile) - first_place_y_))),
+        shift_(std::countr_zero(profile.tile_cells)),
         cell_size_m_(static_cast<float>(profile.cell_size_m())),
+        cells_a_m_(1.0F / cell_size_m_),
         segment_height_m_(static_cast<float>(profile.segment_height_m())),
-        origin_(static_cast<double>(first_x_) * profile.cell_size_m(),
-                static_cast<double>(first_y_) * profile.cell_size_m(),
+        origin_(static_cast<double>(first_place_x_) * profile.tile_size_m(),
+                static_cast<double>(first_place_y_) * profile.tile_size_m(),
                 static_cast<double>(first_segment_) * profile.segment_height_m()) {}
 
-  // World indices of cell (0, 0) and of segment 0.
-  std::int64_t first_x() const { return first_x_; }
-  std::int64_t first_y() const { return first_y_; }
+  // Level-0 tile coordinates of the lowest place, and the world's index of segment 0.
+  std::int64_t first_place_x() const { return first_place_x_; }
+  std::int64_t first_place_y() const { return first_place_y_; }
   std::int64_t first_segment() const { return first_segment_; }
-  std::int32_t side() const { return side_; }  // cells
-  std::size_t size() const {
-    return static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_);
+  std::int32_t places() const { return places_; }           // along a side
+  std::int32_t place_cells() const { return 1 << shift_; }  // along a place's side
+  std::int32_t side() const { return places_ << shift_; }   // cells
+  std::size_t all_places() const {
+    return static_cast<std::size_t>(places_) * static_cast<std::size_t>(places_);
   }
   float cell_size_m() const { return cell_size_m_; }
+  float cells_a_m() const { return cells_a_m_; }
   float segment_height_m() const { return segment_height_m_; }
   const Eigen::Vector3d& origin() const { return origin_; }
 
   WindowCell CellAt(const Eigen::Vector2f& p) const {
-    return {static_cast<std::int32_t>(std::floor(p.x() / cell_size_m_)),
-            static_cast<std::int32_t>(std::floor(p.y() / cell_size_m_))};
+    return {FastFloor(p.x() * cells_a_m_), FastFloor(p.y() * cells_a_m_)};
   }
   bool Contains(WindowCell cell) const {
-    return cell.x >= 0 && cell.x < side_ && cell.y >= 0 && cell.y < side_;
+    return cell.x >= 0 && cell.x < side() && cell.y >= 0 && cell.y < side();
   }
-  // Requires Contains(cell). Row-major, x fastest.
-  std::size_t Index(WindowCell cell) const {
-    return static_cast<std::size_t>(cell.y) * static_cast<std::size_t>(side_) +
-           static_cast<std::size_t>(cell.x);
+  // What takes a cell requires Contains(cell). Places are row-major, x fastest.
+  std::size_t PlaceOf(WindowCell cell) const {
+    return static_cast<std::size_t>(cell.y >> shift_) * static_cast<std::size_t>(places_) +
+           static_cast<std::size_t>(cell.x >> shift_);
+  }
+  TileId IdOf(std::size_t place) const {
+    const auto side = static_cast<std::size_t>(places_);
+    return {0, static_cast<std::int32_t>(first_place_x_ + static_cast<std::int64_t>(place % side)),
+            static_cast<std::int32_t>(first_place_y_ + static_cast<std::int64_t>(place / side))};
+  }
+  WindowCell InPlace(WindowCell cell) const {
+    return {cell.x & (place_cells() - 1), cell.y & (place_cells() - 1)};
+  }
+  // A cell's lowest corner.
+  Eigen::Vector2f CornerAt(WindowCell cell) const {
+    return {static_cast<float>(cell.x) * cell_size_m_, static_cast<float>(cell.y) * cell_size_m_};
   }
   Eigen::Vector2f Center(WindowCell cell) const {
     return {(static_cast<float>(cell.x) + 0.5F) * cell_size_m_,
@@ -68,16 +95,22 @@ class WindowGrid {
   }
   // The segment at a height; negative outside.
   int SegmentAt(float z_m) const {
-    const int segment = static_cast<int>(std::floor(z_m / segment_height_m_));
+    const std::int32_t segment = FastFloor(z_m / segment_height_m_);
     return segment >= 0 && segment < kSegments ? segment : -1;
   }
 
  private:
-  std::int64_t first_x_;
-  std::int64_t first_y_;
+  static std::int64_t PlaceAt(double coordinate_m, const MapProfile& profile) {
+    return static_cast<std::int64_t>(std::floor(coordinate_m / profile.tile_size_m()));
+  }
+
+  std::int64_t first_place_x_;
+  std::int64_t first_place_y_;
   std::int64_t first_segment_;
-  std::int32_t side_;
+  std::int32_t places_;
+  int shift_;
   float cell_size_m_;
+  float cells_a_m_;
   float segment_height_m_;
   Eigen::Vector3d origin_;
 };

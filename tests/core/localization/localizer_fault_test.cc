@@ -1,4 +1,5 @@
 // Maps with holes, wrong maps, no maps, and sources of tiles that fail.
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -170,6 +171,53 @@ TEST_F(LocalizerFaultTest, AtTheEdgeOfTheMapHalfOfItIsEnough) {
     EXPECT_NE(result.health, LocalizationHealth::kLost) << i;
     EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.1) << i;
   }
+}
+
+TEST_F(LocalizerFaultTest, ACoarseMapIsEnoughToBeAboutThereAndIsSaidToBeCoarse) {
+  for (const std::uint8_t level : {std::uint8_t{1}, std::uint8_t{2}}) {
+    source_.tiles = StreetMap().TilesOfLevel(level);
+    localizer_.Start(OnStreet(-8.1));
+    double worst_m = 0.0;
+    double sigma_m = 0.0;
+    for (int i = 0; i < 8; ++i) {
+      const Pose truth = OnStreet(-8.0 + 1.0 * i);
+      const LocalizationResult result = At(truth);
+      EXPECT_EQ(result.cover, MapCover::kCoarse) << i;
+      EXPECT_NE(result.health, LocalizationHealth::kGood) << i;
+      worst_m = std::max(worst_m, ErrorOf(result.T_world_sensor, truth).horizontal_m);
+      sigma_m = std::sqrt(result.covariance(0, 0));
+    }
+    EXPECT_LT(worst_m, 0.2 * (1 << level));
+    EXPECT_GT(3.0 * sigma_m, worst_m) << "its covariance says as much";
+  }
+}
+
+TEST_F(LocalizerFaultTest, TilesThatComeLateAreTakenUpAtAStandstill) {
+  const Tiles all = source_.tiles;
+  source_.tiles.clear();
+  localizer_.Start(OnStreet(0.1));
+  EXPECT_EQ(At(OnStreet(0.0)).cover, MapCover::kNone);
+  source_.tiles = StreetMap().TilesOfLevel(2);
+  LocalizationResult result;
+  int scans = 0;
+  do {
+    result = At(OnStreet(0.0));
+  } while (result.cover != MapCover::kCoarse && ++scans < 20);
+  EXPECT_LE(scans, 5);
+  EXPECT_EQ(result.health, LocalizationHealth::kWeak);
+  source_.tiles = all;
+  scans = 0;
+  do {
+    result = At(OnStreet(0.0));
+  } while (result.cover != MapCover::kFine && ++scans < 20);
+  EXPECT_LE(scans, 5);
+  EXPECT_EQ(result.health, LocalizationHealth::kGood);
+  EXPECT_LT(ErrorOf(result.T_world_sensor, OnStreet(0.0)).horizontal_m, 0.06);
+  const int asked = source_.asked;
+  for (int i = 0; i < 12; ++i) {
+    At(OnStreet(0.0));
+  }
+  EXPECT_EQ(source_.asked, asked) << "all is there";
 }
 
 TEST_F(LocalizerFaultTest, TheSourcesErrorIsTheAnswerAndHarmsNothing) {

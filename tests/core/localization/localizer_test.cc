@@ -109,6 +109,34 @@ TEST(LocalizerTest, ACorridorIsWeakAndCarriesTheVehicleOnAtItsSpeed) {
   }
 }
 
+// Posts 2.5 m apart on either side of a road without end: a vehicle whose speed nobody knows may
+// have moved on by one of them.
+TEST(LocalizerTest, AmongPostsThatRepeatItDoesNotSayWhichAreBesideIt) {
+  ShapeWorld world;
+  world.patches = {testing::Patch{}};
+  for (int i = -16; i <= 16; ++i) {
+    for (const double y_m : {-4.05, 4.05}) {
+      world.boxes.push_back(
+          testing::Box{{2.5 * i + 0.05, y_m, -1.0}, {2.5 * i + 0.25, y_m + 0.2, 4.0}});
+    }
+  }
+  PaintedMap map;
+  map.Paint(world, 42.0);
+  LocalizerOptions options = QuickOptions();
+  options.features.max_range_m = 15.0F;
+  Localizer localizer(map.profile(), map.Source(), options);
+  const auto at = [](int i) {
+    return UprightPose({-5.0 + 2.5 * i, 0.3, 1.8}, 0.0);
+  };
+  localizer.Start(at(0));
+  EXPECT_EQ(At(localizer, world, at(0)).health, LocalizationHealth::kGood) << "it was told";
+  const LocalizationResult result = At(localizer, world, at(1));
+  EXPECT_EQ(result.health, LocalizationHealth::kWeak);
+  EXPECT_GT(std::sqrt(result.covariance(0, 0)), 1.0) << "ahead: one post or another";
+  EXPECT_LT(std::sqrt(result.covariance(1, 1)), 0.3);
+  EXPECT_NEAR(result.T_world_sensor.translation().y(), 0.3, 0.05);
+}
+
 // A bare plain to the west, houses to the east: nothing tells the speed until they are in sight.
 TEST(LocalizerTest, AdriftOnAPlainItIsFoundWhereStructureBegins) {
   ShapeWorld world;

@@ -1,12 +1,15 @@
 #include "tests/core/localization/painted_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "core/base/integer_math.h"
 #include "core/geometry/nibble.h"
 #include "core/tile/column_lattice.h"
+#include "core/tile/tile_pyramid.h"
 
 namespace atlas::testing {
 namespace {
@@ -143,6 +146,29 @@ std::vector<std::shared_ptr<const Tile>> PaintedMap::Tiles() const {
   return tiles;
 }
 
+std::vector<std::shared_ptr<const Tile>> PaintedMap::TilesOfLevel(std::uint8_t level) const {
+  if (level == 0) {
+    return Tiles();
+  }
+  const auto below = TilesOfLevel(static_cast<std::uint8_t>(level - 1));
+  std::map<TileId, const Tile*> by_id;
+  std::set<TileId> parents;
+  for (const auto& tile : below) {
+    by_id[tile->id] = tile.get();
+    parents.insert(tile->id.Parent());
+  }
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  for (const TileId& id : parents) {
+    std::array<const Tile*, 4> children{};
+    for (std::size_t i = 0; i < children.size(); ++i) {
+      const auto child = by_id.find(id.Children().at(i));
+      children.at(i) = child == by_id.end() ? nullptr : child->second;
+    }
+    tiles.push_back(std::make_shared<const Tile>(BuildParentTile(id, children, profile_)));
+  }
+  return tiles;
+}
+
 TilesAround PaintedMap::Source() const {
   return [tiles = Tiles()](const Eigen::Vector3d&,
                            double) -> Result<std::vector<std::shared_ptr<const Tile>>> {
@@ -150,13 +176,17 @@ TilesAround PaintedMap::Source() const {
   };
 }
 
+MapWindow Window(const MapProfile& profile,
+                 MapWindow::Tiles tiles,
+                 const Eigen::Vector3d& center,
+                 double radius_m) {
+  MapWindow window(profile, PlaceOptions());
+  window.Renew(tiles, center, radius_m);
+  return window;
+}
+
 MapWindow PaintedMap::Window(const Eigen::Vector3d& center, double radius_m) const {
-  const auto tiles = Tiles();
-  std::vector<const Tile*> views;
-  for (const auto& tile : tiles) {
-    views.push_back(tile.get());
-  }
-  return {profile_, views, center, radius_m, MapWindowOptions()};
+  return testing::Window(profile_, Tiles(), center, radius_m);
 }
 
 TileLayer GroundLayer(double altitude_m) {

@@ -1,6 +1,7 @@
 // Worlds of shapes as level-0 tiles, as fusion publishes them after many drives.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <utility>
@@ -24,6 +25,8 @@ class PaintedMap {
 
   const MapProfile& profile() const { return profile_; }
   std::vector<std::shared_ptr<const Tile>> Tiles() const;
+  // The same a level or more higher.
+  std::vector<std::shared_ptr<const Tile>> TilesOfLevel(std::uint8_t level) const;
   // Gives all tiles, wherever it is asked.
   TilesAround Source() const;
   MapWindow Window(const Eigen::Vector3d& center, double radius_m) const;
@@ -34,6 +37,11 @@ class PaintedMap {
   MapProfile profile_;
   std::map<TileId, std::vector<std::vector<TileLayer>>> cells_;
 };
+
+MapWindow Window(const MapProfile& profile,
+                 MapWindow::Tiles tiles,
+                 const Eigen::Vector3d& center,
+                 double radius_m);
 
 // Free ground that was measured.
 TileLayer GroundLayer(double altitude_m);

@@ -150,9 +150,30 @@ TEST(RegistrationTest, ASlopeHoldsItsOwnDirection) {
   EXPECT_GT(result.information(0, 0), 100.0 * result.information(1, 1));
 }
 
+// What stands far ahead alone holds the heading only together with the place.
+TEST(RegistrationTest, TheWorstSigmaCountsTheHeadingsError) {
+  RegistrationResult result;
+  const auto add_point = [&](const Eigen::Vector2d& p) {
+    Eigen::Matrix<double, 2, 6> J = Eigen::Matrix<double, 2, 6>::Zero();
+    J(0, 0) = J(1, 1) = 1.0;
+    J(0, 5) = -p.y();
+    J(1, 5) = p.x();
+    result.information += 100.0 * J.transpose() * J;
+  };
+  EXPECT_GE(WorstSigma(result), 1e8);
+  add_point({60.0, -3.0});
+  add_point({60.0, 3.0});
+  // Two points 0.1 m off each: 0.1 / sqrt(2) across if the heading were known; its own error, 0.1 /
+  // (3 sqrt(2)) rad, counts 60 m away.
+  EXPECT_NEAR(WorstSigma(result), 60.0 * 0.1 / (3.0 * std::sqrt(2.0)), 0.05);
+  add_point({-60.0, 0.0});
+  add_point({-60.0, 0.0});
+  EXPECT_NEAR(WorstSigma(result), 0.05, 0.001);
+}
+
 TEST(RegistrationTest, WithoutAMapTheStartStays) {
   const Pose truth = UprightPose({0.3, 0.2, 1.8}, 0.5);
-  const MapWindow empty(MapProfile(), {}, truth.translation(), 30.0, {});
+  const MapWindow empty = testing::Window(MapProfile(), {}, truth.translation(), 30.0);
   for (const ScanFeatures& features : {FeaturesAt(testing::Street(), truth), ScanFeatures()}) {
     const RegistrationResult result = Register(empty, features, truth, {});
     EXPECT_TRUE(result.is_converged);
@@ -165,7 +186,7 @@ TEST(RegistrationTest, WithoutAMapTheStartStays) {
 }
 
 TEST(RegistrationTest, WhereNothingHoldsItATiltedStartIsPutUpright) {
-  const MapWindow empty(MapProfile(), {}, Eigen::Vector3d::Zero(), 10.0, {});
+  const MapWindow empty = testing::Window(MapProfile(), {}, Eigen::Vector3d::Zero(), 10.0);
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-0.6, 0.8, 0)}) {
     Pose start = UprightPose({0.0, 0.0, 0.0}, 0.0);
     start.linear() = Eigen::AngleAxisd(2.0 * kDegree, axis).toRotationMatrix();

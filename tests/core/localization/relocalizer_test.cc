@@ -114,6 +114,22 @@ TEST(RelocalizerTest, WhereTwoPlacesLookTheSameItDoesNotKnowUnlessItIsToldWhereA
   }
 }
 
+// Between two walls without anything else the place along them is anybody's guess, even if no other
+// explains more.
+TEST(RelocalizerTest, WhatNothingHoldsItDoesNotKnow) {
+  PaintedMap map;
+  map.Paint(testing::Corridor(), 30.0);
+  RelocalizerOptions options;
+  options.features.max_range_m = 15.0F;
+  options.min_margin = 0.0;
+  const Relocalizer relocalizer(map.profile(), PlacesOf(map), map.Source(), options);
+  const Relocalization found =
+      Find(relocalizer, testing::Corridor(), UprightPose({3.0, 0.2, 1.8}, 0.1));
+  ASSERT_FALSE(found.places.empty());
+  EXPECT_GT(found.places.front().registration.fit, 0.6);
+  EXPECT_FALSE(found.T_world_sensor);
+}
+
 TEST(RelocalizerTest, ElsewhereOrWithNothingToSeeItDoesNotKnow) {
   const Relocalizer street = RelocalizerIn(StreetMap());
   EXPECT_FALSE(

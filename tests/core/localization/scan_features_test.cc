@@ -95,6 +95,18 @@ TEST(ScanFeaturesTest, TheSameScanHasTheSameFeatures) {
   EXPECT_EQ(first.ground, second.ground);
 }
 
+TEST(ScanFeaturesTest, WhatAnExtractorSawBeforeDoesNotMatter) {
+  FeatureExtractor extractor({});
+  for (const unsigned seed : {114U, 115U, 116U}) {
+    const ScanFeatures& again = extractor.Extract(RandomScan(seed));
+    const ScanFeatures fresh = ExtractFeatures(RandomScan(seed), {});
+    EXPECT_EQ(again.columns, fresh.columns);
+    EXPECT_EQ(again.ground, fresh.ground);
+    EXPECT_EQ(again.returns, fresh.returns);
+  }
+  EXPECT_TRUE(extractor.Extract(LeveledScan()).columns.empty());
+}
+
 TEST(ScanFeaturesTest, AnEmptyScanAndOneOutOfRangeHaveNone) {
   LeveledScan scan;
   for (int round = 0; round < 2; ++round) {

@@ -22,11 +22,14 @@ boost::json::object ScanJson(const LocalizedScan& scan) {
   for (const double number : PoseToRowMajor(scan.located.T_world_sensor)) {
     pose.emplace_back(number);
   }
+  boost::json::value cover;
+  if (scan.located.cover) cover = MapCoverName(*scan.located.cover);
   return {{"type", "scan"},
           {"scan", scan.scan},
           {"trial", scan.trial},
           {"pose", std::move(pose)},
           {"health", LocalizationHealthName(scan.located.health)},
+          {"map", std::move(cover)},
           {"error_m", Rounded(scan.error.translation_m, 5)},
           {"error_deg", Rounded(scan.error.rotation_deg, 5)}};
 }

@@ -60,10 +60,10 @@ TEST(MapWindowTest, AWallsNormalPointsAcrossItInAnyDirection) {
     const Eigen::Vector2f normal(static_cast<float>(-std::sin(angle)),
                                  static_cast<float>(std::cos(angle)));
     for (const double aside : {-0.2, 0.0, 0.2}) {
-      const ColumnLine* line = window.NearestLine(
+      const std::optional<ColumnLine> line = window.NearestLine(
           InWindow(window, 0.05 - aside * std::sin(angle), 0.05 + aside * std::cos(angle), 0.5),
           0.5F);
-      ASSERT_NE(line, nullptr);
+      ASSERT_TRUE(line);
       EXPECT_TRUE(line->is_wall);
       EXPECT_GT(std::abs(line->normal.dot(normal)), 0.99F) << direction;
       const Eigen::Vector2f offset = line->center - InWindow(window, 0.05, 0.05, 0.5).head<2>();
@@ -81,12 +81,13 @@ TEST(MapWindowTest, EachSegmentOfACellHasItsOwnLine) {
     }
   }
   const MapWindow window = map.Window(kOrigin, 5.0);
-  const ColumnLine* low = window.NearestLine(InWindow(window, 0.05, 0.05, 0.5), 0.5F);
-  const ColumnLine* high = window.NearestLine(InWindow(window, 0.05, 0.05, 3.5), 0.5F);
-  ASSERT_TRUE(low != nullptr && high != nullptr);
+  const std::optional<ColumnLine> low = window.NearestLine(InWindow(window, 0.05, 0.05, 0.5), 0.5F);
+  const std::optional<ColumnLine> high =
+      window.NearestLine(InWindow(window, 0.05, 0.05, 3.5), 0.5F);
+  ASSERT_TRUE(low && high);
   EXPECT_GT(std::abs(low->normal.y()), 0.999F);
   EXPECT_GT(std::abs(high->normal.x()), 0.999F);
-  EXPECT_EQ(window.NearestLine(InWindow(window, 0.05, 0.05, 1.5), 0.5F), nullptr);
+  EXPECT_FALSE(window.NearestLine(InWindow(window, 0.05, 0.05, 1.5), 0.5F));
 }
 
 TEST(MapWindowTest, APostIsNoWallAndStandsInItsCell) {
@@ -96,8 +97,9 @@ TEST(MapWindowTest, APostIsNoWallAndStandsInItsCell) {
       map.Put(20 + i % side, 30 + i / side, ColumnLayer(0.0, 0b0001));
     }
     const MapWindow window = map.Window(kOrigin, 10.0);
-    const ColumnLine* line = window.NearestLine(InWindow(window, 2.0, 3.0, 0.5), 0.5F);
-    ASSERT_NE(line, nullptr);
+    const std::optional<ColumnLine> line =
+        window.NearestLine(InWindow(window, 2.0, 3.0, 0.5), 0.5F);
+    ASSERT_TRUE(line);
     EXPECT_FALSE(line->is_wall) << side;
     EXPECT_LT((line->center - InWindow(window, 2.05, 3.05, 0.5).head<2>()).norm(), 1e-4F);
   }
@@ -134,9 +136,10 @@ TEST(MapWindowTest, TheNearestLineIsTheNearest) {
         nearest_m = std::min(nearest_m, (segment - p).head<2>().norm());
       }
     }
-    const ColumnLine* line = window.NearestLine(InWindow(window, p.x(), p.y(), p.z()), 1.2F);
-    ASSERT_EQ(line != nullptr, nearest_m < 1.2) << p.transpose();
-    if (line != nullptr && !line->is_wall) {
+    const std::optional<ColumnLine> line =
+        window.NearestLine(InWindow(window, p.x(), p.y(), p.z()), 1.2F);
+    ASSERT_EQ(line.has_value(), nearest_m < 1.2) << p.transpose();
+    if (line && !line->is_wall) {
       ++found;
       EXPECT_NEAR((line->center - InWindow(window, p.x(), p.y(), p.z()).head<2>()).norm(),
                   nearest_m, 1e-4);
@@ -270,8 +273,9 @@ TEST(MapWindowTest, AFaceIsSeenFromItsFreeSideAlone) {
   for (const auto& [south, north] : {std::pair(true, true), std::pair(true, false),
                                      std::pair(false, true), std::pair(false, false)}) {
     const MapWindow window = WallWithFreeSides(south, north).Window(kOrigin, 10.0);
-    const ColumnLine* line = window.NearestLine(InWindow(window, 0.05, 0.05, 0.5), 0.3F);
-    ASSERT_NE(line, nullptr);
+    const std::optional<ColumnLine> line =
+        window.NearestLine(InWindow(window, 0.05, 0.05, 0.5), 0.3F);
+    ASSERT_TRUE(line);
     EXPECT_TRUE(line->is_wall);
     EXPECT_EQ(line->is_one_sided, south != north);
     const auto is_seen_from = [&](double y) {

@@ -26,7 +26,7 @@ TEST(MapWindowTilesTest, PlacesOutsideTheWindowHaveNothing) {
   for (const Eigen::Vector3d& p :
        {Eigen::Vector3d(500, 0, 0.5), Eigen::Vector3d(0, -500, 0.5), Eigen::Vector3d(0, 0, 500),
         Eigen::Vector3d(0, 0, -500), Eigen::Vector3d(-5.2, 5.2, 0.5)}) {
-    EXPECT_EQ(window.NearestLine(InWindow(window, p.x(), p.y(), p.z()), 1.0F), nullptr);
+    EXPECT_FALSE(window.NearestLine(InWindow(window, p.x(), p.y(), p.z()), 1.0F));
     EXPECT_FALSE(window.IsOccupied(InWindow(window, p.x(), p.y(), p.z())));
     EXPECT_FALSE(window.NearestSurface(InWindow(window, p.x(), p.y(), p.z()), 1.0F));
   }
@@ -37,18 +37,14 @@ TEST(MapWindowTilesTest, TilesMayComeInAnyOrderAndMeetWithoutASeam) {
   map.Paint({{testing::Patch{}}, {testing::Box{{-7.95, 0.05, -1.0}, {7.95, 0.45, 3.0}}}}, 9.0);
   std::vector<std::shared_ptr<const Tile>> tiles = map.Tiles();
   ASSERT_GT(tiles.size(), 4U);
-  std::vector<const Tile*> views;
-  for (const auto& tile : tiles) {
-    views.push_back(tile.get());
-  }
-  const MapWindow first(map.profile(), views, kOrigin, 9.0, {});
-  std::reverse(views.begin(), views.end());
-  const MapWindow second(map.profile(), views, kOrigin, 9.0, {});
+  const MapWindow first = testing::Window(map.profile(), tiles, kOrigin, 9.0);
+  std::reverse(tiles.begin(), tiles.end());
+  const MapWindow second = testing::Window(map.profile(), tiles, kOrigin, 9.0);
   for (const double x : testing::Steps(-6.05, 6.0, 0.1)) {  // seams at 0 and at +-6.4 m
     const Eigen::Vector3f p = InWindow(first, x, -0.2, 0.5);
-    const ColumnLine* a = first.NearestLine(p, 0.6F);
-    const ColumnLine* b = second.NearestLine(p, 0.6F);
-    ASSERT_TRUE(a != nullptr && b != nullptr);
+    const std::optional<ColumnLine> a = first.NearestLine(p, 0.6F);
+    const std::optional<ColumnLine> b = second.NearestLine(p, 0.6F);
+    ASSERT_TRUE(a && b);
     EXPECT_EQ(a->center, b->center);
     EXPECT_EQ(a->normal, b->normal);
     EXPECT_GT(std::abs(a->normal.y()), 0.99F) << x;
@@ -63,8 +59,8 @@ TEST(MapWindowTilesTest, TilesElsewhereAreIgnoredHoweverFar) {
        {3, -3, 1 << 20, -(1 << 20), 1 << 26, TileId::kMaxCoordinate, TileId::kMinCoordinate}) {
     Tile far = near;
     far.id.x = x;
-    const std::vector<const Tile*> views{&far};
-    const MapWindow window(map.profile(), views, kOrigin, 10.0, {});
+    const std::vector tiles{std::make_shared<const Tile>(far)};
+    const MapWindow window = testing::Window(map.profile(), tiles, kOrigin, 10.0);
     EXPECT_EQ(window.lines() + window.surfaces(), 0U) << x;
   }
 }
@@ -80,19 +76,20 @@ TEST(MapWindowTilesTest, FarFromTheWorldsOriginNothingIsLost) {
   const MapWindow a = near.Window({2.0, 0.5, 1.0}, 6.0);
   const MapWindow b = far.Window({9e6 + 2.0, 0.5 - 9e6, 1.0}, 6.0);
   ASSERT_EQ(a.lines(), b.lines());
-  const ColumnLine* near_line = a.NearestLine(InWindow(a, 2.03, 0.35, 0.5), 0.6F);
-  const ColumnLine* far_line = b.NearestLine(InWindow(b, 9e6 + 2.03, 0.35 - 9e6, 0.5), 0.6F);
-  ASSERT_TRUE(near_line != nullptr && far_line != nullptr);
+  const std::optional<ColumnLine> near_line = a.NearestLine(InWindow(a, 2.03, 0.35, 0.5), 0.6F);
+  const std::optional<ColumnLine> far_line =
+      b.NearestLine(InWindow(b, 9e6 + 2.03, 0.35 - 9e6, 0.5), 0.6F);
+  ASSERT_TRUE(near_line && far_line);
   const Eigen::Vector2d near_world = a.origin().head<2>() + near_line->center.cast<double>();
   const Eigen::Vector2d far_world = b.origin().head<2>() + far_line->center.cast<double>();
   EXPECT_LT((far_world - near_world - Eigen::Vector2d(9e6, -9e6)).norm(), 1e-3);
 }
 
 TEST(MapWindowTilesTest, NoTilesMakeAnEmptyWindow) {
-  const MapWindow window(MapProfile(), {}, kOrigin, 20.0, {});
+  const MapWindow window = testing::Window(MapProfile(), {}, kOrigin, 20.0);
   EXPECT_EQ(window.lines(), 0U);
   EXPECT_EQ(window.surfaces(), 0U);
-  EXPECT_EQ(window.NearestLine(InWindow(window, 0, 0, 0.5), 1.0F), nullptr);
+  EXPECT_FALSE(window.NearestLine(InWindow(window, 0, 0, 0.5), 1.0F));
 }
 
 }  // namespace

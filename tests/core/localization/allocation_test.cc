@@ -1,0 +1,80 @@
+// In steady state a localizer allocates nothing: a program of its own, since it counts every new.
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include <gtest/gtest.h>
+
+#include "core/localization/localizer.h"
+#include "tests/core/localization/painted_map.h"
+
+namespace {
+
+std::atomic<std::size_t> allocations{0};
+
+// Both out of line: inlined, a compiler takes them for a mismatched pair.
+[[gnu::noinline]] void* Allocate(std::size_t size, std::size_t alignment) {
+  ++allocations;
+  const std::size_t whole = (size + alignment - 1) / alignment * alignment;
+  void* memory = std::aligned_alloc(alignment, whole == 0 ? alignment : whole);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+[[gnu::noinline]] void Release(void* memory) {
+  std::free(memory);
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return Allocate(size, alignof(std::max_align_t));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return Allocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept {
+  Release(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  Release(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  Release(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  Release(memory);
+}
+
+namespace atlas {
+namespace {
+
+using testing::UprightPose;
+
+TEST(AllocationTest, ALocalizerThatHasItsMapAllocatesNothing) {
+  std::vector<Pose> truths;
+  std::vector<LeveledScan> scans;
+  for (int i = 0; i < 24; ++i) {
+    truths.push_back(UprightPose({-4.0 + 0.2 * i, 0.1, 1.8 + 0.01 * (-4.0 + 0.2 * i)}, 0.0));
+    scans.push_back(
+        testing::CastLeveledScan(testing::QuickSensor(), testing::Street(), truths.back()));
+  }
+  const std::size_t before_all = allocations;
+  Localizer localizer(testing::StreetMap().profile(), testing::StreetMap().Source(),
+                      testing::QuickOptions());
+  localizer.Start(truths.front());
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const std::size_t before = allocations;
+    const auto result = localizer.Localize(scans[i], Eigen::Quaterniond::Identity());
+    const std::size_t during = allocations - before;
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->health, LocalizationHealth::kGood) << i;
+    EXPECT_LT(testing::ErrorOf(result->T_world_sensor, truths[i]).horizontal_m, 0.06) << i;
+    if (i >= 6) {  // its buffers have grown
+      EXPECT_EQ(during, 0U) << i;
+    }
+  }
+  EXPECT_GT(allocations - before_all, 100U) << "they are counted";
+}
+
+}  // namespace
+}  // namespace atlas
