@@ -60,6 +60,7 @@ Localizer::Localizer(const MapProfile& profile,
                      const LocalizerOptions& options,
                      RelocalizerSource relocalizer)
     : options_(options),
+      cell_size_m_(profile.cell_size_m()),
       features_(options.features),
       map_(profile, std::move(tiles), options.map),
       motion_(options.motion),
@@ -121,7 +122,7 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
       (tracked.rival || cover.map != MapCover::kFine)) {
     result.health = LocalizationHealth::kWeak;
   }
-  Remember(result, cover.detail * Seen(result.registration, tracked.rival), is_found);
+  Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
   result.covariance = motion_.covariance();
   return result;
 }
@@ -143,24 +144,31 @@ Localizer::Cover Localizer::CoverAt(const ScanFeatures& features, const Pose& T_
   int looked_at = 0;
   int mapped = 0;
   int fine = 0;
-  double detail = 0.0;
+  double cells_m = 0.0;
   for (std::size_t i = 0; i < features.ground.size(); i += kStride) {
     const std::optional<int> level = map_.window().LevelAt(R * features.ground[i] + t);
     ++looked_at;
     mapped += level ? 1 : 0;
     fine += level == 0 ? 1 : 0;
-    detail += level ? std::pow(0.25, *level) : 0.0;
+    cells_m += level ? cell_size_m_ * (1 << *level) : 0.0;
   }
   if (mapped == 0 || mapped < kMapped * looked_at) {
-    return {MapCover::kNone, 1.0};
+    return {MapCover::kNone, cell_size_m_};
   }
-  return {2 * fine >= mapped ? MapCover::kFine : MapCover::kCoarse, detail / mapped};
+  return {2 * fine >= mapped ? MapCover::kFine : MapCover::kCoarse, cells_m / mapped};
 }
 
 // What the scan says about (x, y, z, yaw); between two places it does not know which.
 Eigen::Matrix4d Localizer::Seen(const RegistrationResult& registration,
+                                const Cover& cover,
                                 const std::optional<Eigen::Vector2d>& rival) const {
   Eigen::Matrix4d seen = options_.information_share * PoseInformation(registration.information);
+  const double cells =
+      cover.map == MapCover::kCoarse ? options_.coarse_sigma_cells : options_.map_sigma_cells;
+  const double place_m = std::hypot(options_.map_sigma_m, cells * cover.cell_m);
+  const Eigen::Vector4d map_sigmas(place_m, place_m, options_.map_sigma_m, options_.map_sigma_rad);
+  const Eigen::Matrix4d map = map_sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+  seen -= (seen * (seen + map).inverse() * seen).eval();  // of the sum of both covariances
   if (rival) {
     Eigen::Vector4d towards = Eigen::Vector4d::Zero();
     towards.head<2>() = rival->normalized();

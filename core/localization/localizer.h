@@ -50,8 +50,14 @@ struct LocalizerOptions {
   int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did
 
   // Neighbouring features err together: a scan informs as this share of its features would, and a
-  // feature counts as much in a log likelihood.
-  double information_share = 0.04;
+  // feature counts as much in a log likelihood. However many there are, no place is known better
+  // than the map is: standard deviations, of a place also as a share of a cell. Fitted to the
+  // errors of single shots with 16 and 64 rings and along a simulated drive.
+  double information_share = 0.15;
+  double map_sigma_m = 0.01;
+  double map_sigma_cells = 0.04;
+  double coarse_sigma_cells = 0.4;  // a coarse cell stands where any of its fine ones does
+  double map_sigma_rad = 0.0006;
   double evidence_share = 0.2;
 
   // Where the place is less certain than this, starts are tried along the least certain direction,
@@ -156,15 +162,17 @@ class Localizer {
   LocalizationHealth Judge(const RegistrationResult& result) const;
   struct Cover {
     MapCover map = MapCover::kNone;
-    double detail = 1.0;  // cells that are twice as large say a quarter as much
+    double cell_m = 0.0;  // of what was mapped, on average
   };
   void NoteCover(MapCover cover);
   Cover CoverAt(const ScanFeatures& features, const Pose& T_world_level) const;
   Eigen::Matrix4d Seen(const RegistrationResult& registration,
+                       const Cover& cover,
                        const std::optional<Eigen::Vector2d>& rival) const;
   void Remember(const LocalizationResult& result, const Eigen::Matrix4d& seen, bool is_found);
 
   LocalizerOptions options_;
+  double cell_size_m_;
   FeatureExtractor features_;
   LocalMap map_;
   MotionModel motion_;
