@@ -18,7 +18,6 @@ namespace {
 constexpr double kMerged_m = 0.5;
 // An obstacle this near in height stands on the same surface.
 constexpr std::int32_t kSameObstacle_mm = 300;
-constexpr std::size_t kMaxCosts = 255;
 
 }  // namespace
 
@@ -27,7 +26,7 @@ CoarseMap::CoarseMap(TileSource& source,
                      const PlanOptions& options,
                      PlanBudget& budget,
                      std::uint8_t level)
-    : tiles_(source, profile, options, budget, level) {
+    : tiles_(source, profile, options, budget, level), options_(options) {
   const double cell_m = tiles_.cell_m();
   max_cells_ = static_cast<std::int32_t>(
       std::ceil((options.max_gap_m + profile.cell_size_m()) / cell_m - 1e-9));
@@ -35,11 +34,26 @@ CoarseMap::CoarseMap(TileSource& source,
       std::tan(options.max_slope_deg * std::numbers::pi / 180.0) * std::numbers::sqrt2 * cell_m;
   const double step_m = std::min(options.max_step_m + climb_m + kMerged_m, 1e-3 * kSameSurface_mm);
   max_step_mm_ = static_cast<std::int32_t>(std::lround(step_m * 1e3));
-  FillOffsets(profile, options);
+  FillCosts();
+  FillOffsets(profile);
 }
 
-void CoarseMap::FillOffsets(const MapProfile& profile, const PlanOptions& options) {
-  const double reach_m = options.clearance_reach_m();
+void CoarseMap::FillCosts() {
+  for (std::size_t i = 0; i < costs_.size(); ++i) {
+    const double crowding = 1.0 - static_cast<double>(i) / kFarCost;
+    costs_[i] = static_cast<float>(1.0 + options_.comfort_weight * crowding);
+  }
+}
+
+std::uint8_t CoarseMap::CostAt(double clearance_m) const {
+  const double spare_m = clearance_m - options_.inflation_m();
+  const double ease =
+      options_.comfort_m > 0.0 ? std::clamp(spare_m / options_.comfort_m, 0.0, 1.0) : 1.0;
+  return static_cast<std::uint8_t>(std::ceil(kFarCost * ease));
+}
+
+void CoarseMap::FillOffsets(const MapProfile& profile) {
+  const double reach_m = options_.clearance_reach_m();
   const auto farthest_m = [&](std::int32_t cells) {
     return (std::abs(cells) + 1) * tiles_.cell_m() - profile.cell_size_m();
   };
@@ -48,23 +62,13 @@ void CoarseMap::FillOffsets(const MapProfile& profile, const PlanOptions& option
     for (std::int32_t dx = -cells; dx <= cells; ++dx) {
       const double distance_m = std::hypot(farthest_m(dx), farthest_m(dy));
       if (distance_m < reach_m) {
-        offsets_.push_back({dx, dy, distance_m, distance_m <= options.inflation_m(), 0});
+        offsets_.push_back(
+            {dx, dy, distance_m, distance_m <= options_.inflation_m(), CostAt(distance_m)});
       }
     }
   }
   std::stable_sort(offsets_.begin(), offsets_.end(),
                    [](const Offset& a, const Offset& b) { return a.farthest_m < b.farthest_m; });
-  for (Offset& offset : offsets_) {
-    const double spare_m = offset.farthest_m - options.inflation_m();
-    const double crowding =
-        options.comfort_m > 0.0 ? std::clamp(1.0 - spare_m / options.comfort_m, 0.0, 1.0) : 0.0;
-    const auto cost = static_cast<float>(1.0 + options.comfort_weight * crowding);
-    if (costs_.empty() || (cost != costs_.back() && costs_.size() < kMaxCosts)) {
-      costs_.push_back(std::min(cost, costs_.empty() ? cost : costs_.back()));
-    }
-    offset.cost = static_cast<std::uint8_t>(costs_.size() - 1);
-  }
-  costs_.push_back(1.0F);
 }
 
 bool CoarseMap::IsObstacle(const SurfaceTile& home,
@@ -91,11 +95,13 @@ Status CoarseMap::Analyse(const NodeRef& ref) {
   node.flags |= SurfaceNode::kAnalysed;
   Judge(tiles_.tile(ref.slot), node);
   if (finest_ != nullptr && node.Has(SurfaceNode::kDrivable)) {
-    const auto is_drivable = IsDrivableBelow(ref);
-    if (!is_drivable) {
-      return is_drivable.error();
+    const auto farthest_m = FarthestBelow(ref);
+    if (!farthest_m) {
+      return farthest_m.error();
     }
-    if (!*is_drivable) {
+    if (*farthest_m) {
+      node.clearance = std::min(node.clearance, CostAt(**farthest_m));
+    } else {
       node.flags &= static_cast<std::uint8_t>(~SurfaceNode::kDrivable);
     }
   }
@@ -103,7 +109,7 @@ Status CoarseMap::Analyse(const NodeRef& ref) {
 }
 
 // From the middle of the cell on, where it is most likely.
-Result<bool> CoarseMap::IsDrivableBelow(const NodeRef& ref) {
+Result<std::optional<double>> CoarseMap::FarthestBelow(const NodeRef& ref) {
   SurfaceTiles& finest = finest_->tiles();
   const int shift = tiles_.level();
   const TileId& id = tiles_.tile(ref.slot).id;
@@ -117,14 +123,14 @@ Result<bool> CoarseMap::IsDrivableBelow(const NodeRef& ref) {
     return Error(slot.error());
   }
   if (*slot == SurfaceTile::kNotThere) {
-    return false;
+    return std::nullopt;
   }
   const auto home = static_cast<std::uint32_t>(*slot);
   const std::int32_t half = cells / 2;
   for (std::int32_t i = 0; i < cells * cells; ++i) {
-    const std::int32_t cx = x % side + (i + half) % cells;
-    const std::int32_t cy = y % side + (i / cells + half) % cells;
-    const auto cell = static_cast<std::uint32_t>(cy * side + cx);
+    const std::int32_t dx = (i + half) % cells;
+    const std::int32_t dy = (i / cells + half) % cells;
+    const auto cell = static_cast<std::uint32_t>((y % side + dy) * side + x % side + dx);
     const SurfaceTile& tile = finest.tile(home);
     for (std::uint32_t n = tile.cell_begin[cell]; n < tile.cell_begin[cell + 1]; ++n) {
       if (std::abs(std::int64_t{tile.nodes[n].altitude_mm} - node.altitude_mm) >= kSameSurface_mm) {
@@ -134,15 +140,19 @@ Result<bool> CoarseMap::IsDrivableBelow(const NodeRef& ref) {
         return Error(std::move(status));
       }
       if (tile.nodes[n].Has(SurfaceNode::kDrivable)) {
-        return true;
+        const auto across = [cells](std::int32_t at) {
+          return std::max(at, cells - 1 - at);
+        };
+        return finest_->ClearanceMetres({home, n}) +
+               finest.cell_m() * std::hypot(across(dx), across(dy));
       }
     }
   }
-  return false;
+  return std::nullopt;
 }
 
 void CoarseMap::Judge(const SurfaceTile& home, SurfaceNode& node) const {
-  node.clearance = static_cast<std::uint8_t>(costs_.size() - 1);
+  node.clearance = kFarCost;
   if (!node.Has(SurfaceNode::kOpen)) {
     return;
   }

@@ -3,7 +3,9 @@
 // level, but for what a cell rounds (docs/algorithms/planning.md).
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/base/status.h"
@@ -45,28 +47,36 @@ class CoarseMap {
   Result<NodeRef> Above(const SurfaceTiles& finer, const NodeRef& ref);
 
  private:
+  static constexpr std::uint8_t kFarCost = 255;
+
   // A cell beside another: an obstacle in it is no farther from whatever lies in the other than
-  // this, in the index of costs_.
+  // this.
   struct Offset {
     std::int32_t dx = 0;
     std::int32_t dy = 0;
     double farthest_m = 0.0;
     bool closes = false;
-    std::uint8_t cost = 0;
+    std::uint8_t cost = 0;  // in costs_
   };
 
-  void FillOffsets(const MapProfile& profile, const PlanOptions& options);
+  void FillCosts();
+  // In costs_, what a metre costs at least where no obstacle is farther than this.
+  std::uint8_t CostAt(double clearance_m) const;
+  void FillOffsets(const MapProfile& profile);
   void Judge(const SurfaceTile& home, SurfaceNode& node) const;
   bool IsObstacle(const SurfaceTile& home, const SurfaceNode& node, const Offset& offset) const;
 
-  Result<bool> IsDrivableBelow(const NodeRef& ref);
+  // Where a node of the finest level can be driven on, and how far from an obstacle whatever lies
+  // in the node's cell may be; none where there is none.
+  Result<std::optional<double>> FarthestBelow(const NodeRef& ref);
 
   SurfaceTiles tiles_;
   SurfaceMap* finest_ = nullptr;
   std::int32_t max_cells_;
   std::int32_t max_step_mm_;
-  std::vector<Offset> offsets_;  // nearest first
-  std::vector<float> costs_;     // the last one: no obstacle near
+  PlanOptions options_;
+  std::vector<Offset> offsets_;            // nearest first
+  std::array<float, kFarCost + 1> costs_;  // of a metre: falling, the last one without obstacles
 };
 
 }  // namespace atlas

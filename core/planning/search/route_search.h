@@ -26,12 +26,9 @@ class RouteSearch {
               SurfaceMap& map)
       : source_(source), profile_(profile), options_(options), budget_(budget), map_(map) {}
 
-  // A way from `start` to `goal`, both included, at most kLoss dearer than the cheapest one, as
-  // far as the corridor's lower bound holds; empty when there is none. Errors as of PlanBudget and
-  // of the tile source.
+  // A way from `start` to `goal`, both included, hardly dearer than the cheapest one
+  // (docs/results.md); empty when there is none. Errors as of PlanBudget and of the tile source.
   Result<std::vector<NodeRef>> Run(const NodeRef& start, const NodeRef& goal);
-
-  static constexpr double kLoss = 0.02;
 
  private:
   Result<std::vector<NodeRef>> Guided(Corridor& corridor,
