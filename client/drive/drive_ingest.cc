@@ -75,6 +75,24 @@ class Ingest {
     return Plan();
   }
 
+  // Whoever wants a session staged wants nothing of it in the map.
+  Status CheckStaged(AtlasClient& client) const {
+    if (!options_.is_staged) return {};
+    const auto sessions = client.ListSessions(options_.session.vehicle);
+    if (!sessions) return sessions.error();
+    for (const SessionSummary& session : *sessions) {
+      const bool is_ours = std::any_of(
+          planned_.begin(), planned_.end(),
+          [&](const PlannedKeyframe& keyframe) { return keyframe.key.session == session.key; });
+      if (is_ours && session.state != "staged" && session.state != "retracted") {
+        return {StatusCode::kConflict,
+                StrCat("session ", session.key, " is there already, and ", session.state,
+                       ": what it gets now would not be staged; --session gives it another name")};
+      }
+    }
+    return {};
+  }
+
   Status Run(AtlasLink& link, const LastingUpload::Progress& progress) {
     const auto send = [this](std::size_t i, KeyframeUploader& uploader) {
       return UploadOne(i, uploader);
@@ -150,6 +168,7 @@ class Ingest {
     upload.time_ms = planned_[i].time_ms;
     upload.T_world_sensor = QuantizedPose::FromPose(drive_.scans[index].T_world_sensor);
     upload.blob = blob;
+    upload.is_staged = options_.is_staged;
     return uploader.Upload(upload);
   }
 
@@ -204,6 +223,7 @@ Result<IngestReport> IngestDrive(const DriveFolder& drive,
   if (Status status = ingest.Prepare((*client)->profile()); !status.ok()) {
     return Error(std::move(status));
   }
+  if (Status status = ingest.CheckStaged(**client); !status.ok()) return Error(std::move(status));
   if (Status status = ingest.Run(link, progress); !status.ok()) return Error(std::move(status));
   return ingest.report();
 }

@@ -24,6 +24,7 @@ struct IngestOptions {
   double max_range_m = 20.0;
   std::optional<double> sensor_height_m;
   bool is_deskewed = false;
+  bool is_staged = false;  // its sessions stay out of the map until somebody publishes them
   double start_s = 0.0;  // added to the scans' times
   double now_s = 0.0;    // since 1970: later scans than a minute from now are refused
   std::optional<std::uint64_t> shuffle_seed;
@@ -49,8 +50,8 @@ struct IngestReport {
 // named and nothing is uploaded. A daemon that is busy is waited for, a connection that breaks is
 // made again, both for as long as the patience; what an interrupted run left with the daemon is not
 // made and sent again (lasting_upload.h). Fails at once where the daemon cannot be reached at all,
-// and at the first keyframe that it refuses otherwise, naming it; what was acknowledged until then
-// stays.
+// or where a session that is to be staged is there and not staged (kConflict), and at the first
+// keyframe that it refuses otherwise, naming it; what was acknowledged until then stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
                                  AtlasLink& link,

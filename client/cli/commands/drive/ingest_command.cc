@@ -93,6 +93,8 @@ class IngestCommand : public Command {
     arguments.Optional("--sensor-height", "M", options_.sensor_height_m,
                        "Above the ground [estimated]");
     arguments.Choice("--deskew", {"on", "off"}, deskew_, "Undo the vehicle's motion during a scan");
+    arguments.Flag("--staged", options_.is_staged,
+                   "Keep it out of the map until `atlas session publish`");
     arguments.Optional("--start", "T", options_.start_s,
                        "Seconds added to the scans' times [0]: who drives later has the last word");
   }
