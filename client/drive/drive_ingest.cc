@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <span>
 
@@ -62,17 +63,34 @@ class Ingest {
     ATLAS_RETURN_IF_ERROR(options_.Validate());
     ATLAS_RETURN_IF_ERROR(Select());
     ATLAS_RETURN_IF_ERROR(CheckScans());
-    const Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
+    Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
     if (!survey) return survey.error();
+    survey_ = *std::move(survey);
     KeyframeBuilderOptions builder_options;
     builder_options.max_range_m = options_.max_range_m;
-    builder_options.mount = survey->mount;
-    builder_options.ring_step = survey->ring_step;
+    builder_options.mount = survey_.mount;
+    builder_options.ring_step = survey_.ring_step;
     ATLAS_RETURN_IF_ERROR(builder_options.Validate(profile));
-    builder_.emplace(profile, survey->layout, builder_options);
-    report_.mount = survey->mount;
+    builder_.emplace(profile, survey_.layout, builder_options);
+    report_.mount = survey_.mount;
+    NoteSessions();
     if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
     return Plan();
+  }
+
+  // Keyframes stay what they are: only where they go is another matter.
+  Status Anchor(AtlasClient& client) {
+    if (!options_.anchor) return {};
+    auto anchors =
+        AnchorSessions({drive_, survey_, options_.start_s}, sessions_, *options_.anchor, client);
+    if (!anchors) return anchors.error();
+    report_.anchors = *std::move(anchors);
+    for (const SessionAnchor& anchor : report_.anchors) {
+      Frame& frame = frames_[anchor.key];
+      frame.is_staged = !anchor.is_anchored();
+      if (anchor.is_anchored()) frame.T_map_drive = anchor.part.T_map_drive->ToPose();
+    }
+    return {};
   }
 
   // Whoever wants a session staged wants nothing of it in the map.
@@ -110,8 +128,11 @@ class Ingest {
     selected_ = SelectScans(drive_, options_.selection);
     report_.keyframes = selected_.size();
     report_.metres = SelectedMetres(drive_, selected_);
-    JoinImpossibleParts(drive_, selected_);
-    report_.impossible_steps = FindImpossibleSteps(drive_, selected_);
+    // Parts that are anchored each for itself may lie anywhere in the drive's own frame.
+    if (!options_.anchor) {
+      JoinImpossibleParts(drive_, selected_);
+      report_.impossible_steps = FindImpossibleSteps(drive_, selected_);
+    }
     std::set<std::uint32_t> parts;
     for (const SelectedScan& scan : selected_) {
       parts.insert(scan.session_part);
@@ -119,6 +140,18 @@ class Ingest {
     }
     report_.sessions = parts.size();
     return {};
+  }
+
+  void NoteSessions() {
+    for (const SelectedScan& selected : selected_) {
+      const SessionKey key = KeyOf(selected).session;
+      const auto known = std::find_if(sessions_.begin(), sessions_.end(),
+                                      [&key](const SessionScans& s) { return s.key == key; });
+      SessionScans& session = known == sessions_.end()
+                                  ? sessions_.emplace_back(SessionScans{key, sessions_.empty(), {}})
+                                  : *known;
+      session.scans.push_back(&drive_.scans[selected.index]);
+    }
   }
 
   Status Plan() {
@@ -166,9 +199,13 @@ class Ingest {
     KeyframeUpload upload;
     upload.key = planned_[i].key;
     upload.time_ms = planned_[i].time_ms;
-    upload.T_world_sensor = QuantizedPose::FromPose(drive_.scans[index].T_world_sensor);
     upload.blob = blob;
-    upload.is_staged = options_.is_staged;
+    const auto frame = frames_.find(upload.key.session);
+    const bool is_of_map = frame == frames_.end();
+    const Pose& T_drive_sensor = drive_.scans[index].T_world_sensor;
+    upload.T_world_sensor = QuantizedPose::FromPose(
+        is_of_map ? T_drive_sensor : frame->second.T_map_drive * T_drive_sensor);
+    upload.is_staged = options_.is_staged || (!is_of_map && frame->second.is_staged);
     return uploader.Upload(upload);
   }
 
@@ -192,7 +229,16 @@ class Ingest {
   const DriveFolder& drive_;
   const IngestOptions& options_;
   std::vector<Pose> poses_;  // of all scans
+  // Where the scans of an anchored session go.
+  struct Frame {
+    Pose T_map_drive = Pose::Identity();
+    bool is_staged = false;
+  };
+
+  DriveSurvey survey_;
   std::optional<KeyframeBuilder> builder_;
+  std::vector<SessionScans> sessions_;
+  std::map<SessionKey, Frame> frames_;  // of anchored ones; others are in the map's frame
   std::vector<SelectedScan> selected_;
   std::vector<PlannedKeyframe> planned_;  // of the selected ones
   IngestReport report_;
@@ -203,6 +249,7 @@ class Ingest {
 Status IngestOptions::Validate() const {
   ATLAS_RETURN_IF_ERROR(session.Validate());
   ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  if (anchor) ATLAS_RETURN_IF_ERROR(anchor->Validate());
   if (!(selection.every_m >= 0.0)) {
     return {StatusCode::kInvalidArgument,
             StrCat("every ", selection.every_m, " m: expected 0 or more")};
@@ -224,6 +271,7 @@ Result<IngestReport> IngestDrive(const DriveFolder& drive,
     return Error(std::move(status));
   }
   if (Status status = ingest.CheckStaged(**client); !status.ok()) return Error(std::move(status));
+  if (Status status = ingest.Anchor(**client); !status.ok()) return Error(std::move(status));
   if (Status status = ingest.Run(link, progress); !status.ok()) return Error(std::move(status));
   return ingest.report();
 }
