@@ -8,6 +8,7 @@
 
 #include "client/drive/drive_survey.h"
 #include "client/drive/impossible_steps.h"
+#include "client/drive/scan_motion.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
@@ -20,22 +21,6 @@ namespace atlas {
 namespace {
 
 constexpr double kMaxAhead_s = 60.0;  // what the daemon accepts
-
-// From one scan to the next, as the sensor moves; still when it has no neighbour before a jump.
-Pose MotionAt(const DriveFolder& drive, std::size_t index) {
-  const auto motion = [&drive](std::size_t from, std::size_t to) -> std::optional<Pose> {
-    const DriveScan& a = drive.scans[from];
-    const DriveScan& b = drive.scans[to];
-    const Pose T_a_b = a.T_world_sensor.inverse() * b.T_world_sensor;
-    const bool is_neighbour = b.number == a.number + 1;
-    if (!is_neighbour || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
-    return T_a_b;
-  };
-  std::optional<Pose> found;
-  if (index + 1 < drive.scans.size()) found = motion(index, index + 1);
-  if (!found && index > 0) found = motion(index - 1, index);
-  return found.value_or(Pose::Identity());
-}
 
 // Whether all that returned is the vehicle itself.
 bool SeesNothing(const PointCloud& cloud) {
@@ -66,6 +51,9 @@ class Ingest {
     Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
     if (!survey) return survey.error();
     survey_ = *std::move(survey);
+    const auto deskewing = DecideDeskewing(options_.deskewing, drive_, survey_);
+    if (!deskewing) return deskewing.error();
+    report_.deskewing = *deskewing;
     KeyframeBuilderOptions builder_options;
     builder_options.max_range_m = options_.max_range_m;
     builder_options.mount = survey_.mount;
@@ -212,7 +200,7 @@ class Ingest {
   Bytes BuildBlob(const PointCloud& cloud, std::size_t index) {
     const CpuTimer timer;
     std::optional<Pose> T_now_later;
-    if (options_.is_deskewed) T_now_later = MotionAt(drive_, index);
+    if (report_.deskewing.is_deskewed) T_now_later = MotionDuring(drive_, index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
     const GridAttitude attitude{SplitYaw(R_world_sensor).R_level_sensor,
                                 GridYaw(drive_.scans[index].number)};

@@ -10,6 +10,7 @@
 #include "client/connection/keyframe_uploader.h"
 #include "client/drive/anchor/session_anchor.h"
 #include "client/drive/drive_selection.h"
+#include "client/drive/drive_skew.h"
 #include "client/drive/lasting_upload.h"
 #include "client/vehicle/atlas_link.h"
 #include "core/base/status.h"
@@ -24,7 +25,7 @@ struct IngestOptions {
   std::optional<std::uint32_t> rings;
   double max_range_m = 20.0;
   std::optional<double> sensor_height_m;
-  bool is_deskewed = false;
+  Deskewing deskewing = Deskewing::kOff;  // by the drive's own motion
   bool is_staged = false;  // its sessions stay out of the map until somebody publishes them
   // The drive has a frame of its own, and is found in the atlas first. A part that is not, is
   // uploaded staged, in its own frame. None: its frame is the atlas's.
@@ -46,6 +47,7 @@ struct IngestReport {
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob
   SensorMount mount;
+  DeskewDecision deskewing;
   std::uint64_t sessions = 0;
   std::vector<std::string> impossible_steps;  // impossible_steps.h
   std::vector<SessionAnchor> anchors;         // of each session, if that was asked for

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "client/cli/commands/drive/anchor_text.h"
+#include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
 #include "client/cli/output/json_text.h"
@@ -36,6 +37,7 @@ boost::json::object ReportJson(const IngestReport& report, double wall_s) {
                               {"sessions", report.sessions},
                               {"impossible_steps", report.impossible_steps.size()},
                               {"wall_s", Rounded(wall_s, 3)}};
+  if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
   if (!report.anchors.empty()) json["anchors"] = AnchorsJson(report.anchors);
   return json;
 }
@@ -44,6 +46,7 @@ void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
   FactList facts;
   facts.Add("keyframes", StrCat(report.keyframes, " along ", FixedText(report.metres, 1), " m, ",
                                 report.sessions, " session(s)"));
+  if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
   for (const SessionAnchor& anchor : report.anchors) {
     facts.Add("anchor", AnchorText(anchor));
   }
@@ -98,7 +101,8 @@ class IngestCommand : public Command {
     arguments.Optional("--batch", "N", batch_, "Keyframes on their way at a time [64]");
     arguments.Optional("--sensor-height", "M", options_.sensor_height_m,
                        "Above the ground [estimated]");
-    arguments.Choice("--deskew", {"on", "off"}, deskew_, "Undo the vehicle's motion during a scan");
+    arguments.Choice("--deskew", {"on", "off", "auto"}, deskew_,
+                     "Undo the vehicle's motion during a scan; auto: where that makes it sharper");
     arguments.Flag("--staged", options_.is_staged,
                    "Keep it out of the map until `atlas session publish`");
     arguments.Flag(
@@ -151,7 +155,9 @@ class IngestCommand : public Command {
     options_.selection.parity = *parity;
     options_.selection.begin = range_.begin;
     options_.selection.end = range_.end;
-    options_.is_deskewed = deskew_ == "on";
+    const Result<Deskewing> deskewing = ParseDeskewing(deskew_);
+    if (!deskewing) return deskewing.error();
+    options_.deskewing = *deskewing;
     options_.upload.max_in_flight = batch_;
     options_.now_s =
         std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
