@@ -43,7 +43,7 @@ struct AnchorOptions {
   // Places that scans look like, but were not believed: where as many of them agree on another
   // transform, the drive is tracked there, too, and has to fit the map so much less well, as a sum
   // over its scans. A world that looks the same from two sides is found out so: where one of them
-  // was mapped less, every scan alone takes the other, but the drive fits both alike (0.99 times),
+  // was mapped less, every scan alone takes the other, but the drive fits both alike (1.0 times),
   // while it fits one deck of a garage 1.6 times as well as the next.
   double min_guess_fit = 0.4;
   std::size_t candidates = 4;
