@@ -20,6 +20,7 @@ using std::chrono::milliseconds;
 constexpr std::uint32_t kMinorWithPast = 2;
 constexpr std::uint32_t kMinorWithSync = 4;
 constexpr std::uint32_t kMinorWithWatch = 5;
+constexpr std::uint32_t kMinorWithKeyframes = 10;
 
 // Of a call that is given up after this; 0: never.
 Clock::time_point EndAfter(milliseconds give_up) {
@@ -275,6 +276,39 @@ Result<std::vector<SessionSummary>> AtlasClient::ListSessions(const std::string&
     if (!reply->sessions_reply().has_more()) return sessions;
     if (last == before) {
       return Error(StatusCode::kInvalidData, "sessions: the daemon has more of them and told none");
+    }
+  }
+}
+
+Result<std::vector<KeyframeSummary>> AtlasClient::ListKeyframes(const SessionKey& session) {
+  if (Status status = session.Validate(); !status.ok()) return Error(std::move(status));
+  if (Status status = CheckMinor(kMinorWithKeyframes, "a list of keyframes"); !status.ok()) {
+    return Error(std::move(status));
+  }
+  std::vector<KeyframeSummary> keyframes;
+  while (true) {
+    wire::Envelope request;
+    wire::KeyframesRequest& page = *request.mutable_keyframes_request();
+    page.set_vehicle(session.vehicle);
+    page.set_session(session.session);
+    if (!keyframes.empty()) page.set_after_sequence(keyframes.back().sequence);
+    const auto reply = channel_->Call(request, Body::kKeyframesReply);
+    if (!reply) return Error(reply.error());
+    const wire::KeyframesReply& told = reply->keyframes_reply();
+    for (const wire::KeyframeInfo& info : told.keyframes()) {
+      const Result<QuantizedPose> pose = PoseFromWire(info.pose());
+      if (!pose) return Error(pose.error().WithContext(StrCat("keyframes of ", session)));
+      if (!keyframes.empty() && info.sequence() <= keyframes.back().sequence) {
+        return Error(StatusCode::kInvalidData,
+                     StrCat("keyframes of ", session, ": the daemon told of ", info.sequence(),
+                            " behind ", keyframes.back().sequence, ", expected them in order"));
+      }
+      keyframes.push_back({info.sequence(), info.time_ms(), *pose});
+    }
+    if (!told.has_more()) return keyframes;
+    if (told.keyframes().empty()) {
+      return Error(StatusCode::kInvalidData,
+                   StrCat("keyframes of ", session, ": the daemon has more and told none"));
     }
   }
 }

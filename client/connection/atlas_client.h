@@ -92,6 +92,9 @@ class AtlasClient {
   // All, or all of a vehicle, by vehicle and session. Page by page: one that begins or vanishes
   // meanwhile may be in it or not, every other one is.
   Result<std::vector<SessionSummary>> ListSessions(const std::string& vehicle = {});
+  // Of a session, by rising sequence number: those that are stored. kNotFound: there is no such
+  // session. kUnsupported: a daemon before 1.10.
+  Result<std::vector<KeyframeSummary>> ListKeyframes(const SessionKey& session);
   // Takes a session out of the map, or puts it back. kNotFound: unknown. One that is so already
   // stays as it is. The reason is for people: one line of at most 256 bytes, or none.
   Result<SessionChangeSummary> ChangeSession(const SessionKey& key,

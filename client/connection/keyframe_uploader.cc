@@ -11,6 +11,7 @@
 namespace atlas {
 namespace {
 
+constexpr std::uint32_t kMinorWithStaged = 10;
 constexpr auto kNoEnd = std::chrono::steady_clock::time_point::max();
 // Of a daemon that is busy and does not say for how long.
 constexpr std::chrono::milliseconds kLeastPause{50};
@@ -22,6 +23,7 @@ wire::Envelope UploadRequest(const KeyframeUpload& upload) {
   message.set_time_ms(upload.time_ms);
   *message.mutable_pose() = PoseToWire(upload.T_world_sensor);
   message.set_blob(BytesToWire(upload.blob));
+  message.set_staged(upload.is_staged);
   return request;
 }
 
@@ -49,7 +51,9 @@ void UploadTotals::Add(const UploadTotals& more) {
 }
 
 KeyframeUploader::KeyframeUploader(const AtlasClient& client, const UploadOptions& options)
-    : channel_(client.channel_), options_(options) {}
+    : channel_(client.channel_),
+      takes_staged_(client.CheckMinor(kMinorWithStaged, "a staged session")),
+      options_(options) {}
 
 KeyframeUploader::~KeyframeUploader() {
   const auto channel = channel_.lock();
@@ -84,6 +88,7 @@ Result<bool> KeyframeUploader::AwaitRoom(std::size_t next_bytes, Clock::time_poi
 }
 
 Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
+  if (upload.is_staged) ATLAS_RETURN_IF_ERROR(takes_staged_);
   InFlight next{next_number_++, 0, upload, upload.blob.size(), {}};
   open_.insert(next.number);
   if (options_.patience.count() > 0) {
@@ -99,6 +104,7 @@ Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
 }
 
 Result<bool> KeyframeUploader::UploadUntil(const KeyframeUpload& upload, Clock::time_point latest) {
+  if (upload.is_staged && !takes_staged_.ok()) return Error(takes_staged_);
   const Result<bool> has_room = AwaitRoom(upload.blob.size(), latest);
   if (!has_room || !*has_room) return has_room;
   if (!first_refusal_.ok()) return Error(first_refusal_);

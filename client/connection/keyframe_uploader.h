@@ -97,6 +97,7 @@ class KeyframeUploader {
   Result<std::shared_ptr<RpcChannel>> Channel() const;
 
   std::weak_ptr<RpcChannel> channel_;
+  Status takes_staged_;  // whether the daemon does
   UploadOptions options_;
   UploadTotals totals_;
   std::deque<InFlight> in_flight_;

@@ -36,6 +36,16 @@ struct KeyframeUpload {
   std::int64_t time_ms = 0;
   QuantizedPose T_world_sensor;
   ByteSpan blob;
+  // The session that it begins is staged: kept, and not in the map until it is published. Taken by
+  // daemons of protocol 1.10 and later alone: others are not sent it (kUnsupported).
+  bool is_staged = false;
+};
+
+// What is known of a stored keyframe, but its blob.
+struct KeyframeSummary {
+  std::uint32_t sequence = 0;
+  std::int64_t time_ms = 0;
+  QuantizedPose T_world_sensor;  // as it is now
 };
 
 struct PoseCorrection {

@@ -16,6 +16,7 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kMinorWithLog = 8;
 constexpr std::uint32_t kMinorWithQuarantine = 9;
+constexpr std::uint32_t kMinorWithStaged = 10;
 
 wire::ChangeSession::Action ActionToWire(SessionAction action) {
   switch (action) {
@@ -25,6 +26,8 @@ wire::ChangeSession::Action ActionToWire(SessionAction action) {
       return wire::ChangeSession::RESTORE;
     case SessionAction::kRelease:
       return wire::ChangeSession::RELEASE;
+    case SessionAction::kPublish:
+      return wire::ChangeSession::PUBLISH;
     case SessionAction::kPurge:
       break;
   }
@@ -87,6 +90,11 @@ Result<SessionChangeSummary> AtlasClient::ChangeSession(const SessionKey& key,
   if (action == SessionAction::kRelease || action == SessionAction::kPurge) {
     if (Status status = CheckMinor(kMinorWithQuarantine, "to release or purge a session");
         !status.ok()) {
+      return Error(std::move(status));
+    }
+  }
+  if (action == SessionAction::kPublish) {
+    if (Status status = CheckMinor(kMinorWithStaged, "to publish a session"); !status.ok()) {
       return Error(std::move(status));
     }
   }

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <span>
 
 #include "client/drive/drive_survey.h"
 #include "client/drive/impossible_steps.h"
+#include "client/drive/scan_motion.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
@@ -19,22 +21,6 @@ namespace atlas {
 namespace {
 
 constexpr double kMaxAhead_s = 60.0;  // what the daemon accepts
-
-// From one scan to the next, as the sensor moves; still when it has no neighbour before a jump.
-Pose MotionAt(const DriveFolder& drive, std::size_t index) {
-  const auto motion = [&drive](std::size_t from, std::size_t to) -> std::optional<Pose> {
-    const DriveScan& a = drive.scans[from];
-    const DriveScan& b = drive.scans[to];
-    const Pose T_a_b = a.T_world_sensor.inverse() * b.T_world_sensor;
-    const bool is_neighbour = b.number == a.number + 1;
-    if (!is_neighbour || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
-    return T_a_b;
-  };
-  std::optional<Pose> found;
-  if (index + 1 < drive.scans.size()) found = motion(index, index + 1);
-  if (!found && index > 0) found = motion(index - 1, index);
-  return found.value_or(Pose::Identity());
-}
 
 // Whether all that returned is the vehicle itself.
 bool SeesNothing(const PointCloud& cloud) {
@@ -62,17 +48,55 @@ class Ingest {
     ATLAS_RETURN_IF_ERROR(options_.Validate());
     ATLAS_RETURN_IF_ERROR(Select());
     ATLAS_RETURN_IF_ERROR(CheckScans());
-    const Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
+    Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
     if (!survey) return survey.error();
+    survey_ = *std::move(survey);
+    const auto deskewing = DecideDeskewing(options_.deskewing, drive_, survey_);
+    if (!deskewing) return deskewing.error();
+    report_.deskewing = *deskewing;
     KeyframeBuilderOptions builder_options;
     builder_options.max_range_m = options_.max_range_m;
-    builder_options.mount = survey->mount;
-    builder_options.ring_step = survey->ring_step;
+    builder_options.mount = survey_.mount;
+    builder_options.ring_step = survey_.ring_step;
     ATLAS_RETURN_IF_ERROR(builder_options.Validate(profile));
-    builder_.emplace(profile, survey->layout, builder_options);
-    report_.mount = survey->mount;
+    builder_.emplace(profile, survey_.layout, builder_options);
+    report_.mount = survey_.mount;
+    NoteSessions();
     if (options_.shuffle_seed) ShuffleScans(selected_, *options_.shuffle_seed);
     return Plan();
+  }
+
+  // Keyframes stay what they are: only where they go is another matter.
+  Status Anchor(AtlasClient& client) {
+    if (!options_.anchor) return {};
+    auto anchors =
+        AnchorSessions({drive_, survey_, options_.start_s}, sessions_, *options_.anchor, client);
+    if (!anchors) return anchors.error();
+    report_.anchors = *std::move(anchors);
+    for (const SessionAnchor& anchor : report_.anchors) {
+      Frame& frame = frames_[anchor.key];
+      frame.is_staged = !anchor.is_anchored();
+      if (anchor.is_anchored()) frame.T_map_drive = anchor.part.T_map_drive->ToPose();
+    }
+    return {};
+  }
+
+  // Whoever wants a session staged wants nothing of it in the map.
+  Status CheckStaged(AtlasClient& client) const {
+    if (!options_.is_staged) return {};
+    const auto sessions = client.ListSessions(options_.session.vehicle);
+    if (!sessions) return sessions.error();
+    for (const SessionSummary& session : *sessions) {
+      const bool is_ours = std::any_of(
+          planned_.begin(), planned_.end(),
+          [&](const PlannedKeyframe& keyframe) { return keyframe.key.session == session.key; });
+      if (is_ours && session.state != "staged" && session.state != "retracted") {
+        return {StatusCode::kConflict,
+                StrCat("session ", session.key, " is there already, and ", session.state,
+                       ": what it gets now would not be staged; --session gives it another name")};
+      }
+    }
+    return {};
   }
 
   Status Run(AtlasLink& link, const LastingUpload::Progress& progress) {
@@ -92,8 +116,11 @@ class Ingest {
     selected_ = SelectScans(drive_, options_.selection);
     report_.keyframes = selected_.size();
     report_.metres = SelectedMetres(drive_, selected_);
-    JoinImpossibleParts(drive_, selected_);
-    report_.impossible_steps = FindImpossibleSteps(drive_, selected_);
+    // Parts that are anchored each for itself may lie anywhere in the drive's own frame.
+    if (!options_.anchor) {
+      JoinImpossibleParts(drive_, selected_);
+      report_.impossible_steps = FindImpossibleSteps(drive_, selected_);
+    }
     std::set<std::uint32_t> parts;
     for (const SelectedScan& scan : selected_) {
       parts.insert(scan.session_part);
@@ -101,6 +128,18 @@ class Ingest {
     }
     report_.sessions = parts.size();
     return {};
+  }
+
+  void NoteSessions() {
+    for (const SelectedScan& selected : selected_) {
+      const SessionKey key = KeyOf(selected).session;
+      const auto known = std::find_if(sessions_.begin(), sessions_.end(),
+                                      [&key](const SessionScans& s) { return s.key == key; });
+      SessionScans& session = known == sessions_.end()
+                                  ? sessions_.emplace_back(SessionScans{key, sessions_.empty(), {}})
+                                  : *known;
+      session.scans.push_back(&drive_.scans[selected.index]);
+    }
   }
 
   Status Plan() {
@@ -148,15 +187,20 @@ class Ingest {
     KeyframeUpload upload;
     upload.key = planned_[i].key;
     upload.time_ms = planned_[i].time_ms;
-    upload.T_world_sensor = QuantizedPose::FromPose(drive_.scans[index].T_world_sensor);
     upload.blob = blob;
+    const auto frame = frames_.find(upload.key.session);
+    const bool is_of_map = frame == frames_.end();
+    const Pose& T_drive_sensor = drive_.scans[index].T_world_sensor;
+    upload.T_world_sensor = QuantizedPose::FromPose(
+        is_of_map ? T_drive_sensor : frame->second.T_map_drive * T_drive_sensor);
+    upload.is_staged = options_.is_staged || (!is_of_map && frame->second.is_staged);
     return uploader.Upload(upload);
   }
 
   Bytes BuildBlob(const PointCloud& cloud, std::size_t index) {
     const CpuTimer timer;
     std::optional<Pose> T_now_later;
-    if (options_.is_deskewed) T_now_later = MotionAt(drive_, index);
+    if (report_.deskewing.is_deskewed) T_now_later = MotionDuring(drive_, index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
     const GridAttitude attitude{SplitYaw(R_world_sensor).R_level_sensor,
                                 GridYaw(drive_.scans[index].number)};
@@ -173,7 +217,16 @@ class Ingest {
   const DriveFolder& drive_;
   const IngestOptions& options_;
   std::vector<Pose> poses_;  // of all scans
+  // Where the scans of an anchored session go.
+  struct Frame {
+    Pose T_map_drive = Pose::Identity();
+    bool is_staged = false;
+  };
+
+  DriveSurvey survey_;
   std::optional<KeyframeBuilder> builder_;
+  std::vector<SessionScans> sessions_;
+  std::map<SessionKey, Frame> frames_;  // of anchored ones; others are in the map's frame
   std::vector<SelectedScan> selected_;
   std::vector<PlannedKeyframe> planned_;  // of the selected ones
   IngestReport report_;
@@ -184,6 +237,7 @@ class Ingest {
 Status IngestOptions::Validate() const {
   ATLAS_RETURN_IF_ERROR(session.Validate());
   ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  if (anchor) ATLAS_RETURN_IF_ERROR(anchor->Validate());
   if (!(selection.every_m >= 0.0)) {
     return {StatusCode::kInvalidArgument,
             StrCat("every ", selection.every_m, " m: expected 0 or more")};
@@ -204,6 +258,8 @@ Result<IngestReport> IngestDrive(const DriveFolder& drive,
   if (Status status = ingest.Prepare((*client)->profile()); !status.ok()) {
     return Error(std::move(status));
   }
+  if (Status status = ingest.CheckStaged(**client); !status.ok()) return Error(std::move(status));
+  if (Status status = ingest.Anchor(**client); !status.ok()) return Error(std::move(status));
   if (Status status = ingest.Run(link, progress); !status.ok()) return Error(std::move(status));
   return ingest.report();
 }

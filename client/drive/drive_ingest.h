@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "client/connection/keyframe_uploader.h"
+#include "client/drive/anchor/session_anchor.h"
 #include "client/drive/drive_selection.h"
+#include "client/drive/drive_skew.h"
 #include "client/drive/lasting_upload.h"
 #include "client/vehicle/atlas_link.h"
 #include "core/base/status.h"
@@ -23,7 +25,11 @@ struct IngestOptions {
   std::optional<std::uint32_t> rings;
   double max_range_m = 20.0;
   std::optional<double> sensor_height_m;
-  bool is_deskewed = false;
+  Deskewing deskewing = Deskewing::kOff;  // by the drive's own motion
+  bool is_staged = false;  // its sessions stay out of the map until somebody publishes them
+  // The drive has a frame of its own, and is found in the atlas first. A part that is not, is
+  // uploaded staged, in its own frame. None: its frame is the atlas's.
+  std::optional<AnchorOptions> anchor;
   double start_s = 0.0;  // added to the scans' times
   double now_s = 0.0;    // since 1970: later scans than a minute from now are refused
   std::optional<std::uint64_t> shuffle_seed;
@@ -41,16 +47,19 @@ struct IngestReport {
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob
   SensorMount mount;
+  DeskewDecision deskewing;
   std::uint64_t sessions = 0;
   std::vector<std::string> impossible_steps;  // impossible_steps.h
+  std::vector<SessionAnchor> anchors;         // of each session, if that was asked for
 };
 
 // `progress` (may be empty) is called with the number of keyframes sent. A scan that is bad is
 // named and nothing is uploaded. A daemon that is busy is waited for, a connection that breaks is
 // made again, both for as long as the patience; what an interrupted run left with the daemon is not
-// made and sent again (lasting_upload.h). Fails at once where the daemon cannot be reached at all,
-// and at the first keyframe that it refuses otherwise, naming it; what was acknowledged until then
-// stays.
+// made and sent again (lasting_upload.h). An anchored drive's session that is there is gone on with
+// in the frame that it has there. Fails at once where the daemon cannot be reached at all,
+// or where a session that is to be staged is there and not staged (kConflict), and at the first
+// keyframe that it refuses otherwise, naming it; what was acknowledged until then stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
                                  AtlasLink& link,

@@ -106,16 +106,21 @@ SurveyOptions SurveyOptionsFor(const DriveLocalizationOptions& options) {
   return survey;
 }
 
-Result<std::unique_ptr<ScanLocalizer>> MakeLocalizer(const DriveFolder& drive,
+// From one scan that is used to the next.
+double RevolutionsBetween(ScanParity parity) {
+  return parity == ScanParity::kAll ? 1.0 : 2.0;
+}
+
+Result<std::unique_ptr<ScanLocalizer>> MakeLocalizer(const DriveSurvey& survey,
                                                      const DriveLocalizationOptions& options,
+                                                     bool is_deskewed,
                                                      MapView& view) {
-  const bool is_paper = options.mode == LocalizationMode::kPaper;
-  const SurveyOptions survey_options = SurveyOptionsFor(options);
-  const Result<DriveSurvey> survey =
-      is_paper ? SurveyDrive(drive, survey_options) : SurveySensor(drive, survey_options);
-  if (!survey) return Error(survey.error());
-  if (is_paper) return MakePaperLocalizer(*survey, options.range_m(), view);
-  return MakeAtlasLocalizer(*survey, options.range_m(), view);
+  if (options.mode == LocalizationMode::kPaper) {
+    return MakePaperLocalizer(survey, options.range_m(), view);
+  }
+  const double revolutions = RevolutionsBetween(options.selection.parity);
+  return MakeAtlasLocalizer(survey, options.range_m(), view,
+                            is_deskewed ? std::optional(revolutions) : std::nullopt);
 }
 
 }  // namespace
@@ -125,6 +130,11 @@ Status DriveLocalizationOptions::Validate() const {
   if (!(range_m() >= 1.0 && range_m() <= 200.0)) {
     return {StatusCode::kInvalidArgument,
             StrCat("maximum range ", range_m(), " m: expected 1 to 200")};
+  }
+  if (deskewing != Deskewing::kOff && (shots || mode == LocalizationMode::kPaper)) {
+    return {StatusCode::kInvalidArgument,
+            "deskewing goes by the motion of the scans before: not of single shots, nor in mode "
+            "paper"};
   }
   if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
@@ -138,9 +148,18 @@ Result<DriveLocalizationReport> LocalizeDrive(
     MapView& view,
     const std::function<void(const LocalizedScan&)>& on_scan) {
   if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
-  const auto localizer = MakeLocalizer(drive, options, view);
+  const SurveyOptions survey_options = SurveyOptionsFor(options);
+  const Result<DriveSurvey> survey = options.mode == LocalizationMode::kPaper
+                                         ? SurveyDrive(drive, survey_options)
+                                         : SurveySensor(drive, survey_options);
+  if (!survey) return Error(survey.error());
+  const auto deskewing = DecideDeskewing(options.deskewing, drive, *survey);
+  if (!deskewing) return Error(deskewing.error());
+  const auto localizer = MakeLocalizer(*survey, options, deskewing->is_deskewed, view);
   if (!localizer) return Error(localizer.error());
-  return LocalizeDrive(drive, options, **localizer, on_scan);
+  auto report = LocalizeDrive(drive, options, **localizer, on_scan);
+  if (report) report->deskewing = *deskewing;
+  return report;
 }
 
 Result<DriveLocalizationReport> LocalizeDrive(

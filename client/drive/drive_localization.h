@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "client/drive/drive_selection.h"
+#include "client/drive/drive_skew.h"
 #include "client/drive/scan_localizer.h"
 #include "client/map/map_view.h"
 #include "client/score/localization_score.h"
@@ -31,8 +32,9 @@ struct DriveLocalizationOptions {
   LocalizationMode mode = LocalizationMode::kAtlas;
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
-  std::optional<double> max_range_m;  // 100 m; the paper's: 40 m
-  std::optional<Shots> shots;         // tracking, if not given
+  std::optional<double> max_range_m;      // 100 m; the paper's: 40 m
+  Deskewing deskewing = Deskewing::kOff;  // by the predicted motion: not for single shots
+  std::optional<Shots> shots;             // tracking, if not given
   std::uint64_t seed = 0;
   bool is_restarted = true;  // tracking is told where it is after a jump
   double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;  // a cheap IMU's
@@ -64,6 +66,7 @@ struct DriveLocalizationReport {
   std::uint64_t scans = 0;
   std::uint64_t restarts = 0;  // after jumps
   double cpu_s = 0.0;          // segmentation and tiles included
+  DeskewDecision deskewing;
 
   // Shots a CPU second.
   double hz() const { return cpu_s > 0.0 ? static_cast<double>(score.shots()) / cpu_s : 0.0; }

@@ -27,16 +27,20 @@ RelocalizerSource RelocalizerOf(MapView& view, const RelocalizerOptions& options
 
 class AtlasScanLocalizer : public ScanLocalizer {
  public:
-  AtlasScanLocalizer(const DriveSurvey& survey, const LocalizerOptions& options, MapView& view)
+  AtlasScanLocalizer(const DriveSurvey& survey,
+                     const LocalizerOptions& options,
+                     MapView& view,
+                     std::optional<double> revolutions)
       : survey_(survey),
+        revolutions_(revolutions),
         localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})) {}
 
   void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
 
   Result<LocatedScan> Locate(const PointCloud& cloud,
                              const Eigen::Quaterniond& R_level_sensor) override {
-    const LeveledScan leveled =
-        SegmentScan(cloud, survey_.layout, survey_.ring_step, R_level_sensor, {});
+    const LeveledScan leveled = SegmentScan(cloud, survey_.layout, survey_.ring_step,
+                                            R_level_sensor, {}, DuringRevolution());
     const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor);
     if (!result) return Error(result.error());
     return LocatedScan{result->T_world_sensor, result->health, result->registration.fit,
@@ -44,7 +48,19 @@ class AtlasScanLocalizer : public ScanLocalizer {
   }
 
  private:
+  std::optional<Pose> DuringRevolution() const {
+    if (!revolutions_) return std::nullopt;
+    const Pose T_now_later = localizer_.T_now_later();
+    const Eigen::AngleAxisd turn(T_now_later.linear());
+    Pose during = Pose::Identity();
+    during.linear() =
+        Eigen::AngleAxisd(turn.angle() / *revolutions_, turn.axis()).toRotationMatrix();
+    during.translation() = T_now_later.translation() / *revolutions_;
+    return during;
+  }
+
   DriveSurvey survey_;
+  std::optional<double> revolutions_;
   Localizer localizer_;
 };
 
@@ -74,10 +90,11 @@ class PaperScanLocalizer : public ScanLocalizer {
 
 std::unique_ptr<ScanLocalizer> MakeAtlasLocalizer(const DriveSurvey& survey,
                                                   double max_range_m,
-                                                  MapView& view) {
+                                                  MapView& view,
+                                                  std::optional<double> revolutions) {
   LocalizerOptions options;
   options.features.max_range_m = static_cast<float>(max_range_m);
-  return std::make_unique<AtlasScanLocalizer>(survey, options, view);
+  return std::make_unique<AtlasScanLocalizer>(survey, options, view, revolutions);
 }
 
 Result<std::unique_ptr<ScanLocalizer>> MakePaperLocalizer(const DriveSurvey& survey,

@@ -36,10 +36,12 @@ class ScanLocalizer {
 
 // Both match what is within `max_range_m`; `view` outlives them.
 //
-// The product's (core/localization/localizer.h).
+// The product's (core/localization/localizer.h). With `revolutions`, how many the sensor makes from
+// one scan to the next, scans are deskewed by the motion that the localizer predicts.
 std::unique_ptr<ScanLocalizer> MakeAtlasLocalizer(const DriveSurvey& survey,
                                                   double max_range_m,
-                                                  MapView& view);
+                                                  MapView& view,
+                                                  std::optional<double> revolutions = std::nullopt);
 // The paper's encode, decode and ICP (core/localization/icp). `survey` with its mount;
 // kInvalidArgument for a range that no keyframe has.
 Result<std::unique_ptr<ScanLocalizer>> MakePaperLocalizer(const DriveSurvey& survey,

@@ -10,13 +10,14 @@ namespace {
 // Frozen.
 constexpr std::uint32_t kMagic = 0x4B564152;  // "RAVK"
 constexpr std::uint8_t kVersion = 1;
+constexpr std::uint8_t kStagedVersion = 2;  // the same, of a staged session
 
 }  // namespace
 
 Bytes EncodeSpooled(const KeyframeUpload& upload) {
   ByteWriter out;
   out.U32(kMagic);
-  out.U8(kVersion);
+  out.U8(upload.is_staged ? kStagedVersion : kVersion);
   out.String(upload.key.session.vehicle);
   out.String(upload.key.session.session);
   out.U32(upload.key.sequence);
@@ -37,8 +38,11 @@ Result<SpooledKeyframe> DecodeSpooled(ByteSpan file) {
   const Result<ByteSpan> content = WithoutChecksum(file);
   if (!content) return Error(content.error());
   ByteReader in(*content);
-  const bool is_ours = in.U32() == kMagic && in.U8() == kVersion;
+  const bool is_of_kind = in.U32() == kMagic;
+  const std::uint8_t version = in.U8();
+  const bool is_ours = is_of_kind && (version == kVersion || version == kStagedVersion);
   SpooledKeyframe keyframe;
+  keyframe.is_staged = version == kStagedVersion;
   keyframe.key.session.vehicle = std::string(in.String(kMaxNameSize));
   keyframe.key.session.session = std::string(in.String(kMaxNameSize));
   keyframe.key.sequence = in.U32();

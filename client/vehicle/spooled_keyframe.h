@@ -14,8 +14,9 @@ struct SpooledKeyframe {
   std::int64_t time_ms = 0;
   QuantizedPose T_world_sensor;
   Bytes blob;
+  bool is_staged = false;
 
-  KeyframeUpload ToUpload() const { return {key, time_ms, T_world_sensor, blob}; }
+  KeyframeUpload ToUpload() const { return {key, time_ms, T_world_sensor, blob, is_staged}; }
 };
 
 // No spooled keyframe takes more.

@@ -6,7 +6,8 @@
 namespace atlas {
 
 // kRetract takes a session out of the map, kRestore puts a retracted one back. kRelease keeps one
-// in the map whatever its keyframes look like. kPurge deletes it for good.
-enum class SessionAction : std::uint8_t { kRetract, kRestore, kRelease, kPurge };
+// in the map whatever its keyframes look like. kPurge deletes it for good. kPublish puts a staged
+// one into the map.
+enum class SessionAction : std::uint8_t { kRetract, kRestore, kRelease, kPurge, kPublish };
 
 }  // namespace atlas

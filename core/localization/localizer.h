@@ -119,6 +119,10 @@ class Localizer {
   // Forgets the motion; the next scan is near `T_world_sensor`.
   void Start(const Pose& T_world_sensor);
 
+  // How the sensor is taken to move from one scan to the next, in its own frame: what scans are to
+  // be deskewed by. Identity as long as nothing is known of it.
+  Pose T_now_later() const { return motion_.T_now_later(); }
+
   // Requires Start(). `scan` is levelled by `R_level_sensor`. Errors are those of the tiles'
   // and the relocalizer's sources.
   Result<LocalizationResult> Localize(const LeveledScan& scan,

@@ -54,6 +54,16 @@ void MotionModel::Predict() {
   pose_.linear() = TurnAboutVertical(motion_(3)) * pose_.linear();
 }
 
+Pose MotionModel::T_now_later() const {
+  const Eigen::Matrix3d& R_world_sensor = pose_.linear();
+  Pose T_now_later = Pose::Identity();
+  T_now_later.linear() =
+      R_world_sensor.transpose() * TurnAboutVertical(motion_(3)) * R_world_sensor;
+  T_now_later.translation() = R_world_sensor.transpose() * TurnAboutVertical(0.5 * motion_(3)) *
+                              R_world_sensor * motion_.head<3>();
+  return T_now_later;
+}
+
 void MotionModel::Correct(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) {
   const Eigen::Matrix4d prior = covariance_.topLeftCorner<4, 4>();
   const Eigen::Matrix4d posterior = (prior.inverse() + seen).inverse();

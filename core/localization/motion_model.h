@@ -55,6 +55,8 @@ class MotionModel {
   void SetTilt(const Eigen::Matrix3d& R_world_sensor);
 
   const Pose& T_world_sensor() const { return pose_; }
+  // From one scan to the next, as it is known: identity while nothing is.
+  Pose T_now_later() const;
   PoseCovariance covariance() const { return covariance_.topLeftCorner<4, 4>(); }
 
  private:

@@ -30,13 +30,14 @@ enum class RequestKind : std::uint8_t {
   kCancel,
   kLog,
   kBackup,
+  kKeyframes,
   kUnknown,
 };
 // As metrics and logs call them, in the order of the enumerators.
-inline constexpr std::array<std::string_view, 17> kRequestKindNames = {
+inline constexpr std::array<std::string_view, 18> kRequestKindNames = {
     "hello",  "upload_keyframe", "update_poses", "change_session", "query_region", "sync",
     "status", "sessions",        "wait",         "digest",         "verify",       "compact",
-    "watch",  "cancel",          "log",          "backup",         "unknown"};
+    "watch",  "cancel",          "log",          "backup",         "keyframes",    "unknown"};
 inline constexpr std::size_t kRequestKinds = kRequestKindNames.size();
 inline constexpr std::size_t kStatusCodes = 1 + static_cast<std::size_t>(StatusCode::kInternal);
 

@@ -97,6 +97,16 @@ void AtlasService::PutKeyframe(NewKeyframe keyframe, AtlasStore::Done<PutKeyfram
   store_.PutKeyframe(std::move(keyframe), Notifying<PutKeyframeResult>(changes_, report));
 }
 
+Result<KeyframePage> AtlasService::ListKeyframes(const SessionKey& session,
+                                                 std::optional<std::uint32_t> after_sequence,
+                                                 std::uint32_t limit) {
+  auto page = store_.ListKeyframes(session, after_sequence, limit);
+  if (!page && page.error().code() == StatusCode::kInvalidData) {
+    return Error(OfTheStore(page.error()));
+  }
+  return page;
+}
+
 Result<std::optional<SessionRecord>> AtlasService::FindSession(const SessionKey& key) {
   auto found = store_.FindSession(key);
   if (!found && found.error().code() == StatusCode::kInvalidData) {

@@ -125,6 +125,10 @@ class AtlasService {
   Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after, std::uint32_t limit) {
     return store_.ListSessions(after, limit);
   }
+  // Behind `after_sequence`; atlas_store.h. kUnavailable: a row is damaged.
+  Result<KeyframePage> ListKeyframes(const SessionKey& session,
+                                     std::optional<std::uint32_t> after_sequence,
+                                     std::uint32_t limit);
   // nullopt: unknown. kUnavailable: its row is damaged.
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key);
   // Of the last change on disk; never blocks.

@@ -74,6 +74,7 @@ Result<NewKeyframe> CheckUpload(UploadRequest request,
   keyframe.level_quaternion = header->level_quaternion;
   keyframe.prior = request.prior;
   keyframe.blob = std::move(request.blob);
+  keyframe.is_staged = request.is_staged;
   keyframe.footprint = std::move(*footprint);
   return keyframe;
 }
@@ -86,12 +87,13 @@ Status CheckSessionChange(const SessionChange& change) {
   ATLAS_RETURN_IF_ERROR(change.key.session.empty() ? ValidateName("vehicle", change.key.vehicle)
                                                    : change.key.Validate());
   ATLAS_RETURN_IF_ERROR(CheckAuthor(change.author));
-  const bool is_of_one =
-      change.action == SessionAction::kRelease || change.action == SessionAction::kPurge;
-  if (is_of_one && change.key.session.empty()) {
-    return Status(StatusCode::kInvalidArgument,
-                  StrCat("vehicle ", change.key.vehicle,
-                         ": sessions are released and purged one by one; name the session"));
+  const bool is_of_all =
+      change.action == SessionAction::kRetract || change.action == SessionAction::kRestore;
+  if (!is_of_all && change.key.session.empty()) {
+    return Status(
+        StatusCode::kInvalidArgument,
+        StrCat("vehicle ", change.key.vehicle,
+               ": sessions are released, published and purged one by one; name the session"));
   }
   const bool is_line = std::none_of(change.reason.begin(), change.reason.end(), [](char c) {
     return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;

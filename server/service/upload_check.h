@@ -17,6 +17,7 @@ struct UploadRequest {
   QuantizedPose pose;
   std::optional<PositionPrior> prior;
   Bytes blob;
+  bool is_staged = false;  // the session that it begins
 };
 
 // Keyframes may be this far ahead of the daemon's clock.

@@ -109,6 +109,11 @@ class AtlasStore : public TileIndex {
 
   // In the order of `keys`; kNotFound names the first unknown one.
   virtual Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
+  // Those of a session behind `after_sequence`, which nobody need have; nullopt: from the first one
+  // on. `limit` is at least 1. kNotFound: there is no such session.
+  virtual Result<KeyframePage> ListKeyframes(const SessionKey& session,
+                                             std::optional<std::uint32_t> after_sequence,
+                                             std::uint32_t limit) = 0;
   // The keyframes of live sessions whose footprints touch a level-0 tile: those that were not there
   // at revision `since`, or not as they are now. All of them, and `is_whole`, where `since` is 0 or
   // before the last compaction: nothing tells any more what it dropped.

@@ -27,6 +27,7 @@ enum class EventKind : std::uint8_t {
   kTablesRepaired = 16,  // by who asked for repairs
   kBackup = 17,          // of the atlas as it was
   kLogDamaged = 18,      // what was committed last is lost
+  kSessionPublished = 19,
 };
 
 // The author of what nobody asked for.
@@ -71,6 +72,8 @@ constexpr std::string_view EventName(EventKind kind) {
       return "backup";
     case EventKind::kLogDamaged:
       return "log_damaged";
+    case EventKind::kSessionPublished:
+      return "session_published";
   }
   return "unknown";  // of a later version
 }

@@ -14,7 +14,7 @@ namespace atlas {
 
 // Frozen numbers (docs/formats/store.md).
 enum class SessionState : std::uint8_t {
-  kStaged = 0,  // does not occur yet
+  kStaged = 0,  // kept, and not in the map until somebody publishes it
   kLive = 1,
   kQuarantined = 2,  // a way along its keyframes is implausible (plausibility.h)
   kRetracted = 3,

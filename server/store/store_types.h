@@ -65,6 +65,7 @@ struct NewKeyframe {
   std::array<std::int32_t, 4> level_quaternion{};
   std::optional<PositionPrior> prior;
   Bytes blob;
+  bool is_staged = false;                    // the session that it begins, if it does
   std::vector<TileId> footprint;             // the level-0 tiles it touches at `pose`
   std::shared_ptr<MissingUploads> missing;   // of who sends it; null: order does not matter
   std::shared_ptr<SessionStart> start;       // of its session; null: as many as they like
@@ -107,6 +108,12 @@ struct KeyframeRecord {
   std::array<std::int32_t, 4> level_quaternion{};
   QuantizedPose pose;
   SessionState session_state = SessionState::kLive;
+};
+
+// A page of a session's stored keyframes, by rising sequence number.
+struct KeyframePage {
+  std::vector<KeyframeRecord> keyframes;
+  bool has_more = false;  // behind the last one
 };
 
 struct StoredKeyframe {

@@ -171,6 +171,73 @@ def places(bin_dir):
     assert not any(row["health"] == "good" and row["error_m"] > 1.0 for row in rows[:-1])
 
 
+def moved_copy(folder, work, yaw_deg, shift_m):
+    """The drive in another frame, turned about the vertical and shifted."""
+    copy = pathlib.Path(work) / f"{folder.name}_moved"
+    copy.mkdir()
+    for name in ("velodyne", "times.txt"):
+        if (folder / name).exists():
+            (copy / name).symlink_to((folder / name).resolve())
+    c, s = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
+    lines = []
+    for line in (folder / "poses.txt").read_text().splitlines():
+        m = list(map(float, line.split()))
+        east, north, up = m[0:4], m[4:8], m[8:12]
+        rows = [[c * a - s * b for a, b in zip(east, north)], [s * a + c * b for a, b in zip(east, north)], up]
+        for row, shift in zip(rows, shift_m):
+            row[3] += shift
+        lines.append(" ".join(repr(value) for row in rows for value in row) + "\n")
+    (copy / "poses.txt").write_text("".join(lines))
+    return copy
+
+
+def anchor_errors(transform, moved, truth, scans):
+    """How far off the transform puts these scans of the moved drive, in metres."""
+    c, s = (f(math.radians(transform["yaw_deg"])) for f in (math.cos, math.sin))
+    errors = []
+    for scan in scans:
+        x, y, z = moved[scan]
+        put = (c * x - s * y + transform["x_m"], s * x + c * y + transform["y_m"], z + transform["z_m"])
+        errors.append(math.dist(put, truth[scan]))
+    return errors
+
+
+def anchor(bin_dir):
+    """Drives moved into frames of their own, found in the atlas again, or kept out of it."""
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        folder = drive("kitti_0005")
+        atlas.run("ingest", folder, "--session", "first", "--range", "0:77", "--every", 0)
+        atlas.run("wait")
+        before = atlas.run("digest")["digest"]
+        unknown = atlas.call("ingest", drive("semantickitti_mini/02"), "--anchor", "--session", "elsewhere")
+        told = json.loads(unknown.stdout)["anchors"][0]
+        print(f"another drive: {told}")
+        assert unknown.returncode == 3 and not told["anchored"]
+        assert atlas.run("digest")["digest"] == before
+        moved = moved_copy(folder, work, -71.25, (2000.5, 333.3, -12.0))
+        done = atlas.run("ingest", moved, "--session", "second", "--anchor", "--scans", "odd", "--every", 0)
+        told = done["anchors"][0]
+        scans = range(1, 154, 2)
+        errors = anchor_errors(told["transform"], positions(moved), positions(folder), scans)
+        on_map = [error for scan, error in zip(scans, errors) if scan < 77]
+        print(f"kitti_0005, odd scans in the map of its first half: {told}; off by {max(on_map):.3f} m at most on the "
+              f"map, {max(errors):.3f} m at its other end")
+        assert told["anchored"] and max(on_map) <= 0.06 and max(errors) <= 0.15
+        assert atlas.stop() == 0
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        atlas.run("ingest", drive("sim_overpass_A"))
+        folder = drive("sim_overpass_B")
+        moved = moved_copy(folder, work, 33.3, (-700.25, 41.5, 6.75))
+        done = json.loads(atlas.call("ingest", moved, "--anchor").stdout)
+        for told, scans in zip(done["anchors"], (range(121), range(121, 242)), strict=True):
+            print(f"an interchange that looks the same from two sides: {told}")
+            if told["anchored"]:
+                assert max(anchor_errors(told["transform"], positions(moved), positions(folder), scans)) <= 0.5
+        assert atlas.stop() == 0
+
+
 def second(bin_dir):
     """Second drives of simulated worlds, the other way and in the other lane, tracked on their decks."""
     for world, goal_m in {"garage": 0.05}.items():
@@ -348,8 +415,8 @@ def main():
             finally:
                 assert atlas.stop() == 0
     else:
-        {"localization": localization, "places": places, "second": second, "segmentation": segmentation, "order": order,
-         "ground": ground, "street": street}[name](bin_dir)
+        {"localization": localization, "places": places, "anchor": anchor, "second": second,
+         "segmentation": segmentation, "order": order, "ground": ground, "street": street}[name](bin_dir)
 
 
 if __name__ == "__main__":

@@ -74,6 +74,7 @@ bool CallAll(AtlasClient& client) {
   Query(client);
   static_cast<void>(client.ReadStatus());
   static_cast<void>(client.ListSessions());
+  static_cast<void>(client.ListKeyframes(kKey.session));
   static_cast<void>(client.WaitUntilFused(milliseconds(1)));
   static_cast<void>(client.Digest(milliseconds(1)));
   static_cast<void>(client.Verify(false, milliseconds(1)));

@@ -12,6 +12,7 @@ std::vector<Bytes> Seeds() {
   std::vector<Bytes> seeds;
   for (const Bytes& blob : KeyframeSeeds(testing::GoldenProfile())) {
     seeds.push_back(EncodeSpooled({{{"bus", "day-2"}, 7}, 1'700'000'000'000, {}, blob}));
+    seeds.push_back(EncodeSpooled({{{"bus", "day-2"}, 8}, 1'700'000'000'000, {}, blob, true}));
   }
   seeds.push_back(EncodeSpooled({{{"b", "d"}, 0}, 0, {}, {}}));
   return seeds;

@@ -19,6 +19,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeSessionRetractCommand());
   commands.push_back(MakeSessionRestoreCommand());
   commands.push_back(MakeSessionReleaseCommand());
+  commands.push_back(MakeSessionPublishCommand());
   commands.push_back(MakeSessionPurgeCommand());
   commands.push_back(MakeVehicleRetractCommand());
   commands.push_back(MakeVehicleRestoreCommand());

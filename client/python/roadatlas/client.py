@@ -20,12 +20,12 @@ from roadatlas.tls import Tls
 from roadatlas.watch import Watch
 
 PROTOCOL_MAJOR = 1
-PROTOCOL_MINOR = 9
+PROTOCOL_MINOR = 10
 _FIELD_OF = {field.message_type.full_name: field.name
              for field in atlas_pb2.Envelope.DESCRIPTOR.oneofs_by_name["body"].fields}
 _REPLY_TO = {"hello": "hello_reply", "upload_keyframe": "upload_reply", "update_poses": "update_poses_reply",
-             "change_session": "change_session_reply", "status_request": "status_reply",
-             "sessions_request": "sessions_reply", "wait_request": "wait_reply", "digest_request": "digest_reply",
+             "change_session": "change_session_reply", "keyframes_request": "keyframes_reply",
+             "status_request": "status_reply", "sessions_request": "sessions_reply", "wait_request": "wait_reply", "digest_request": "digest_reply",
              "compact_request": "compact_reply", "verify_request": "verify_reply",
              "log_request": "log_reply", "cancel_request": "cancel_reply"}  # those of one message
 
@@ -99,7 +99,10 @@ class AtlasClient:
         return self._connection.bytes_received
 
     def submit(self, request: Message) -> int:
-        """Sends a request that is answered by one message, without waiting for it; the id for `result`."""
+        """Sends a request that is answered by one message, without waiting for it; the id for `result`. DaemonTooOld:
+        it would put a staged session into the map."""
+        if isinstance(request, atlas_pb2.UploadKeyframe) and request.staged:
+            self._needs_minor(10, "a staged session")
         awaited = _REPLY_TO[_field_of(request)]
         request_id = self._send(request)
         self._awaited[request_id] = awaited
@@ -126,7 +129,7 @@ class AtlasClient:
 
     def change_session(self, vehicle: str, session: str, action: int, author: str = "",
                        reason: str = "") -> atlas_pb2.ChangeSessionReply:
-        """`action` is ChangeSession.RETRACT, .RESTORE, .RELEASE or .PURGE."""
+        """`action` is ChangeSession.RETRACT, .RESTORE, .RELEASE, .PUBLISH or .PURGE."""
         return self._call(atlas_pb2.ChangeSession(vehicle=vehicle, session=session, action=action, author=author,
                                                   reason=reason))
 
@@ -148,6 +151,23 @@ class AtlasClient:
                 return sessions
             if not reply.sessions:
                 raise BrokenReply("there are more sessions, and none of them came")
+
+    def keyframes(self, vehicle: str, session: str) -> list[atlas_pb2.KeyframeInfo]:
+        """A session's stored ones with their poses of now, by sequence number, however many pages they take."""
+        self._needs_minor(10, "a list of keyframes")
+        keyframes: list[atlas_pb2.KeyframeInfo] = []
+        request = atlas_pb2.KeyframesRequest(vehicle=vehicle, session=session)
+        while True:
+            reply = self._call(request)
+            for keyframe in reply.keyframes:
+                if keyframes and keyframe.sequence <= keyframes[-1].sequence:
+                    raise BrokenReply(f"keyframe {keyframe.sequence} comes twice, or out of order")
+                keyframes.append(keyframe)
+                request.after_sequence = keyframe.sequence
+            if not reply.has_more:
+                return keyframes
+            if not reply.keyframes:
+                raise BrokenReply("there are more keyframes, and none of them came")
 
     def wait(self, timeout_ms: int) -> atlas_pb2.WaitReply:
         """Until no tile is dirty; `timed_out` tells."""

@@ -28,6 +28,21 @@ Status CheckUpload(const Identity& identity, const wire::UploadKeyframe& upload)
              : Deny(identity, StrCat("upload for the vehicle ", NameFrom(upload.key().vehicle())));
 }
 
+// Where a vehicle drove is its own, and of those who correct it.
+Status CheckKeyframes(const Identity& identity, const wire::KeyframesRequest& request) {
+  const bool is_own = identity.role == Role::kVehicle &&
+                      (identity.name.empty() || request.vehicle() == identity.name);
+  return is_own || identity.role == Role::kMerge
+             ? Status()
+             : Deny(identity, StrCat("read keyframes of ", NameFrom(request.vehicle())));
+}
+
+// Who aligns sessions says when they are.
+Status CheckChange(const Identity& identity, const wire::ChangeSession& change) {
+  const bool is_publish = change.action() == wire::ChangeSession::PUBLISH;
+  return is_publish && identity.role == Role::kMerge ? Status() : Deny(identity, "change sessions");
+}
+
 Status CheckPoses(const Identity& identity, const wire::UpdatePoses& poses) {
   if (identity.role == Role::kMerge) {
     return {};
@@ -50,8 +65,10 @@ Status CheckMayAsk(const Identity& identity, const wire::Envelope& request) {
       return CheckUpload(identity, request.upload_keyframe());
     case wire::Envelope::kUpdatePoses:
       return CheckPoses(identity, request.update_poses());
+    case wire::Envelope::kKeyframesRequest:
+      return CheckKeyframes(identity, request.keyframes_request());
     case wire::Envelope::kChangeSession:
-      return Deny(identity, "change sessions");
+      return CheckChange(identity, request.change_session());
     case wire::Envelope::kCompactRequest:
       return Deny(identity, "compact the atlas");
     case wire::Envelope::kBackupRequest:

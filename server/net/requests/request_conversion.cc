@@ -76,8 +76,12 @@ Result<UploadRequest> UploadFromWire(const wire::UploadKeyframe& upload) {
     return Error(pose.error().WithContext(StrCat("keyframe ", *key)));
   }
   const ByteSpan blob = BytesFromWire(upload.blob());
-  return UploadRequest{std::move(*key), upload.time_ms(), *pose, PriorFromWire(upload),
-                       Bytes(blob.begin(), blob.end())};
+  return UploadRequest{std::move(*key),
+                       upload.time_ms(),
+                       *pose,
+                       PriorFromWire(upload),
+                       Bytes(blob.begin(), blob.end()),
+                       upload.staged()};
 }
 
 Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message) {
@@ -116,10 +120,14 @@ Result<SessionChange> SessionChangeFromWire(const wire::ChangeSession& message) 
     case wire::ChangeSession::PURGE:
       change.action = SessionAction::kPurge;
       return change;
+    case wire::ChangeSession::PUBLISH:
+      change.action = SessionAction::kPublish;
+      return change;
     default:
       return Error(StatusCode::kInvalidArgument,
                    StrCat("session: unknown action ", static_cast<int>(message.action()),
-                          ", expected to retract (1), restore (2), release (3) or purge (4)"));
+                          ", expected to retract (1), restore (2), release (3), purge (4) or "
+                          "publish (5)"));
   }
 }
 

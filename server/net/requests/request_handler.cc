@@ -9,6 +9,7 @@
 #include "core/base/str_cat.h"
 #include "proto/wire/convert.h"
 #include "server/net/requests/backup_requests.h"
+#include "server/net/requests/keyframes_reply.h"
 #include "server/net/requests/on_pool.h"
 #include "server/net/requests/read_requests.h"
 #include "server/net/requests/request_conversion.h"
@@ -144,6 +145,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole,
       return AnswerStatus(context_, request, peer.out);
     case Envelope::kSessionsRequest:
       return AnswerSessions(context_, request, peer);
+    case Envelope::kKeyframesRequest:
+      return AnswerKeyframes(context_, request, peer);
     case Envelope::kWaitRequest:
       return AnswerWait(context_, whole, record, peer.out);
     case Envelope::kDigestRequest:

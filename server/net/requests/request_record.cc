@@ -48,6 +48,8 @@ RequestKind KindOf(const Envelope& request) {
       return RequestKind::kLog;
     case Envelope::kBackupRequest:
       return RequestKind::kBackup;
+    case Envelope::kKeyframesRequest:
+      return RequestKind::kKeyframes;
     default:
       return RequestKind::kUnknown;
   }

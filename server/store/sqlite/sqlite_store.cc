@@ -205,6 +205,13 @@ class SqliteStore final : public AtlasStore {
     return readers_.Run<FoundKeyframes>(
         [keys](Connection& connection) { return FindKeyframeRecords(connection, keys); });
   }
+  Result<KeyframePage> ListKeyframes(const SessionKey& session,
+                                     std::optional<std::uint32_t> after_sequence,
+                                     std::uint32_t limit) override {
+    return readers_.Run<KeyframePage>([&](Connection& connection) {
+      return ReadKeyframePage(connection, session, after_sequence, limit);
+    });
+  }
   Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override {
     return readers_.Run<TileSources>(
         [&id, since](Connection& connection) { return GatherTileSources(connection, id, since); });
@@ -294,14 +301,8 @@ class SqliteStore final : public AtlasStore {
         [&](Connection& connection) { return ReadSessions(connection, after, limit); });
   }
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) override {
-    using Found = std::optional<SessionRecord>;
-    return readers_.Run<Found>([&key](Connection& connection) -> Result<Found> {
-      const auto row = atlas::FindSession(connection, key);
-      if (!row) {
-        return Error(row.error());
-      }
-      return *row ? Found((*row)->record) : Found();
-    });
+    return readers_.Run<std::optional<SessionRecord>>(
+        [&key](Connection& connection) { return FindSessionRecord(connection, key); });
   }
   Status CheckSession(const SessionKey& key) override {
     return ReadStatus(

@@ -323,5 +323,62 @@ TEST(AtlasClientTest, ASessionThatIsNoneIsNotAskedFor) {
   }
 }
 
+// A daemon of protocol 1.`minor` that answers with these pages, one a request.
+Result<std::vector<KeyframeSummary>> ListedFrom(std::uint32_t minor,
+                                                const std::vector<wire::KeyframesReply>& pages) {
+  TestPeer peer([&pages, minor](PeerSocket& socket) {
+    wire::Envelope hello;
+    hello.mutable_hello_reply()->set_protocol_major(kProtocolMajor);
+    hello.mutable_hello_reply()->set_protocol_minor(minor);
+    hello.mutable_hello_reply()->set_profile(ProfileToWire({}));
+    socket.Reply(socket.ReadRequest()->request_id(), std::move(hello));
+    for (const wire::KeyframesReply& page : pages) {
+      const auto request = socket.ReadRequest();
+      if (!request) return;
+      wire::Envelope reply;
+      *reply.mutable_keyframes_reply() = page;
+      socket.Reply(request->request_id(), std::move(reply));
+    }
+    socket.Drain();
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  return client ? client->ListKeyframes({"bus", "day"}) : Error(client.error());
+}
+
+wire::KeyframesReply PageOf(const std::vector<std::uint32_t>& sequences, bool has_more) {
+  wire::KeyframesReply page;
+  for (const std::uint32_t sequence : sequences) {
+    wire::KeyframeInfo& keyframe = *page.add_keyframes();
+    keyframe.set_sequence(sequence);
+    QuantizedPose pose;
+    pose.x_um = 1'000 * std::int64_t{sequence};
+    *keyframe.mutable_pose() = PoseToWire(pose);
+  }
+  page.set_has_more(has_more);
+  return page;
+}
+
+TEST(AtlasClientTest, KeyframesComePageByPage) {
+  const auto listed = ListedFrom(10, {PageOf({0, 3}, true), PageOf({4}, false)});
+  ASSERT_TRUE(listed) << listed.error().message();
+  ASSERT_EQ(listed->size(), 3U);
+  EXPECT_EQ(listed->back().sequence, 4U);
+  EXPECT_EQ(listed->back().T_world_sensor.x_um, 4'000);
+  EXPECT_TRUE(ListedFrom(10, {PageOf({}, false)})->empty());
+}
+
+TEST(AtlasClientTest, PagesOfKeyframesThatLeadNowhereAreRefused) {
+  wire::KeyframesReply without_pose = PageOf({1}, false);
+  without_pose.mutable_keyframes(0)->clear_pose();
+  for (const auto& pages :
+       {std::vector{PageOf({}, true)}, std::vector{PageOf({2, 2}, false)},
+        std::vector{PageOf({5}, true), PageOf({4}, false)}, std::vector{without_pose}}) {
+    const auto listed = ListedFrom(10, pages);
+    ASSERT_FALSE(listed);
+    EXPECT_EQ(listed.error().code(), StatusCode::kInvalidData) << listed.error().message();
+  }
+  EXPECT_EQ(ListedFrom(9, {}).error().code(), StatusCode::kUnsupported);
+}
+
 }  // namespace
 }  // namespace atlas

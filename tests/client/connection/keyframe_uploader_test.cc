@@ -279,5 +279,42 @@ TEST(KeyframeUploaderTest, LostConnectionIsNotAnAcknowledgement) {
   EXPECT_EQ(uploader.totals().acked, 1U);
 }
 
+// Answers as a daemon of protocol 1.`minor`, whatever it is sent, and notes which uploads are
+// staged.
+std::vector<bool> StagedOnesThatCome(std::uint32_t minor, Status& second) {
+  std::vector<bool> staged;
+  {
+    TestPeer peer([&staged, minor](PeerSocket& socket) {
+      wire::Envelope hello;
+      hello.mutable_hello_reply()->set_protocol_major(kProtocolMajor);
+      hello.mutable_hello_reply()->set_protocol_minor(minor);
+      hello.mutable_hello_reply()->set_profile(ProfileToWire({}));
+      socket.Reply(socket.ReadRequest()->request_id(), std::move(hello));
+      while (const auto request = socket.ReadRequest()) {
+        staged.push_back(request->upload_keyframe().staged());
+        Acknowledge(socket, request->request_id(), false);
+      }
+    });
+    auto client = AtlasClient::Connect(peer.options());
+    EXPECT_TRUE(client);
+    KeyframeUploader uploader(*client);
+    const Bytes blob(10, 1);
+    EXPECT_TRUE(uploader.Upload(Upload(0, blob)).ok());
+    KeyframeUpload upload = Upload(1, blob);
+    upload.is_staged = true;
+    second = uploader.Upload(upload);
+    EXPECT_TRUE(uploader.Finish().ok());
+  }
+  return staged;
+}
+
+TEST(KeyframeUploaderTest, NothingIsStagedWithADaemonThatWouldTakeItIntoTheMap) {
+  Status second;
+  EXPECT_EQ(StagedOnesThatCome(10, second), (std::vector<bool>{false, true}));
+  EXPECT_TRUE(second.ok());
+  EXPECT_EQ(StagedOnesThatCome(9, second), (std::vector<bool>{false}));
+  EXPECT_EQ(second.code(), StatusCode::kUnsupported);
+}
+
 }  // namespace
 }  // namespace atlas

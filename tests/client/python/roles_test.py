@@ -14,6 +14,7 @@ from support import pose_at
 RETRACT = atlas_pb2.ChangeSession.RETRACT
 RELEASE = atlas_pb2.ChangeSession.RELEASE
 PURGE = atlas_pb2.ChangeSession.PURGE
+PUBLISH = atlas_pb2.ChangeSession.PUBLISH
 
 
 class RolesTest(FleetCase):
@@ -70,6 +71,14 @@ class RolesTest(FleetCase):
         for client in (self.car, self.reader, self.merge):
             for action in (RETRACT, RELEASE, PURGE):
                 self.refused(client, client.change_session, "car.7", "s", action)
+        for client in (self.car, self.reader):
+            self.refused(client, client.change_session, "car.7", "s", PUBLISH)
+        self.assertFalse(self.merge.change_session("car.7", "s", PUBLISH).changed)
+        self.admin.upload_keyframe(keyframe_of("car.8", self.admin))
+        self.refused(self.reader, self.reader.keyframes, "car.7", "s")
+        self.refused(self.car, self.car.keyframes, "car.8", "s")
+        for client, vehicle in ((self.car, "car.7"), (self.merge, "car.8"), (self.admin, "car.7")):
+            self.assertEqual([frame.sequence for frame in client.keyframes(vehicle, "s")], [0])
         for client in (self.car, self.reader):
             self.refused(client, client.verify, 60_000)
             self.refused(client, client.log)

@@ -14,6 +14,7 @@ RETRACT = atlas_pb2.ChangeSession.RETRACT
 RESTORE = atlas_pb2.ChangeSession.RESTORE
 RELEASE = atlas_pb2.ChangeSession.RELEASE
 PURGE = atlas_pb2.ChangeSession.PURGE
+PUBLISH = atlas_pb2.ChangeSession.PUBLISH
 
 
 class UploadTest(AtlasCase):
@@ -152,6 +153,28 @@ class CorrectionTest(AtlasCase):
         self.assertEqual(self.client.digest(60_000).sha256, before.sha256)
         self.refused(Code.CONFLICT, self.client.upload_keyframe, self.upload(0, 0, "wild", radius_cells=20))
         self.refused(Code.NOT_FOUND, self.client.digest, 60_000, before.revision)
+
+
+    def test_session_staged_corrected_and_published(self):
+        before = self.client.digest(60_000)
+        for i in range(2):
+            upload = self.upload(i, 40 + 8 * i, "night", radius_cells=20)
+            upload.staged = True
+            self.assertEqual(self.client.upload_keyframe(upload).tiles_marked, 0)
+            self.assertTrue(self.client.upload_keyframe(upload).duplicate)
+        self.assertEqual([session.state for session in self.client.sessions()], ["live", "staged"])
+        self.client.update_poses([atlas_pb2.PoseUpdate(key=key(1, "night"), pose=pose_at(47))])
+        self.assertEqual([(frame.sequence, frame.time_ms, frame.pose) for frame in
+                          self.client.keyframes("car", "night")],
+                         [(i, upload.time_ms - 1000 * (1 - i), pose_at(x_m)) for i, x_m in enumerate((40, 47))])
+        self.assertEqual(self.client.digest(60_000).sha256, before.sha256)
+        self.refused(Code.CONFLICT, self.client.change_session, "car", "night", RELEASE)
+        reply = self.client.change_session("car", "night", PUBLISH, "surveyor")
+        self.assertEqual((reply.changed, reply.state), (True, "live"))
+        self.assertFalse(self.client.change_session("car", "night", PUBLISH).changed)
+        self.assertNotEqual(self.client.digest(60_000).sha256, before.sha256)
+        self.assertEqual(self.client.log()[-1].kind, "session_published")
+        self.refused(Code.NOT_FOUND, self.client.keyframes, "car", "nobody")
 
 
 class SessionsTest(AtlasCase):

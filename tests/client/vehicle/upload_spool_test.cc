@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "client/vehicle/spooled_keyframe.h"
 #include "tests/client/vehicle/spool_peer.h"
 
 namespace atlas {
@@ -241,6 +242,21 @@ TEST(UploadSpoolTest, AFileCutAnywhereIsNeverSent) {
     EXPECT_TRUE(peer.came().empty());
     fs::rename(cut.refused_folder() / path.filename(), path);
   }
+}
+
+TEST(SpooledKeyframeTest, SaysWhetherItsSessionIsStaged) {
+  const Bytes blob{1, 2, 3};
+  KeyframeUpload upload;
+  upload.key = {{"car", "monday"}, 4};
+  upload.blob = blob;
+  const Bytes live = EncodeSpooled(upload);
+  upload.is_staged = true;
+  const Bytes staged = EncodeSpooled(upload);
+  EXPECT_EQ(live[4], 1) << "as programs before wrote it";
+  EXPECT_EQ(staged[4], 2);
+  EXPECT_FALSE(DecodeSpooled(live)->ToUpload().is_staged);
+  EXPECT_TRUE(DecodeSpooled(staged)->ToUpload().is_staged);
+  EXPECT_EQ(DecodeSpooled(staged)->blob, blob);
 }
 
 }  // namespace

@@ -35,6 +35,28 @@ void ExpectIsCovariance(const PoseCovariance& covariance) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<PoseCovariance>(covariance).eigenvalues()(0), 0.0);
 }
 
+TEST(MotionModelTest, TheMotionDuringAScanIsThatToTheNext) {
+  MotionModel model({});
+  model.Start(OnCircle(0));
+  EXPECT_TRUE(model.T_now_later().isApprox(Pose::Identity())) << "nothing is known yet";
+  for (int i = 1; i <= 30; ++i) {
+    model.Predict();
+    model.Correct(OnCircle(i), kSeenWell);
+  }
+  const Pose right = OnCircle(30).inverse() * OnCircle(31);
+  const Pose told = model.T_now_later();
+  EXPECT_LT((told.translation() - right.translation()).norm(), 0.01);
+  EXPECT_LT(Eigen::AngleAxisd(told.linear().transpose() * right.linear()).angle(), 0.002);
+  // A sensor that is tilted on its vehicle moves the same way in the world.
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  Pose tilted = OnCircle(30);
+  tilted.linear() *= tilt;
+  model.SetTilt(tilted.linear());
+  const Pose next = tilted * model.T_now_later();
+  EXPECT_LT(Eigen::AngleAxisd(next.linear().transpose() * (OnCircle(31).linear() * tilt)).angle(),
+            0.002);
+}
+
 TEST(MotionModelTest, ASteadyMotionGoesOn) {
   MotionModel model({});
   model.Start(OnCircle(0));

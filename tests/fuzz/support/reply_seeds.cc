@@ -107,6 +107,9 @@ std::vector<wire::Envelope> ReplySeeds() {
   session.set_vehicle("bus");
   session.set_session("day");
   session.set_state("live");
+  wire::KeyframeInfo& keyframe = *next().mutable_keyframes_reply()->add_keyframes();
+  keyframe.set_sequence(1);
+  *keyframe.mutable_pose() = PoseToWire({1'000'000, 0, 1'800'000, {1 << 30, 0, 0, 0}});
   next().mutable_wait_reply()->set_revision(9);
   next().mutable_digest_reply()->set_sha256(std::string(32, 'd'));
   next().mutable_verify_reply()->add_findings("none");

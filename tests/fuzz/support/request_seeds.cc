@@ -95,6 +95,8 @@ std::vector<wire::Envelope> RequestSeeds(const MapProfile& profile) {
   }
   all.emplace_back().mutable_status_request();
   all.emplace_back().mutable_sessions_request();
+  all.emplace_back().mutable_keyframes_request()->set_vehicle("bus");
+  all.back().mutable_keyframes_request()->set_session("day");
   all.emplace_back().mutable_wait_request()->set_timeout_ms(20);
   all.emplace_back().mutable_digest_request()->set_timeout_ms(20);
   all.emplace_back().mutable_verify_request()->set_timeout_ms(20);

@@ -167,6 +167,44 @@ wire::Envelope SessionsReply() {
   return envelope;
 }
 
+wire::Envelope Keyframes() {
+  wire::Envelope envelope = Of(6);
+  wire::KeyframesRequest& keyframes = *envelope.mutable_keyframes_request();
+  keyframes.set_vehicle("car.7");
+  keyframes.set_session("monday");
+  keyframes.set_after_sequence(11);
+  return envelope;
+}
+
+wire::Envelope KeyframesReply() {
+  wire::Envelope envelope = Of(6);
+  wire::KeyframeInfo& keyframe = *envelope.mutable_keyframes_reply()->add_keyframes();
+  const wire::Envelope uploaded = Upload();
+  keyframe.set_sequence(uploaded.upload_keyframe().key().sequence());
+  keyframe.set_time_ms(uploaded.upload_keyframe().time_ms());
+  *keyframe.mutable_pose() = uploaded.upload_keyframe().pose();
+  return envelope;
+}
+
+// The first keyframe of a session that is to stay out of the map.
+wire::Envelope StagedUpload() {
+  wire::Envelope envelope = Upload();
+  envelope.set_request_id(7);
+  wire::UploadKeyframe& upload = *envelope.mutable_upload_keyframe();
+  *upload.mutable_key() = KeyToWire({{"car.7", "tuesday"}, 0});
+  upload.set_staged(true);
+  return envelope;
+}
+
+wire::Envelope Publication() {
+  wire::Envelope envelope = Of(8);
+  wire::ChangeSession& change = *envelope.mutable_change_session();
+  change.set_vehicle("car.7");
+  change.set_session("tuesday");
+  change.set_action(wire::ChangeSession::PUBLISH);
+  return envelope;
+}
+
 wire::Envelope Manifest() {
   wire::Envelope envelope = Of(2);
   wire::SyncManifest& manifest = *envelope.mutable_sync_manifest();
@@ -203,9 +241,10 @@ TEST(DocumentedFramesTest, AreWhatThisBuildWrites) {
     return EncodeEnvelopeFrame(envelope).value();
   };
   const std::vector<Bytes> written = {
-      frame(Hello()),      frame(Backup()),        frame(Sync()),        frame(Watch()),
-      frame(HelloReply()), frame(Upload()),        frame(UploadReply()), frame(Busy()),
-      frame(Sessions()),   frame(SessionsReply()), frame(Manifest()),    TileFrame(),
+      frame(Hello()),        frame(Backup()),        frame(Sync()),        frame(Watch()),
+      frame(HelloReply()),   frame(Upload()),        frame(UploadReply()), frame(Busy()),
+      frame(Sessions()),     frame(SessionsReply()), frame(Keyframes()),   frame(KeyframesReply()),
+      frame(StagedUpload()), frame(Publication()),   frame(Manifest()),    TileFrame(),
       frame(SyncEnd())};
   EXPECT_EQ(DocumentedFrames(), written);
 }

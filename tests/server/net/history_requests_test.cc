@@ -112,6 +112,56 @@ TEST_F(HistoryRequestTest, ASessionIsQuarantinedReleasedAndPurged) {
   EXPECT_EQ(Digest().tiles, 0u);
 }
 
+TEST_F(HistoryRequestTest, AStagedSessionIsListedAndPublished) {
+  Serve();
+  UploadDrive(2);
+  const AtlasDigest day = Digest();
+  const auto peer = Connect();
+  for (std::uint32_t i = 3; i < 6; ++i) {
+    const UploadRequest upload = DriveUpload(i, "night");
+    wire::Envelope request;
+    wire::UploadKeyframe& message = *request.mutable_upload_keyframe();
+    *message.mutable_key() = KeyToWire(upload.key);
+    message.set_time_ms(upload.time_ms);
+    *message.mutable_pose() = PoseToWire(upload.pose);
+    message.set_blob(BytesToWire(upload.blob));
+    message.set_staged(true);
+    peer->Send(request);
+    EXPECT_EQ(peer->Receive()->upload_reply().tiles_marked(), 0u);
+  }
+  EXPECT_EQ(Digest().sha256, day.sha256);
+  wire::Envelope sessions;
+  sessions.mutable_sessions_request();
+  peer->Send(sessions);
+  EXPECT_EQ(peer->Receive()->sessions_reply().sessions(1).state(), "staged");
+  wire::Envelope keyframes;
+  keyframes.mutable_keyframes_request()->set_vehicle("bus");
+  keyframes.mutable_keyframes_request()->set_session("night");
+  keyframes.mutable_keyframes_request()->set_limit(2);
+  peer->Send(keyframes);
+  const auto first = peer->Receive()->keyframes_reply();
+  ASSERT_EQ(first.keyframes_size(), 2);
+  EXPECT_TRUE(first.has_more());
+  EXPECT_EQ(first.keyframes(1).sequence(), 4u);
+  EXPECT_EQ(*PoseFromWire(first.keyframes(1).pose()), DriveUpload(4).pose);
+  keyframes.mutable_keyframes_request()->set_after_sequence(4);
+  peer->Send(keyframes);
+  const auto rest = peer->Receive()->keyframes_reply();
+  ASSERT_EQ(rest.keyframes_size(), 1);
+  EXPECT_FALSE(rest.has_more());
+  keyframes.mutable_keyframes_request()->set_session("dusk");
+  peer->Send(keyframes);
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kNotFound);
+  keyframes.mutable_keyframes_request()->set_session("a/b");
+  peer->Send(keyframes);
+  EXPECT_EQ(CodeOf(peer->Receive()), StatusCode::kInvalidArgument);
+  peer->Send(ChangeOf("night", wire::ChangeSession::PUBLISH));
+  const auto published = peer->Receive()->change_session_reply();
+  EXPECT_EQ(published.state(), "live");
+  EXPECT_GT(published.tiles_marked(), 0u);
+  EXPECT_NE(Digest().sha256, day.sha256);
+}
+
 TEST_F(HistoryRequestTest, BadSessionChangesAreTyped) {
   Serve();
   UploadDrive(1);

@@ -17,6 +17,7 @@ std::unique_ptr<Command> MakePosesApplyCommand();
 std::unique_ptr<Command> MakeRestoreCommand();
 std::unique_ptr<Command> MakeSessionRestoreCommand();
 std::unique_ptr<Command> MakeSessionReleaseCommand();
+std::unique_ptr<Command> MakeSessionPublishCommand();
 std::unique_ptr<Command> MakeSessionPurgeCommand();
 std::unique_ptr<Command> MakeSessionRetractCommand();
 std::unique_ptr<Command> MakeSessionsCommand();

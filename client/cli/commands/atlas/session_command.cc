@@ -1,5 +1,6 @@
 // `atlas session retract V/S` and `atlas session restore V/S`: a drive out of the map and back;
-// `release V/S`: out of quarantine for good; `purge V/S`: deleted.
+// `publish V/S`: a staged one into it; `release V/S`: out of quarantine for good; `purge V/S`:
+// deleted.
 // `atlas vehicle retract V` and `restore V`: all its drives.
 #include "client/cli/commands/atlas/atlas_commands.h"
 #include "client/cli/commands/atlas/author_flag.h"
@@ -154,6 +155,11 @@ std::unique_ptr<Command> MakeSessionReleaseCommand() {
   return std::make_unique<SessionCommand>(
       "release", "Put a quarantined session into the map, and never quarantine it again",
       SessionAction::kRelease);
+}
+
+std::unique_ptr<Command> MakeSessionPublishCommand() {
+  return std::make_unique<SessionCommand>("publish", "Put a staged session into the map",
+                                          SessionAction::kPublish);
 }
 
 std::unique_ptr<Command> MakeSessionPurgeCommand() {

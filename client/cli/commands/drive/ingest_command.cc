@@ -2,6 +2,8 @@
 #include <chrono>
 #include <filesystem>
 
+#include "client/cli/commands/drive/anchor_text.h"
+#include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
 #include "client/cli/output/json_text.h"
@@ -21,26 +23,33 @@ double FrontendMsPerScan(const IngestReport& report) {
 }
 
 boost::json::object ReportJson(const IngestReport& report, double wall_s) {
-  return {{"keyframes", report.keyframes},
-          {"empty_scans", report.empty_scans},
-          {"acked", report.upload.totals.acked},
-          {"duplicates", report.upload.totals.duplicates},
-          {"sent_before", report.upload.sent_before},
-          {"reconnections", report.upload.reconnections},
-          {"metres", Rounded(report.metres, 3)},
-          {"bytes_sent", report.upload.totals.bytes_sent},
-          {"frontend_ms_per_scan", Rounded(FrontendMsPerScan(report), 3)},
-          {"sensor_height_m", Rounded(report.mount.height_m, 3)},
-          {"sensor_tilt_deg", Rounded(report.mount.TiltDeg(), 2)},
-          {"sessions", report.sessions},
-          {"impossible_steps", report.impossible_steps.size()},
-          {"wall_s", Rounded(wall_s, 3)}};
+  boost::json::object json = {{"keyframes", report.keyframes},
+                              {"empty_scans", report.empty_scans},
+                              {"acked", report.upload.totals.acked},
+                              {"duplicates", report.upload.totals.duplicates},
+                              {"sent_before", report.upload.sent_before},
+                              {"reconnections", report.upload.reconnections},
+                              {"metres", Rounded(report.metres, 3)},
+                              {"bytes_sent", report.upload.totals.bytes_sent},
+                              {"frontend_ms_per_scan", Rounded(FrontendMsPerScan(report), 3)},
+                              {"sensor_height_m", Rounded(report.mount.height_m, 3)},
+                              {"sensor_tilt_deg", Rounded(report.mount.TiltDeg(), 2)},
+                              {"sessions", report.sessions},
+                              {"impossible_steps", report.impossible_steps.size()},
+                              {"wall_s", Rounded(wall_s, 3)}};
+  if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
+  if (!report.anchors.empty()) json["anchors"] = AnchorsJson(report.anchors);
+  return json;
 }
 
 void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
   FactList facts;
   facts.Add("keyframes", StrCat(report.keyframes, " along ", FixedText(report.metres, 1), " m, ",
                                 report.sessions, " session(s)"));
+  if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
+  for (const SessionAnchor& anchor : report.anchors) {
+    facts.Add("anchor", AnchorText(anchor));
+  }
   facts.Add("acknowledged", StrCat(report.upload.totals.acked, ", of them ",
                                    report.upload.totals.duplicates, " were there already"));
   if (report.upload.sent_before > 0) {
@@ -92,7 +101,15 @@ class IngestCommand : public Command {
     arguments.Optional("--batch", "N", batch_, "Keyframes on their way at a time [64]");
     arguments.Optional("--sensor-height", "M", options_.sensor_height_m,
                        "Above the ground [estimated]");
-    arguments.Choice("--deskew", {"on", "off"}, deskew_, "Undo the vehicle's motion during a scan");
+    arguments.Choice("--deskew", {"on", "off", "auto"}, deskew_,
+                     "Undo the vehicle's motion during a scan; auto: where that makes it sharper");
+    arguments.Flag("--staged", options_.is_staged,
+                   "Keep it out of the map until `atlas session publish`");
+    arguments.Flag(
+        "--anchor", is_anchored_,
+        "The drive has a frame of its own: find it in the map first; staged if it is not");
+    arguments.Optional("--prior", "X,Y", prior_m_, "With --anchor: where it begins, in the atlas");
+    arguments.Optional("--prior-radius", "M", prior_radius_m_, "How far off that is at most");
     arguments.Optional("--start", "T", options_.start_s,
                        "Seconds added to the scans' times [0]: who drives later has the last word");
   }
@@ -127,7 +144,7 @@ class IngestCommand : public Command {
     } else {
       PrintReport(*report, wall.count(), context.out);
     }
-    return {};
+    return CheckAnchored(report->anchors);
   }
 
  private:
@@ -138,12 +155,31 @@ class IngestCommand : public Command {
     options_.selection.parity = *parity;
     options_.selection.begin = range_.begin;
     options_.selection.end = range_.end;
-    options_.is_deskewed = deskew_ == "on";
+    const Result<Deskewing> deskewing = ParseDeskewing(deskew_);
+    if (!deskewing) return deskewing.error();
+    options_.deskewing = *deskewing;
     options_.upload.max_in_flight = batch_;
     options_.now_s =
         std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
     options_.session = {vehicle_, session_.value_or(FolderName())};
+    ATLAS_RETURN_IF_ERROR(CompleteAnchor());
     return options_.Validate();
+  }
+
+  Status CompleteAnchor() {
+    if (prior_m_.has_value() != prior_radius_m_.has_value()) {
+      return {StatusCode::kInvalidArgument, "--prior and --prior-radius need each other"};
+    }
+    if (!is_anchored_) {
+      return prior_m_ ? Status(StatusCode::kInvalidArgument, "--prior needs --anchor") : Status();
+    }
+    options_.anchor.emplace();
+    if (prior_m_) {
+      auto& prior = options_.anchor->prior.emplace();
+      prior.center = *prior_m_;
+      prior.radius_m = *prior_radius_m_;
+    }
+    return {};
   }
 
   std::string FolderName() const {
@@ -166,6 +202,9 @@ class IngestCommand : public Command {
   std::string vehicle_ = "vehicle";
   std::optional<std::string> session_;
   std::string deskew_ = "off";
+  bool is_anchored_ = false;
+  std::optional<Eigen::Vector2d> prior_m_;
+  std::optional<double> prior_radius_m_;
   NumberRange range_;
   std::uint32_t batch_ = 64;
   IngestOptions options_ = DefaultOptions();

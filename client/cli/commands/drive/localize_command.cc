@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
 #include "client/cli/commands/drive/relocalization_text.h"
@@ -41,17 +42,20 @@ boost::json::value ErrorJson(const LocalizationScore& score, double error) {
 
 boost::json::object SummaryJson(const DriveLocalizationReport& report,
                                 std::uint64_t bytes_received) {
-  return {{"type", "summary"},
-          {"translation_rmse_m", ErrorJson(report.score, report.score.translation_rmse_m())},
-          {"rotation_rmse_deg", ErrorJson(report.score, report.score.rotation_rmse_deg())},
-          {"translation_p95_m", ErrorJson(report.score, report.score.translation_p95_m())},
-          {"failures", report.score.failures()},
-          {"lost", report.score.lost()},
-          {"restarts", report.restarts},
-          {"scans", report.scans},
-          {"shots", report.score.shots()},
-          {"hz", Rounded(report.hz(), 2)},
-          {"bytes_received", bytes_received}};
+  boost::json::object json{
+      {"type", "summary"},
+      {"translation_rmse_m", ErrorJson(report.score, report.score.translation_rmse_m())},
+      {"rotation_rmse_deg", ErrorJson(report.score, report.score.rotation_rmse_deg())},
+      {"translation_p95_m", ErrorJson(report.score, report.score.translation_p95_m())},
+      {"failures", report.score.failures()},
+      {"lost", report.score.lost()},
+      {"restarts", report.restarts},
+      {"scans", report.scans},
+      {"shots", report.score.shots()},
+      {"hz", Rounded(report.hz(), 2)},
+      {"bytes_received", bytes_received}};
+  if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
+  return json;
 }
 
 void PrintSummary(const DriveLocalizationReport& report,
@@ -67,6 +71,7 @@ void PrintSummary(const DriveLocalizationReport& report,
                                   FixedText(score.rotation_rmse_deg(), 3), " deg RMSE; ",
                                   FixedText(score.translation_p95_m(), 3), " m at 95 %"));
   facts.Add("failures", StrCat(score.failures(), ", of them ", score.lost(), " lost"));
+  if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
   facts.Add("speed", FixedText(report.hz(), 1) + " scans a CPU second");
   facts.Add("received", BytesText(bytes_received));
   facts.Print(out);
@@ -93,6 +98,8 @@ class LocalizeCommand : public Command {
     arguments.Flag("--relocalize", relocalize_, "Find each scan alone, with no start");
     arguments.Optional("--prior-radius", "M", prior_radius_m_,
                        "With --relocalize: within so far of a position that is given");
+    arguments.Choice("--deskew", {"on", "off", "auto"}, deskew_,
+                     "Undo the predicted motion during a scan; auto: where drives are skewed");
     arguments.Choice("--mode", {"atlas", "paper"}, mode_,
                      "How scans are matched; paper: its encode, decode and ICP, to compare with");
     track_.Declare(arguments);
@@ -123,6 +130,9 @@ class LocalizeCommand : public Command {
     options_.rings = drive_.rings();
     options_.mode = mode_ == "paper" ? LocalizationMode::kPaper : LocalizationMode::kAtlas;
     options_.selection.parity = *parity;
+    const Result<Deskewing> deskewing = ParseDeskewing(deskew_);
+    if (!deskewing) return deskewing.error();
+    options_.deskewing = *deskewing;
     if (trials_ && !perturbation_) {
       return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
     }
@@ -130,10 +140,11 @@ class LocalizeCommand : public Command {
     if (prior_radius_m_ && !relocalize_) {
       return {StatusCode::kInvalidArgument, "--prior-radius needs --relocalize"};
     }
-    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || track_.is_wanted())) {
+    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off" ||
+                        track_.is_wanted())) {
       return {StatusCode::kInvalidArgument,
               "--relocalize takes no start and no track: without --perturb, --no-restart, --mode "
-              "paper, --output and --plot"};
+              "paper, --deskew, --output and --plot"};
     }
     if (perturbation_) {
       options_.shots = {perturbation_->translation_m,
@@ -197,6 +208,7 @@ class LocalizeCommand : public Command {
   std::optional<double> prior_radius_m_;
   TrackOutput track_;
   std::string mode_ = "atlas";
+  std::string deskew_ = "off";
   std::optional<Perturbation> perturbation_;
   std::optional<std::uint32_t> trials_;
   DriveLocalizationOptions options_;

@@ -222,7 +222,7 @@ std::vector<std::int64_t> ListKeyframesBefore(Connection& connection,
 
 std::vector<std::int64_t> ListKeyframesBehind(Connection& connection,
                                               std::int64_t session_id,
-                                              std::uint32_t sequence,
+                                              std::int64_t sequence,
                                               std::size_t count) {
   Query row = connection.Prepare(
       "SELECT id FROM keyframes WHERE session_id = ? AND sequence > ? ORDER BY sequence LIMIT ?");

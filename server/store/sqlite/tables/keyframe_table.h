@@ -49,7 +49,7 @@ std::vector<std::int64_t> ListKeyframesBefore(Connection& connection,
                                               std::size_t count);
 std::vector<std::int64_t> ListKeyframesBehind(Connection& connection,
                                               std::int64_t session_id,
-                                              std::uint32_t sequence,
+                                              std::int64_t sequence,
                                               std::size_t count);
 // kInvalidData when the row, its session, its pose, its tiles of now or its blob is damaged: fusion
 // cannot have it.

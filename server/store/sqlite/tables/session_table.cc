@@ -373,10 +373,11 @@ void AddLostSession(Connection& connection,
   WriteSession(connection, row);
 }
 
-SessionRow AddSession(Connection& connection, const SessionKey& key) {
+SessionRow AddSession(Connection& connection, const SessionKey& key, SessionState state) {
   SessionRow row;
   row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));
   row.record.key = key;
+  row.record.state = state;
   WriteSession(connection, row);
   return row;
 }

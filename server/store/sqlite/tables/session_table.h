@@ -64,8 +64,7 @@ void AddLostSession(Connection& connection,
                     std::int64_t id,
                     const SessionKey& key,
                     SessionState state);
-// A new live one.
-SessionRow AddSession(Connection& connection, const SessionKey& key);
+SessionRow AddSession(Connection& connection, const SessionKey& key, SessionState state);
 void WriteSession(Connection& connection, const SessionRow& row);
 // Counts one more keyframe in.
 SessionRow CountKeyframe(Connection& connection, SessionRow session, const NewKeyframe& keyframe);

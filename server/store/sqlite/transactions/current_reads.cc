@@ -1,7 +1,9 @@
 #include "server/store/sqlite/transactions/current_reads.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
@@ -39,6 +41,41 @@ std::vector<std::int64_t> ListKeyframeRows(Connection& connection,
     ids.push_back(row.Int());
   }
   return ids;
+}
+
+Result<std::optional<SessionRecord>> FindSessionRecord(Connection& connection,
+                                                       const SessionKey& key) {
+  auto row = FindSession(connection, key);
+  if (!row) {
+    return Error(row.error());
+  }
+  return *row ? std::optional((*row)->record) : std::nullopt;
+}
+
+Result<KeyframePage> ReadKeyframePage(Connection& connection,
+                                      const SessionKey& session,
+                                      std::optional<std::uint32_t> after_sequence,
+                                      std::uint32_t limit) {
+  const auto row = FindSession(connection, session);
+  if (!row) {
+    return Error(row.error());
+  }
+  if (!*row) {
+    return Error(StatusCode::kNotFound, StrCat("session ", session, " is not in the atlas"));
+  }
+  std::vector<std::int64_t> ids = ListKeyframesBehind(
+      connection, (*row)->id, after_sequence ? std::int64_t{*after_sequence} : -1, limit + 1U);
+  KeyframePage page;
+  page.has_more = ids.size() > limit;
+  ids.resize(std::min<std::size_t>(ids.size(), limit));
+  for (const std::int64_t id : ids) {
+    auto record = ReadKeyframeRecord(connection, id);
+    if (!record) {
+      return Error(record.error());
+    }
+    page.keyframes.push_back(*std::move(record));
+  }
+  return page;
 }
 
 Result<TileSources> GatherTileSources(Connection& connection,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,14 @@ namespace atlas {
 // One for each key, in their order.
 Result<FoundKeyframes> FindKeyframeRecords(Connection& connection,
                                            std::span<const KeyframeKey> keys);
+// nullopt: unknown.
+Result<std::optional<SessionRecord>> FindSessionRecord(Connection& connection,
+                                                       const SessionKey& key);
+// As AtlasStore::ListKeyframes.
+Result<KeyframePage> ReadKeyframePage(Connection& connection,
+                                      const SessionKey& session,
+                                      std::optional<std::uint32_t> after_sequence,
+                                      std::uint32_t limit);
 // In ascending order, beginning behind `after_id`.
 std::vector<std::int64_t> ListKeyframeRows(Connection& connection,
                                            std::int64_t after_id,

@@ -17,17 +17,13 @@ namespace {
 
 constexpr std::uint32_t kPage = 256;  // sessions read at a time
 
-// What a retracted session is when it is back. One that nobody released is judged by what came
-// meanwhile, too.
-Result<SessionJudgement> JudgeRestored(Connection& connection,
-                                       const SessionRow& session,
-                                       const SessionChange& change) {
-  const auto before = ReadStateBeforeRetraction(connection, session.id);
-  if (!before) {
-    return Error(before.error());
-  }
-  SessionJudgement judgement{*before, ""};
-  if (*before != SessionState::kReleased && change.limits) {
+// What a session is that comes into the map: judged, where there is something to judge it by.
+SessionJudgement JudgeEntering(Connection& connection,
+                               const SessionRow& session,
+                               SessionState unjudged,
+                               const SessionChange& change) {
+  SessionJudgement judgement{unjudged, ""};
+  if (change.limits) {
     judgement = JudgeSession(connection, session, *change.limits);
   }
   if (judgement.state != SessionState::kQuarantined) {
@@ -36,10 +32,30 @@ Result<SessionJudgement> JudgeRestored(Connection& connection,
   return judgement;
 }
 
+// What a retracted session is when it is back. One that nobody released is judged by what came
+// meanwhile, too; a staged one when it is published.
+Result<SessionJudgement> JudgeRestored(Connection& connection,
+                                       const SessionRow& session,
+                                       const SessionChange& change) {
+  const auto before = ReadStateBeforeRetraction(connection, session.id);
+  if (!before) {
+    return Error(before.error());
+  }
+  const bool is_judged = *before != SessionState::kReleased && *before != SessionState::kStaged;
+  return is_judged ? JudgeEntering(connection, session, *before, change)
+                   : SessionJudgement{*before, change.reason};
+}
+
 Result<SessionJudgement> StateAfter(Connection& connection,
                                     const SessionRow& session,
                                     const SessionChange& change) {
   const SessionState state = session.record.state;
+  const bool is_let_in =
+      change.action == SessionAction::kRelease || change.action == SessionAction::kPublish;
+  if (is_let_in && state == SessionState::kRetracted) {
+    return Error(StatusCode::kConflict,
+                 StrCat("session ", change.key, " is retracted: restore it first"));
+  }
   switch (change.action) {
     case SessionAction::kRetract:
       return SessionJudgement{SessionState::kRetracted, change.reason};
@@ -47,11 +63,15 @@ Result<SessionJudgement> StateAfter(Connection& connection,
       return state == SessionState::kRetracted ? JudgeRestored(connection, session, change)
                                                : SessionJudgement{state, ""};
     case SessionAction::kRelease:
-      if (state == SessionState::kRetracted) {
+      if (state == SessionState::kStaged) {
         return Error(StatusCode::kConflict,
-                     StrCat("session ", change.key, " is retracted: restore it first"));
+                     StrCat("session ", change.key, " is staged: publish it first"));
       }
       return SessionJudgement{SessionState::kReleased, change.reason};
+    case SessionAction::kPublish:
+      return state == SessionState::kStaged
+                 ? JudgeEntering(connection, session, SessionState::kLive, change)
+                 : SessionJudgement{state, ""};
     case SessionAction::kPurge:
       break;
   }
@@ -66,6 +86,8 @@ EventKind KindOf(SessionAction action) {
       return EventKind::kRestore;
     case SessionAction::kRelease:
       return EventKind::kSessionReleased;
+    case SessionAction::kPublish:
+      return EventKind::kSessionPublished;
     case SessionAction::kPurge:
       break;
   }

@@ -156,7 +156,8 @@ Result<SessionRow> FindOrBeginSession(Connection& connection, const NewKeyframe&
       return Error(std::move(status));
     }
   }
-  return AddSession(connection, key);
+  return AddSession(connection, key,
+                    keyframe.is_staged ? SessionState::kStaged : SessionState::kLive);
 }
 
 Status CheckRoom(Connection& connection, const NewKeyframe& keyframe, UploadRoom& room) {

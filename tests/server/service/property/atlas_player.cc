@@ -163,6 +163,7 @@ UploadRequest AtlasPlayer::RequestOf(const Placing& placing) const {
   request.time_ms = content.time_ms;
   request.pose = placing.pose;
   request.blob = content.blob;
+  request.is_staged = frame.is_staged;
   return request;
 }
 

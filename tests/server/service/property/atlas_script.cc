@@ -37,6 +37,8 @@ const char* NameOf(SessionAction action) {
       return "restore";
     case SessionAction::kRelease:
       return "release";
+    case SessionAction::kPublish:
+      return "publish";
     case SessionAction::kPurge:
       return "purge";
   }
@@ -90,7 +92,7 @@ std::ostream& operator<<(std::ostream& out, const AtlasScript& script) {
     const ScriptFrame& frame = script.frames[i];
     out << "frame " << i << ": " << frame.key << ", radius "
         << frame.contents[0].keyframe->grid.radius_cells << ", time " << frame.contents[0].time_ms
-        << " ms\n";
+        << " ms" << (frame.is_staged ? ", staged" : "") << '\n';
   }
   const PlausibilityLimits& limits = script.plausibility;
   out << "plausible: " << limits.max_speed_mps << " m/s and " << limits.max_jump_m << " m, "

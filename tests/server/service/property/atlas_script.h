@@ -29,6 +29,7 @@ struct FrameContent {
 
 struct ScriptFrame {
   KeyframeKey key;
+  bool is_staged = false;                // as all of its session
   std::array<FrameContent, 3> contents;  // the right one, another scan, the same at another time
 };
 
@@ -45,7 +46,7 @@ enum class StepKind {
   kUpload,         // each placing of the step, without waiting for the answer
   kUploadTwice,    // all of them from two threads at once, the second in reverse order
   kMovePoses,      // one batch
-  kChangeSession,  // retract, restore, release or purge
+  kChangeSession,  // retract, restore, release, publish or purge
   kCompact,        // what was taken before `before_ms`
   kAwaitAnswers,   // to all that was sent
   kCompare,        // when clean: with the oracle

@@ -16,7 +16,9 @@
 namespace atlas::testing {
 
 Result<PutKeyframeResult> ModelAtlas::Put(const Placing& placing) {
-  Session& session = sessions_[SessionOf(placing.frame)];
+  const bool is_staged = script_.frames[placing.frame].is_staged;
+  const Session begun{is_staged ? SessionState::kStaged : SessionState::kLive, false, !is_staged};
+  Session& session = sessions_.try_emplace(SessionOf(placing.frame), begun).first->second;
   if (session.state == SessionState::kPurged) {
     return Error(StatusCode::kConflict, "purged");
   }
@@ -125,7 +127,12 @@ SessionState ModelAtlas::StateAfter(const SessionKey& key, SessionAction action)
       if (session.state != SessionState::kRetracted) {
         return session.state;
       }
+      if (!session.is_published) {
+        return SessionState::kStaged;
+      }
       return session.is_released ? SessionState::kReleased : Judge(key);
+    case SessionAction::kPublish:
+      return session.state == SessionState::kStaged ? Judge(key) : session.state;
     case SessionAction::kRelease:
       return SessionState::kReleased;
     case SessionAction::kPurge:
@@ -154,16 +161,19 @@ Result<SessionChangeResult> ModelAtlas::Change(const SessionKey& key, SessionAct
   }
   Session& session = found->second;
   const bool is_purged = session.state == SessionState::kPurged;
-  const bool is_retracted = session.state == SessionState::kRetracted;
+  const bool is_release = action == SessionAction::kRelease;
+  const bool is_publish = action == SessionAction::kPublish;
   if ((is_purged && action != SessionAction::kPurge) ||
-      (is_retracted && action == SessionAction::kRelease)) {
+      (session.state == SessionState::kRetracted && (is_release || is_publish)) ||
+      (session.state == SessionState::kStaged && is_release)) {
     return Error(StatusCode::kConflict, "not in this state");
   }
   SessionChangeResult result;
   result.state = StateAfter(key, action);
   const bool was_in_map = IsInMap(session.state);
   result.is_changed = std::exchange(session.state, result.state) != result.state;
-  session.is_released = session.is_released || action == SessionAction::kRelease;
+  session.is_released = session.is_released || is_release;
+  session.is_published = session.is_published || is_publish;
   if (was_in_map != IsInMap(result.state)) {
     result.tiles_marked = Touch(TilesOf(key));
   }

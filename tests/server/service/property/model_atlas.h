@@ -51,6 +51,7 @@ class ModelAtlas {
   struct Session {
     SessionState state = SessionState::kLive;
     bool is_released = false;
+    bool is_published = false;  // or never was staged
   };
 
   const SessionKey& SessionOf(std::size_t frame) const { return script_.frames[frame].key.session; }

@@ -136,8 +136,9 @@ void Drawing::DrawLimits() {
 void Drawing::DrawSession(const SessionKey& key) {
   std::uint32_t sequence = Below(20);
   const std::uint32_t count = 1 + Below(8);
+  const bool is_staged = OneIn(4);
   for (std::uint32_t i = 0; i < count; ++i) {
-    ScriptFrame frame{{key, sequence}, {}};
+    ScriptFrame frame{{key, sequence}, is_staged, {}};
     levels_.push_back(DrawTilt(is_repeated_ ? 0.0 : 5.0));
     FrameContent& right = frame.contents[0];
     const bool is_again = repeated_scan_ && !OneIn(6);
@@ -282,10 +283,11 @@ void Drawing::AddChange() {
   Step step;
   step.kind = StepKind::kChangeSession;
   step.session = sessions_[Below(static_cast<std::uint32_t>(sessions_.size()))];
-  const std::uint32_t chance = Below(16);
+  const std::uint32_t chance = Below(20);
   step.action = chance < 6    ? SessionAction::kRetract
                 : chance < 12 ? SessionAction::kRestore
                 : chance < 15 ? SessionAction::kRelease
+                : chance < 19 ? SessionAction::kPublish
                               : SessionAction::kPurge;
   script_.steps.push_back(step);
   if (OneIn(4)) {

@@ -54,7 +54,7 @@ class Drawing {
                                   : RandomKeyframe(script_.profile, 16, number);
     FrameContent content{100 * std::int64_t{number}, nullptr, EncodeKeyframe(keyframe)};
     content.keyframe = std::make_shared<const Keyframe>(std::move(keyframe));
-    script_.frames.push_back({{{"car", session}, number}, {content, content, content}});
+    script_.frames.push_back({{{"car", session}, number}, false, {content, content, content}});
     poses_.push_back(Level(at));
     Add(StepKind::kUpload, {number, poses_.back(), 0});
     Add(StepKind::kAwaitAnswers, {});
