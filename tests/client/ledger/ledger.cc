@@ -52,6 +52,8 @@ std::string_view WordOf(SessionAction action) {
       return "release";
     case SessionAction::kPurge:
       return "purge";
+    case SessionAction::kPublish:
+      return "publish";
   }
   return "";
 }

@@ -44,6 +44,8 @@ std::string_view StateAfter(SessionAction action) {
       return "released";
     case SessionAction::kPurge:
       return "purged";
+    case SessionAction::kPublish:
+      return "live";
   }
   return "";
 }
