@@ -49,8 +49,8 @@ struct IngestReport {
 // named and nothing is uploaded. A daemon that is busy is waited for, a connection that breaks is
 // made again, both for as long as the patience; what an interrupted run left with the daemon is not
 // made and sent again (lasting_upload.h). Fails at once where the daemon cannot be reached at all,
-// and at the first keyframe that it refuses otherwise, naming it; what was acknowledged until then
-// stays.
+// or takes nothing of this vehicle from this client (kPermissionDenied), and at the first keyframe
+// that it refuses otherwise, naming it; what was acknowledged until then stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
                                  AtlasLink& link,
