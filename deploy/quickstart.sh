@@ -1,12 +1,17 @@
 #!/usr/bin/env bash
 # From a fresh machine to a map on the screen: installs, builds `release`, starts atlasd on loopback,
 # maps a drive, localizes a second pass in it, plans a route, draws a picture.
-# Usage: deploy/quickstart.sh [KITTI_FOLDER]
+# Usage: deploy/quickstart.sh [DRIVE]
 #   Without a folder: a simulated multi-storey garage; a second drive with another seed is localized.
-#   With one (velodyne/ and poses.txt): its even scans are mapped, the odd ones localized.
+#   With one (velodyne/ and poses.txt, docs/data.md): its even scans are mapped, the odd ones localized.
 # Leaves everything in build/quickstart; run again, it starts over.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
+if (($# > 0)) && [[ ! -d $1/velodyne || ! -f $1/poses.txt ]]; then
+  echo "quickstart: there is no drive in '$1': expected velodyne/ and poses.txt. docs/data.md says where public drives" \
+    "come from; without a folder a drive is simulated" >&2
+  exit 2
+fi
 drive=${1:+$(cd "$1" && pwd)}
 cd "$root"
 . deploy/packages.sh

@@ -15,6 +15,7 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include "client/connection/tls_hint.h"
 #include "core/base/str_cat.h"
 #include "proto/wire/frame.h"
 
@@ -174,7 +175,8 @@ Result<bool> DaemonConnection::Impl::Step(Clock::time_point latest, Clock::time_
   Run(opened_, latest);
   if (!opened_) return false;
   if (*opened_) {
-    return Error(Fail(StatusCode::kUnavailable, StrCat(Doing(), ": ", opened_->message())));
+    const auto hint = stage_ == Stage::kEncrypting ? MayNotSpeakTls(*opened_) : "";
+    return Error(Fail(StatusCode::kUnavailable, StrCat(Doing(), ": ", opened_->message(), hint)));
   }
   Status begun = stage_ == Stage::kConnecting ? BeginTalking() : Status();
   if (!begun.ok()) return Error(std::move(begun));
@@ -304,11 +306,16 @@ Result<bool> DaemonConnection::Impl::ReadSome(Clock::time_point deadline) {
   Run(read_, deadline);
   if (!read_) return false;
   is_reading_ = false;
-  if (*read_) {
-    return Error(Fail(StatusCode::kUnavailable, StrCat("waiting for a reply: ", read_->message())));
+  const bool is_first = bytes_received_ == 0 && !tls_;
+  const ByteSpan came = ByteSpan(chunk_).first(*read_ ? 0 : read_bytes_);
+  if (*read_ || (is_first && IsTlsAlert(came))) {
+    return Error(
+        Fail(StatusCode::kUnavailable,
+             StrCat("waiting for a reply: ", *read_ ? read_->message() : "a TLS alert came",
+                    is_first ? kMayExpectTls : "")));
   }
   bytes_received_ += read_bytes_;
-  decoder_.Push(ByteSpan(chunk_).first(read_bytes_));
+  decoder_.Push(came);
   return true;
 }
 

@@ -53,7 +53,8 @@ void UploadTotals::Add(const UploadTotals& more) {
 KeyframeUploader::KeyframeUploader(const AtlasClient& client, const UploadOptions& options)
     : channel_(client.channel_),
       takes_staged_(client.CheckMinor(kMinorWithStaged, "a staged session")),
-      options_(options) {}
+      options_(options),
+      taken_(options_.now()) {}
 
 KeyframeUploader::~KeyframeUploader() {
   const auto channel = channel_.lock();
@@ -92,7 +93,7 @@ Status KeyframeUploader::Upload(const KeyframeUpload& upload) {
   InFlight next{next_number_++, 0, upload, upload.blob.size(), {}};
   open_.insert(next.number);
   if (options_.patience.count() > 0) {
-    if (next.number == 0) taken_ = Clock::now();
+    if (next.number == 0) taken_ = options_.now();
     next.blob.assign(upload.blob.begin(), upload.blob.end());
     next.upload.blob = next.blob;
   }
@@ -138,7 +139,7 @@ void KeyframeUploader::NoteRefusal(InFlight upload, const Status& refusal) {
   const bool is_busy = refusal.code() == StatusCode::kUnavailable;
   // The first of a round decides for those behind it, which wait for it: they are refused a moment
   // later, and it is the one to be named when the patience ends.
-  if (is_busy && (!busy_.empty() || Clock::now() - taken_ < options_.patience)) {
+  if (is_busy && (!busy_.empty() || options_.now() - taken_ < options_.patience)) {
     busy_.push_back(std::move(upload));
     return;
   }
@@ -198,7 +199,7 @@ Status KeyframeUploader::OnAnswer(const Answer& answer) {
             StrCat("keyframe ", key, ": the daemon answered with something else")};
   }
   const wire::UploadReply& ack = reply.upload_reply();
-  taken_ = Clock::now();
+  taken_ = options_.now();
   ++totals_.acked;
   open_.erase(answered.number);
   totals_.duplicates += ack.duplicate() ? 1U : 0U;

@@ -27,6 +27,8 @@ struct UploadOptions {
   // With a daemon that is busy (kUnavailable): what it refused is sent again, in the same order and
   // not before the daemon wants it, until it has taken nothing for so long. 0: not at all.
   std::chrono::milliseconds patience{0};
+  // The clock that the patience goes by.
+  std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
 struct UploadTotals {
@@ -104,8 +106,8 @@ class KeyframeUploader {
   std::size_t in_flight_bytes_ = 0;
   std::vector<InFlight> busy_;  // refused, to be sent again
   std::uint64_t next_number_ = 0;
-  std::set<std::uint64_t> open_;            // numbers that were not acknowledged
-  Clock::time_point taken_ = Clock::now();  // when the daemon took one last
+  std::set<std::uint64_t> open_;  // numbers that were not acknowledged
+  Clock::time_point taken_;       // when the daemon took one last
   Status first_refusal_;
 };
 

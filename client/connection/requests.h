@@ -133,6 +133,9 @@ struct SessionSummary {
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
   std::string reason;           // of a state that is not "live"; empty: of a daemon before 1.9, too
   bool is_damaged = false;      // `reason` says what; of a "damaged" one only the name is known
+
+  // Released ones are: somebody let them in.
+  bool IsInMap() const { return state == "live" || state == "released"; }
 };
 
 struct SessionChangeSummary {

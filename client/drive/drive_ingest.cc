@@ -35,6 +35,22 @@ SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
   return survey;
 }
 
+// As the daemon would with the first keyframe (docs/protocol.md, "Who may ask for what"), but
+// before every scan is read for it. Of a role that is not known here the daemon has the word.
+Status CheckMayUpload(const AtlasIdentity& atlas, const std::string& vehicle) {
+  const auto deny = [&atlas](const std::string& what) {
+    return Status(
+        StatusCode::kPermissionDenied,
+        StrCat(atlas.our_name.empty() ? "without a certificate or a token" : atlas.our_name,
+               ", with the role ", atlas.our_role, ", may not ", what));
+  };
+  if (atlas.our_role == "reader" || atlas.our_role == "merge") return deny("upload keyframes");
+  if (atlas.our_role == "vehicle" && !atlas.our_name.empty() && atlas.our_name != vehicle) {
+    return deny(StrCat("upload for the vehicle ", vehicle, " (--vehicle)"));
+  }
+  return {};
+}
+
 class Ingest {
  public:
   Ingest(const DriveFolder& drive, const IngestOptions& options)
@@ -254,6 +270,10 @@ Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const LastingUpload::Progress& progress) {
   const Result<AtlasClient*> client = link.Client(options.connect_timeout);
   if (!client) return Error(client.error());
+  const std::string& vehicle = options.session.vehicle;
+  if (Status status = CheckMayUpload((*client)->atlas(), vehicle); !status.ok()) {
+    return Error(std::move(status));
+  }
   Ingest ingest(drive, options);
   if (Status status = ingest.Prepare((*client)->profile()); !status.ok()) {
     return Error(std::move(status));

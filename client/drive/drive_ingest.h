@@ -57,9 +57,10 @@ struct IngestReport {
 // named and nothing is uploaded. A daemon that is busy is waited for, a connection that breaks is
 // made again, both for as long as the patience; what an interrupted run left with the daemon is not
 // made and sent again (lasting_upload.h). An anchored drive's session that is there is gone on with
-// in the frame that it has there. Fails at once where the daemon cannot be reached at all,
-// or where a session that is to be staged is there and not staged (kConflict), and at the first
-// keyframe that it refuses otherwise, naming it; what was acknowledged until then stays.
+// in the frame that it has there. Fails at once where the daemon cannot be reached at all or takes
+// nothing of this vehicle from this client (kPermissionDenied), or where a session that is to be
+// staged is there and not staged (kConflict), and at the first keyframe that it refuses otherwise,
+// naming it; what was acknowledged until then stays.
 Result<IngestReport> IngestDrive(const DriveFolder& drive,
                                  const IngestOptions& options,
                                  AtlasLink& link,

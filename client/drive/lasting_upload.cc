@@ -21,17 +21,22 @@ LastingUpload::LastingUpload(std::vector<PlannedKeyframe> planned,
       progress_(std::move(progress)) {}
 
 Status LastingUpload::Run(AtlasLink& link) {
-  acknowledged_ = Clock::now();
+  const Status status = UploadAll(link);
+  if (!IsAllAcknowledged() || !IsTemporary(status.code())) return status;
+  report_.sessions_unknown = status;
+  return {};
+}
+
+Status LastingUpload::UploadAll(AtlasLink& link) {
+  acknowledged_ = options_.now();
   Result<AtlasClient*> client = link.Wait(options_.patience);
   while (client) {
-    const std::uint64_t acked_before = report_.totals.acked;
+    const std::uint64_t before = acknowledgements_;
     Status status = RunOn(**client);
     if (status.ok()) status = ReadSessions(**client);
     if (status.ok()) return status;
     if (!(*client)->is_broken()) return Refused(status);
-    if (report_.totals.acked > acked_before) {
-      link.Report({});  // it worked: the next attempt is a first one
-    }
+    if (acknowledgements_ > before) link.Report({});  // it worked: the next attempt is a first one
     link.Report(status);
     client = Reconnect(link, status);
   }
@@ -66,7 +71,7 @@ Status LastingUpload::Refused(const Status& status) const {
 }
 
 Result<AtlasClient*> LastingUpload::Reconnect(AtlasLink& link, const Status& why) {
-  const auto lost_for = std::chrono::duration_cast<milliseconds>(Clock::now() - acknowledged_);
+  const auto lost_for = std::chrono::duration_cast<milliseconds>(options_.now() - acknowledged_);
   Result<AtlasClient*> client =
       lost_for < options_.patience ? link.Wait(options_.patience - lost_for) : Error(why);
   if (!client) return Error(GivenUp(why, client.error()));
@@ -76,21 +81,20 @@ Result<AtlasClient*> LastingUpload::Reconnect(AtlasLink& link, const Status& why
 
 Status LastingUpload::GivenUp(const Status& broke, const Status& failure) const {
   const auto lost_for =
-      std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - acknowledged_);
-  const bool may_pass = IsTemporary(failure.code());
-  const std::string where = next_ < planned_.size()
-                                ? StrCat("keyframe ", planned_[next_].key)
-                                : "all keyframes were acknowledged; their sessions";
+      std::chrono::duration_cast<std::chrono::seconds>(options_.now() - acknowledged_);
+  const bool may_pass = IsTemporary(failure.code()) && !IsAllAcknowledged();
+  const std::string where = IsAllAcknowledged() ? "all keyframes were acknowledged; their sessions"
+                                                : StrCat("keyframe ", planned_[next_].key);
   return {
       failure.code(),
       StrCat(where, ": the connection broke (", broke.message(), "), and ", lost_for.count(),
-             " s after the ", report_.totals.acked > 0 ? "last acknowledgement" : "beginning", ": ",
+             " s after the ", acknowledgements_ > 0 ? "last acknowledgement" : "beginning", ": ",
              failure.message(),
              may_pass ? "; the same command goes on there once the daemon can be reached" : "")};
 }
 
 Status LastingUpload::RunOn(AtlasClient& client) {
-  if (epoch_ != client.atlas().epoch) ATLAS_RETURN_IF_ERROR(FindStart(client));
+  ATLAS_RETURN_IF_ERROR(FindStart(client));
   KeyframeUploader uploader(client, options_);
   Status status = SendAll(uploader);
   // It is either there or refused when this returns.
@@ -101,13 +105,24 @@ Status LastingUpload::RunOn(AtlasClient& client) {
     }
   }
   next_ += uploader.first_open();
-  if (uploader.totals().acked > 0) acknowledged_ = uploader.taken();
+  NoteAnswers(uploader);
   report_.totals.Add(uploader.totals());
   return status;
 }
 
+void LastingUpload::NoteAnswers(const KeyframeUploader& uploader) {
+  acknowledgements_ += uploader.totals().acked;
+  if (uploader.totals().acked > 0) acknowledged_ = uploader.taken();
+}
+
 Status LastingUpload::FindStart(AtlasClient& client) {
-  next_ = there_ = 0;
+  if (epoch_ != client.atlas().epoch) {
+    epoch_ = client.atlas().epoch;
+    is_started_ = false;
+    compared_.clear();
+    next_ = there_ = 0;
+  }
+  if (is_started_) return {};
   if (!planned_.empty()) {
     const auto sessions = client.ListSessions(planned_.front().key.session.vehicle);
     if (!sessions) return sessions.error();
@@ -115,17 +130,27 @@ Status LastingUpload::FindStart(AtlasClient& client) {
     there_ = CountSentBefore(planned_, *sessions);
     next_ = there_ - std::min(there_, kSentTwice);
   }
-  if (!epoch_) report_.sent_before = next_;
-  epoch_ = client.atlas().epoch;
+  report_.sent_before = left_out_ = std::min<std::uint64_t>(left_out_, next_);
+  is_started_ = true;
   return {};
 }
 
 Status LastingUpload::Compare(AtlasClient& client, std::span<const SessionSummary> sessions) {
+  std::vector<std::size_t> open = FindThere(planned_, sessions);
+  std::erase_if(open, [this](std::size_t i) { return compared_.contains(i); });
   KeyframeUploader uploader(client, options_);
-  for (const std::size_t i : FindThere(planned_, sessions)) {
-    ATLAS_RETURN_IF_ERROR(send_(i, uploader));
+  Status status;
+  for (auto i = open.begin(); i != open.end() && status.ok(); ++i) {
+    status = SendOne(*i, uploader);
   }
-  return uploader.Finish();
+  if (status.ok()) status = uploader.Finish();
+  NoteAnswers(uploader);
+  // Of what is counted as acknowledged these are not, for they are sent again.
+  report_.totals.sent += uploader.totals().sent;
+  report_.totals.bytes_sent += uploader.totals().bytes_sent;
+  const auto answered = static_cast<std::ptrdiff_t>(uploader.first_open());
+  compared_.insert(open.begin(), open.begin() + answered);
+  return status;
 }
 
 Status LastingUpload::SendAll(KeyframeUploader& uploader) {
@@ -139,10 +164,18 @@ Status LastingUpload::SendAll(KeyframeUploader& uploader) {
       ATLAS_RETURN_IF_ERROR(uploader.Finish());
     }
     ++of_session;
-    ATLAS_RETURN_IF_ERROR(send_(i, uploader));
+    ATLAS_RETURN_IF_ERROR(SendOne(i, uploader));
     if (progress_) progress_(i + 1, planned_.size());
   }
   return uploader.Finish();
+}
+
+// Hears what was answered meanwhile first: once sending fails nothing is heard any more, and it
+// would be sent again.
+Status LastingUpload::SendOne(std::size_t i, KeyframeUploader& uploader) {
+  const Result<bool> is_answered = uploader.FinishUntil(Clock::now());
+  if (!is_answered) return is_answered.error();
+  return send_(i, uploader);
 }
 
 }  // namespace atlas

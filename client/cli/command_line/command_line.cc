@@ -188,15 +188,17 @@ Result<ConnectionOptions> ConnectionFrom(const CommonFlags& common, const Comman
 }
 
 Status RunCommand(Command& command, const CommonFlags& common, const CommandLineIo& io) {
-  CommandContext context{io.out, io.err, common.is_json, io.is_err_terminal, io.is_out_terminal,
-                         {},     {}};
-  if (common.atlas_file) {  // of a daemon nothing is asked: how it is reached does not matter
-    context.atlas_file = *common.atlas_file;
-    return command.Run(context);
-  }
-  Result<ConnectionOptions> connection = ConnectionFrom(common, io);
+  // Of a daemon nothing is asked beside a file: how it is reached does not matter.
+  Result<ConnectionOptions> connection =
+      common.atlas_file ? ConnectionOptions() : ConnectionFrom(common, io);
   if (!connection) return connection.error();
-  context.connection = *std::move(connection);
+  CommandContext context{io.out,
+                         io.err,
+                         common.is_json,
+                         io.is_err_terminal,
+                         io.is_out_terminal,
+                         *std::move(connection),
+                         common.atlas_file};
   return command.Run(context);
 }
 

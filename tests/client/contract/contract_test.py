@@ -18,7 +18,7 @@ from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 
 KEYS = {
     "ingest": "keyframes acked duplicates sent_before reconnections metres bytes_sent frontend_ms_per_scan "
-              "sensor_height_m sessions wall_s",
+              "sensor_height_m sessions session_states wall_s",
     "wait": "revision dirty_tiles",
     "status": "revision preset keyframes sessions tiles dirty_tiles damaged_tiles store_bytes tile_bytes keyframe_bytes "
               "cells multilayer_cells rss_bytes compacted quarantined used_bytes store_limit_bytes disk_free_bytes "

@@ -1,6 +1,9 @@
 // `atlas ingest` over a link that breaks, and after a run that was interrupted.
+#include <array>
 #include <atomic>
+#include <map>
 #include <memory>
+#include <thread>
 #include <utility>
 
 #include "client/drive/drive_ingest.h"
@@ -136,6 +139,7 @@ TEST_F(IngestResumeTest, OtherOptionsThanTheFirstRunsAreAConflict) {
   const CommandRun other = Ingest(daemon, {"--rings", "8"});
   EXPECT_EQ(other.exit_code, static_cast<int>(ExitCode::kConflict)) << other.err;
   EXPECT_NE(other.err.find("with other content"), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("(--sensor-height)"), std::string::npos) << other.err;
   EXPECT_EQ(Connect(daemon).ReadStatus()->keyframes, 30U) << "none of them was stored";
   EXPECT_EQ(Digest(daemon), first);
   EXPECT_EQ(Ingest(daemon).exit_code, 0) << "the right command goes on";
@@ -167,15 +171,63 @@ TEST_F(IngestResumeTest, WhatIsThereBesidesAndWhatIsNotInTheMapIsTold) {
   // Another drive whose numbers lie between: nobody can know until one is met.
   const CommandRun other = Ingest(daemon, {"--rings", "8", "--range", "0:4"});
   EXPECT_EQ(other.exit_code, static_cast<int>(ExitCode::kConflict)) << other.err;
-  EXPECT_NE(other.err.find("before it 2 keyframes of this run"), std::string::npos) << other.err;
+  // The first one, and what was on its way when the second was refused.
+  const auto stored = std::to_string(Connect(daemon).ReadStatus()->keyframes - 5);
+  EXPECT_NE(other.err.find("before it " + stored + " keyframes of this run"), std::string::npos)
+      << other.err;
   const CommandRun right = Ingest(daemon, {"--scans", "odd", "--range", "0:10"});
   EXPECT_EQ(right.exit_code, 0) << right.err;
-  EXPECT_NE(right.err.find("vehicle/overpass has 2 keyframes more"), std::string::npos)
+  EXPECT_NE(right.err.find("vehicle/overpass has " + stored + " keyframes more"), std::string::npos)
       << right.err;
   ASSERT_EQ(RunAtlas(daemon.address(), {"session", "retract", "vehicle/overpass"}).exit_code, 0);
   const CommandRun again = Ingest(daemon, {"--scans", "odd", "--range", "0:10"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_NE(again.err.find("is retracted, not in the map"), std::string::npos) << again.err;
+  const auto& states = again.json().at("session_states").as_array();
+  ASSERT_EQ(states.size(), 1U);
+  EXPECT_EQ(states[0].at("session"), "overpass");
+  EXPECT_EQ(states[0].at("state"), "retracted");
+  EXPECT_EQ(states[0].at("in_map"), false);
+  EXPECT_EQ(std::to_string(states[0].at("others").to_number<int>()), stored);
+}
+
+TEST_F(IngestResumeTest, AReleasedSessionIsInTheMap) {
+  const DaemonProcess daemon(NewData(), {"--cell-size", "0.2", "--quarantine-max-speed-mps", "1",
+                                         "--quarantine-max-jump-m", "0"});
+  const CommandRun fast = Ingest(daemon);
+  ASSERT_EQ(fast.exit_code, 0) << fast.err;
+  ASSERT_NE(fast.err.find("is quarantined, not in the map"), std::string::npos) << fast.err;
+  ASSERT_EQ(RunAtlas(daemon.address(), {"session", "release", "vehicle/overpass"}).exit_code, 0);
+  const CommandRun again = Ingest(daemon);
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(again.err.find("vehicle/overpass is"), std::string::npos) << again.err;
+  EXPECT_EQ(again.json().at("session_states").at(0).at("in_map"), true);
+}
+
+// Each begins with a keyframe alone, and one of these comes first.
+TEST_F(IngestResumeTest, OfTwoDrivesThatAreSentAtOnceUnderOneNameOneIsStored) {
+  const std::vector<std::vector<std::string>> drives = {{}, {"--rings", "8"}};
+  std::map<std::string, std::size_t> digests;  // of each alone
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const DaemonProcess daemon(NewData(), kSmall);
+    ASSERT_EQ(Ingest(daemon, drives[i]).exit_code, 0);
+    digests[Digest(daemon)] = i;
+  }
+  ASSERT_EQ(digests.size(), 2U);
+  for (int round = 0; round < 3; ++round) {
+    const DaemonProcess daemon(NewData(), kSmall);
+    std::array<CommandRun, 2> runs;
+    std::thread other([&] { runs[1] = Ingest(daemon, drives[1]); });
+    runs[0] = Ingest(daemon, drives[0]);
+    other.join();
+    const std::string digest = Digest(daemon);
+    ASSERT_TRUE(digests.contains(digest)) << "a mixture";
+    const std::size_t winner = digests[digest];
+    EXPECT_EQ(runs[winner].exit_code, 0) << runs[winner].err;
+    const CommandRun& loser = runs[1 - winner];
+    EXPECT_EQ(loser.exit_code, static_cast<int>(ExitCode::kConflict)) << loser.err;
+    EXPECT_EQ(loser.err.find("were stored"), std::string::npos) << loser.err;
+  }
 }
 
 TEST_F(IngestResumeTest, NorDoesOneThatBeginsBeforeWhatIsThere) {

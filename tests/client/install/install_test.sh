@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# Installs the client library into a folder of its own, builds a project of a vehicle and the examples
-# of docs/client.md against it, and runs the project. Usage: install_test.sh SOURCE BUILD BIN CMAKE COMPILER
+# Installs the programs and the client library into a folder of their own, builds a project of a vehicle and
+# the examples of docs/client.md against it, and runs all of them. Usage: install_test.sh SOURCE BUILD CMAKE COMPILER
 set -euo pipefail
-source=$1 build=$2 bin=$3 cmake=$4 compiler=$5
+source=$1 build=$2 cmake=$3 compiler=$4
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$cmake" --install "$build" --prefix "$folder/prefix" >/dev/null
+"$cmake" --install "$build" --prefix "$folder/programs" --component programs >/dev/null
+[[ $(find "$folder/programs" -type f -printf '%P\n' | sort | xargs) == "bin/atlas bin/atlasd" ]]
 if grep -rlE '<boost/asio|\.pb\.h|google/protobuf|<openssl|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
   echo "public headers include what should stay behind the library"
   exit 1
@@ -20,9 +22,10 @@ awk '/^```cpp$/ { on = 1; next } /^```$/ { on = 0 } on' "$source/docs/client.md"
 
 # An atlas without a tile, as its daemon left it.
 mkfifo "$folder/said"
-"$bin/atlasd" --data "$folder/atlas" --listen 127.0.0.1:0 --log-level error >"$folder/said" &
+"$folder/prefix/bin/atlasd" --data "$folder/atlas" --listen 127.0.0.1:0 --log-level error >"$folder/said" &
 daemon=$!
-head -n 1 "$folder/said" >/dev/null
+read -r _ address <"$folder/said"
+"$folder/prefix/bin/atlas" status --server "$address" >/dev/null
 kill "$daemon"
 wait "$daemon"
 [[ $("$folder/build/map_of_file" "$folder/atlas/atlas.db" 0 0) == "0 tiles, current" ]]

@@ -44,6 +44,10 @@ void PeerSocket::Drain() {
   }
 }
 
+void PeerSocket::EndWriting() {
+  shutdown(fd_, SHUT_WR);
+}
+
 TestPeer::TestPeer(std::function<void(PeerSocket&)> serve)
     : listener_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in address{};

@@ -25,6 +25,8 @@ class PeerSocket {
   std::optional<wire::Envelope> ReadRequest();
   // Reads and drops until the client closes.
   void Drain();
+  // Nothing more is written: the client hears all that was, and then the end.
+  void EndWriting();
 
  private:
   int fd_;

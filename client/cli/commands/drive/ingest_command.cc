@@ -6,6 +6,7 @@
 #include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/commands/drive/session_text.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
@@ -68,20 +69,6 @@ void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
   facts.Print(out);
 }
 
-// What the upload alone would not have left.
-void TellOf(const UploadedSession& session, std::ostream& err) {
-  const SessionSummary& summary = session.summary;
-  if (summary.state != "live") {
-    err << "note: session " << StrCat(summary.key) << " is " << summary.state << ", not in the map"
-        << (summary.reason.empty() ? "" : ": " + summary.reason) << '\n';
-  }
-  if (session.others > 0) {
-    err << "note: session " << StrCat(summary.key) << " has " << session.others
-        << " keyframes more than were selected here: of another selection of the same drive, or of "
-           "another drive\n";
-  }
-}
-
 class IngestCommand : public Command {
  public:
   std::string Name() const override { return "ingest"; }
@@ -135,12 +122,12 @@ class IngestCommand : public Command {
                   << "): the daemon keeps their session out of the map unless it is released "
                      "(atlas session release)\n";
     }
-    for (const UploadedSession& session : report->upload.sessions) {
-      TellOf(session, context.err);
-    }
+    PrintSessionNotes(report->upload, context.err);
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     if (context.is_json) {
-      context.PrintJson(ReportJson(*report, wall.count()));
+      boost::json::object json = ReportJson(*report, wall.count());
+      json["session_states"] = SessionStatesJson(report->upload);
+      context.PrintJson(json);
     } else {
       PrintReport(*report, wall.count(), context.out);
     }

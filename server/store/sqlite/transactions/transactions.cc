@@ -221,9 +221,10 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
         StrCat(
             "keyframe ", keyframe.key,
             " is in the atlas with other content: another scan, time (--start), range, number of "
-            "rings, --deskew, sensor height and tilt (estimated from other scans of the folder?), "
-            "or "
-            "another version's way to make it; --session gives it a name of its own"));
+            "rings, --deskew, sensor height (--sensor-height) or tilt, which are estimated from "
+            "scans "
+            "of the whole folder and change where that has grown, or another version's way to make "
+            "it; --session gives it a name of its own"));
   }
   return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
 }
