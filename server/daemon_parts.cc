@@ -68,6 +68,9 @@ Result<std::unique_ptr<AtlasStore>> OpenStore(const DaemonConfig& config,
   options.on_damaged_log = [](const std::string& what) {
     spdlog::error("{}", what);
   };
+  options.on_repair = [](const std::string& what) {
+    spdlog::error("damage was put right: {}", what);
+  };
   Result<std::unique_ptr<AtlasStore>> store = OpenSqliteStore(options);
   if (store) {
     if (Status status = config.CheckAgainst((*store)->identity().profile); !status.ok()) {

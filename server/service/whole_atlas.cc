@@ -1,6 +1,11 @@
 #include "server/service/whole_atlas.h"
 
+#include <algorithm>
+#include <chrono>
+#include <limits>
 #include <utility>
+
+#include "core/base/str_cat.h"
 
 namespace atlas {
 
@@ -53,7 +58,7 @@ Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
   if (!repaired) {
     return repaired;
   }
-  if (const auto clean = wait_.UntilCleanInTime(patience); !clean) {
+  if (const auto clean = UntilCleanOrFull(patience); !clean) {
     return Error(clean.error());
   }
   auto left = VerifyInTime(request.rebuild, patience);
@@ -66,6 +71,28 @@ Result<VerifyReport> WholeAtlas::Verify(const VerifyRequest& request,
   return left;
 }
 
+Result<WaitOutcome> WholeAtlas::UntilCleanOrFull(const Patience& patience) const {
+  constexpr std::chrono::seconds kSlice(2);  // workers try once a second
+  std::uint64_t left = std::numeric_limits<std::uint64_t>::max();
+  while (true) {
+    const auto begin = std::chrono::steady_clock::now();
+    const Patience slice{std::min(patience.deadline, begin + kSlice), patience.stop};
+    auto clean = wait_.UntilClean(slice);
+    if (!clean || !clean->is_timed_out) {
+      return clean;
+    }
+    if (patience.is_over()) {
+      return wait_.UntilCleanInTime(patience);
+    }
+    const auto refusal = store_.ReadWriteFigures().last_refusal;
+    if (refusal && refusal->when >= begin && clean->dirty_tiles >= left) {
+      return Error(refusal->why.WithContext(
+          StrCat(clean->dirty_tiles, " tiles are to be fused, and cannot be written")));
+    }
+    left = clean->dirty_tiles;
+  }
+}
+
 Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const Patience& patience) const {
   AtlasVerifier::Options options;
   options.request.rebuild = rebuild;
@@ -73,7 +100,7 @@ Result<VerifyReport> WholeAtlas::VerifyInTime(bool rebuild, const Patience& pati
   while (true) {
     std::uint64_t clean_revision = 0;
     if (rebuild) {
-      const auto clean = wait_.UntilCleanInTime(patience);
+      const auto clean = UntilCleanOrFull(patience);
       if (!clean) {
         return Error(clean.error());
       }

@@ -36,6 +36,9 @@ class WholeAtlas {
 
  private:
   Result<VerifyReport> VerifyInTime(bool rebuild, const Patience& patience) const;
+  // Ends with what the store refuses to write where nothing is fused for that: a disk that filled
+  // would be waited for without end.
+  Result<WaitOutcome> UntilCleanOrFull(const Patience& patience) const;
   // Of an atlas without dirty tiles, nor damage.
   Result<std::uint64_t> CleanRevision(const Patience& patience) const;
 

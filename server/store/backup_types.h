@@ -58,6 +58,10 @@ struct BackupNote {
 // A restore leaves so many revisions out: what was given after the backup, and is lost, is given to
 // nothing else.
 inline constexpr std::uint64_t kRevisionsLeftOut = std::uint64_t{1} << 32;
+// How often revisions were left out before this one: more changes than that no atlas lives to see.
+constexpr std::uint64_t LineOf(std::uint64_t revision) {
+  return revision / kRevisionsLeftOut;
+}
 
 struct RestoreOrder {
   std::filesystem::path backup;

@@ -3,21 +3,19 @@
 #include <algorithm>
 
 #include "core/base/str_cat.h"
-#include "server/store/backup_types.h"
 
 namespace atlas {
 
 Status StoreIdentity::CheckNotLost(std::uint64_t revision) const {
-  const auto lost = std::find_if(restores.begin(), restores.end(), [revision](std::uint64_t next) {
-    return revision < next && next - revision <= kRevisionsLeftOut;
+  const auto found = std::find_if(lost.begin(), lost.end(), [revision](const LostRevisions& range) {
+    return range.after < revision && revision < range.before;
   });
-  if (lost == restores.end()) {
+  if (found == lost.end()) {
     return {};
   }
-  return {
-      StatusCode::kNotFound,
-      StrCat("revision ", revision, " is lost: the atlas went on from revision ",
-             *lost - kRevisionsLeftOut - 1, ", that of a backup or of what its log still told")};
+  return {StatusCode::kNotFound,
+          StrCat("revision ", revision, " is lost: the atlas went on from revision ", found->after,
+                 ", that of a backup or of what its log still told")};
 }
 
 }  // namespace atlas

@@ -21,14 +21,21 @@
 
 namespace atlas {
 
+// Those between the two may have been given to what is lost.
+struct LostRevisions {
+  std::uint64_t after = 0;
+  std::uint64_t before = 0;
+
+  friend bool operator==(const LostRevisions&, const LostRevisions&) = default;
+};
+
 // Fixed when the atlas was created.
 struct StoreIdentity {
   MapProfile profile;
   std::array<std::uint8_t, 16> atlas_id{};
   std::uint64_t epoch = 1;  // moves when the atlas goes on from an earlier revision (new_line.h)
-  // At which revisions it went on after that. Those left out before each may have been given to
-  // what is lost.
-  std::vector<std::uint64_t> restores = {};
+  // Those left out before it went on.
+  std::vector<LostRevisions> lost = {};
 
   // kNotFound: a revision that is lost.
   Status CheckNotLost(std::uint64_t revision) const;

@@ -53,6 +53,10 @@ Result<VerifyReport> AtlasVerifier::Run() {
   if (Status status = RepairTables(TableRepair::kSums); !status.ok()) {
     return Error(std::move(status));
   }
+  if (!unnoted_.empty()) {
+    report_.findings.push_back(
+        StrCat("what was found could not be noted, and is as it was: ", unnoted_));
+  }
   return std::move(report_);
 }
 
@@ -85,7 +89,7 @@ Status AtlasVerifier::HandleKeyframe(std::int64_t id, const Status& damage) {
   if (!options_.request.repair) {
     const auto noted =
         Await<std::uint32_t>([&](auto done) { store_.NoteDamage({id}, std::move(done)); });
-    return noted ? Status() : noted.error();
+    return noted ? Status() : Unnoted(noted.error());
   }
   const auto outcome = Await<RepairOutcome>([&](auto done) {
     store_.RepairKeyframe({id, options_.request.author, FootprintOf(id), true}, std::move(done));
@@ -103,7 +107,7 @@ Status AtlasVerifier::HandleTile(const TileId& id) {
   const auto marked =
       Await<std::uint32_t>([&](auto done) { store_.MarkDirty({id}, std::move(done)); });
   if (!marked) {
-    return marked.error();
+    return Unnoted(marked.error());
   }
   ++report_.restored;
   ++report_.marks;
@@ -118,6 +122,18 @@ Status AtlasVerifier::HandlePlaceOf(const TileId& id) {
   }
   const auto decoded = DecodeTile((*tile)->blob, store_.identity().profile);
   return decoded && decoded->id != id ? HandleTile(decoded->id) : Status();
+}
+
+// A disk that takes nothing keeps nobody from being told what is found on it.
+Status AtlasVerifier::Unnoted(const Status& refusal) {
+  const bool is_of_the_disk = refusal.code() == StatusCode::kResourceExhausted ||
+                              refusal.code() == StatusCode::kPermissionDenied ||
+                              refusal.code() == StatusCode::kUnavailable;
+  if (!is_of_the_disk || options_.request.repair) {
+    return refusal;
+  }
+  unnoted_ = refusal.message();
+  return {};
 }
 
 // Counts damage; every other failure ends the verification.

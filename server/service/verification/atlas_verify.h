@@ -72,6 +72,7 @@ class AtlasVerifier {
   Status CompareTile(const TileId& id, const std::optional<StoredTile>& stored);
   Status CheckParentExists(const TileId& id);
   Status Note(Status problem);
+  Status Unnoted(const Status& refusal);
   Status Mismatch(const TileId& id, const std::string& what);
 
   AtlasStore& store_;
@@ -81,6 +82,7 @@ class AtlasVerifier {
   TileCache tiles_{0};  // what is verified is read
   TileBuilder builder_;
   VerifyReport report_;
+  std::string unnoted_;  // why what is found cannot be written down; empty: it can
 };
 
 }  // namespace atlas

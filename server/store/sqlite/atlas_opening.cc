@@ -22,6 +22,7 @@
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/session_table.h"
+#include "server/store/sqlite/transactions/atlas_past.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/new_line.h"
 #include "server/store/sqlite/transactions/transactions.h"
@@ -181,10 +182,24 @@ std::string NoteLoss(Connection& writer, StoreIdentity& identity, const DamagedL
   return what;
 }
 
+// By the events that are behind.
+std::vector<std::string> ListMended(Connection& writer, std::int64_t last_event) {
+  std::vector<std::string> mended;
+  ScanEvents(writer, [&](const Event& event) {
+    const bool is_new = static_cast<std::int64_t>(event.id) > last_event;
+    if (is_new && !event.is_damaged && event.kind != EventKind::kUpgraded) {
+      mended.push_back(StrCat(EventName(event.kind), ": ", event.subject,
+                              event.subject.empty() ? "" : ": ", event.detail));
+    }
+  });
+  return mended;
+}
+
 // What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
-// marked again.
-void Mend(Connection& writer, std::uint8_t levels) {
+// marked again. What there was, for people.
+std::vector<std::string> Mend(Connection& writer, std::uint8_t levels) {
   writer.Begin();
+  const std::int64_t last_event = writer.Ask("SELECT coalesce(max(id), 0) FROM events");
   RestoreCounters(writer);
   FinishMigration(writer);
   std::vector<SessionRow> sessions;
@@ -203,6 +218,7 @@ void Mend(Connection& writer, std::uint8_t levels) {
     MarkAllInStore(writer, status.message(), levels);
   }
   writer.Commit();
+  return ListMended(writer, last_event);
 }
 
 }  // namespace
@@ -245,7 +261,11 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
     }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
-    Mend(*writer, identity->profile.levels);
+    for (const std::string& what : Mend(*writer, identity->profile.levels)) {
+      if (options.on_repair) {
+        options.on_repair(what);
+      }
+    }
     const auto tell = [&options](const std::string& what) {
       if (options.on_damaged_log) {
         options.on_damaged_log(what);
@@ -258,11 +278,9 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       tell(NoteLoss(*writer, *identity, *log));
     }
     KeepVehicleBytes(*writer);
-    identity->restores = RevisionsOf(*writer, EventKind::kBackupRestored);
-    const auto losses = RevisionsOf(*writer, EventKind::kLogDamaged);
-    identity->restores.insert(identity->restores.end(), losses.begin(), losses.end());
-    const bool has_purged = !RevisionsOf(*writer, EventKind::kSessionPurged).empty();
-    return OpenedAtlas{std::move(*identity), std::move(writer), has_purged};
+    AtlasPast past = ReadPast(*writer);
+    identity->lost = std::move(past.lost);
+    return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged};
   } catch (const std::exception& error) {
     return Error(StatusFromException(error).WithContext(directory.database_file().string()));
   }

@@ -14,7 +14,7 @@ namespace atlas {
 struct OpenedAtlas {
   StoreIdentity identity;
   std::unique_ptr<Connection> writer;
-  bool has_purged = false;  // the log may have what was to be overwritten
+  bool may_have_purged = false;  // the log may have what was to be overwritten
 };
 
 // Errors as OpenSqliteStore. The directory stays locked by the caller.

@@ -19,6 +19,9 @@ namespace atlas {
 namespace fs = std::filesystem;
 namespace {
 
+// The index of the log has 32 KiB; the rest is for what file systems round up.
+constexpr off_t kRoomBytes = 64 * 1024;
+
 std::string ReadHolder(int fd) {
   std::array<char, 32> text{};
   const ssize_t size = ::pread(fd, text.data(), text.size() - 1, 0);
@@ -111,11 +114,36 @@ DataDirectory::DataDirectory(fs::path directory, int lock_fd)
     : directory_(std::move(directory)), lock_fd_(lock_fd) {}
 
 DataDirectory::DataDirectory(DataDirectory&& other) noexcept
-    : directory_(std::move(other.directory_)), lock_fd_(std::exchange(other.lock_fd_, -1)) {}
+    : directory_(std::move(other.directory_)),
+      lock_fd_(std::exchange(other.lock_fd_, -1)),
+      keeps_room_(other.keeps_room_) {}
 
 DataDirectory::~DataDirectory() {
-  if (lock_fd_ >= 0) {
-    ::close(lock_fd_);
+  if (lock_fd_ < 0) {
+    return;
+  }
+  if (keeps_room_ && has_atlas()) {
+    KeepRoom();
+  }
+  ::close(lock_fd_);
+}
+
+void DataDirectory::FreeRoom() {
+  std::error_code ignored;  // of what cannot be removed there is none
+  fs::remove(room_file(), ignored);
+  keeps_room_ = true;
+}
+
+void DataDirectory::KeepRoom() const {
+  const int fd = ::open(room_file().c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  if (fd < 0) {
+    return;
+  }
+  const bool is_kept = ::posix_fallocate(fd, 0, kRoomBytes) == 0;
+  ::close(fd);
+  if (!is_kept) {
+    std::error_code ignored;
+    fs::remove(room_file(), ignored);
   }
 }
 

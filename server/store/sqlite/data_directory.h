@@ -33,11 +33,19 @@ class DataDirectory {
   Status Publish() const;
   std::uint64_t StoreBytes() const;
 
+  // To open the atlas takes room for what SQLite makes beside it, without which not even what is
+  // stored can be read. Frees what was kept for that; as much is kept again where the disk has it
+  // when this goes, behind all connections.
+  void FreeRoom();
+
  private:
   DataDirectory(std::filesystem::path directory, int lock_fd);
+  std::filesystem::path room_file() const { return directory_ / "atlas.db.room"; }
+  void KeepRoom() const;
 
   std::filesystem::path directory_;
   int lock_fd_ = -1;
+  bool keeps_room_ = false;
 };
 
 }  // namespace atlas

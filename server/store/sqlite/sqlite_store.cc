@@ -67,7 +67,7 @@ class SqliteStore final : public AtlasStore {
                  }},
                 guard_),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {
-    if (atlas.has_purged) {
+    if (atlas.may_have_purged) {
       log_.EmptySoon();
     }
   }
@@ -381,6 +381,7 @@ Result<std::unique_ptr<AtlasStore>> OpenSqliteStore(const SqliteStoreOptions& op
   if (!directory) {
     return Error(directory.error());
   }
+  directory->FreeRoom();
   auto atlas = OpenAtlas(*directory, options);
   if (!atlas) {
     return Error(atlas.error());

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "server/store/atlas_store.h"
 
@@ -31,6 +32,8 @@ struct SqliteStoreOptions {
   std::function<void(std::int64_t)> on_upgrade = {};
   // Told what is lost because the log is damaged (log_damage.h), and where the log is kept.
   std::function<void(const std::string&)> on_damaged_log = {};
+  // Told each damage that was put right before the atlas is served.
+  std::function<void(const std::string&)> on_repair = {};
 };
 
 // Opens the atlas in the directory, or makes one if it is missing or empty and a profile is given.

@@ -79,6 +79,8 @@ TEST_F(LostKeysTest, AKeyframeThatIsStoredTwiceBecomesOne) {
   EXPECT_THAT(Events(), ::testing::HasSubstr("keyframe bus/day/5: it was stored twice"));
   ExpectWhole(intact_);
   EXPECT_TRUE(Upload(DriveUpload(5))->is_duplicate);
+  EXPECT_EQ(store_->CheckRevision(kDrive).code(), StatusCode::kNotFound)
+      << "what there was of the other one is gone";
 }
 
 TEST_F(LostKeysTest, TilesOfAKeyframeThatIsStoredTwiceAreNotFused) {
@@ -113,6 +115,31 @@ TEST_F(LostKeysTest, ACorrectionOfTheSecondOneIsKept) {
   ExpectWhole(moved);
 }
 
+// The index found the second one for a while, and then the first again.
+TEST_F(LostKeysTest, ACorrectionOfTheSecondOneThatTheFirstHadLaterIsNotTaken) {
+  const auto move = [this](double x_m) {
+    return Move({{{{"bus", "day"}, 5}, PoseOf({x_m, 1.0, 1.8, 5.0})}});
+  };
+  Fill();
+  ASSERT_TRUE(move(3.0));
+  const AtlasDigest moved = Digest();
+  Close();
+  std::filesystem::remove_all(directory_ / "data");
+  Fill();
+  LoseKeyframe();
+  ASSERT_FALSE(Upload(DriveUpload(5))->is_duplicate);
+  ASSERT_TRUE(move(2.0));
+  Close();
+  testing::TurnBits(Database(), "sqlite_autoindex_keyframes_1", {4, 9, 1, 1, 5, 9}, 4, 1);
+  testing::TurnBits(Database(), "sqlite_autoindex_keyframes_1", {4, 9, 1, 1, 69, 6}, 4, 64);
+  Open(1);
+  const auto later = move(3.0);
+  ASSERT_TRUE(later) << later.error().message();
+  EXPECT_EQ(store_->ReadKeyframeRecord(6)->pose, PoseOf({3.0, 1.0, 1.8, 5.0}));
+  ASSERT_TRUE(Repair());
+  ExpectWhole(moved);
+}
+
 TEST_F(LostKeysTest, OtherBytesUnderTheKeyGo) {
   Fill();
   LoseKeyframe();
@@ -131,12 +158,18 @@ TEST_F(LostKeysTest, TheSecondOneHealsTheFirst) {
     Fill();
     LoseKeyframe();
     ASSERT_TRUE(Upload(DriveUpload(5)));
+    Close();
+    const auto revision =
+        testing::AskDatabase(Database(), "SELECT revision FROM keyframes WHERE id = 6");
     Tamper(damage);
     const auto repaired = Repair();
     ASSERT_TRUE(repaired) << repaired.error().message();
     EXPECT_EQ(repaired->given_up, 0U);
     ExpectWhole(intact_);
     Close();
+    EXPECT_EQ(testing::AskDatabase(Database(), "SELECT revision FROM keyframes WHERE id = 6"),
+              revision)
+        << "at which it was uploaded";
     std::filesystem::remove_all(directory_ / "data");
   }
 }
@@ -159,6 +192,39 @@ TEST_F(LostKeysTest, ARowWithTheKeyOfAnotherGetsItsOwnBack) {
     Close();
     std::filesystem::remove_all(directory_ / "data");
   }
+}
+
+// It takes six bytes: a bit of the upper two is beyond what a number may be.
+TEST_F(LostKeysTest, ABitBeyondTheNumberOfAKeyframeIsDamageOfItsRow) {
+  constexpr std::uint32_t kFirst = 0x8000'0001U;
+  const auto upload = [](std::uint32_t i) {
+    UploadRequest request = DriveUpload(i);
+    request.key.sequence = kFirst + i;
+    return request;
+  };
+  Open(1);
+  for (std::uint32_t i = 0; i < kDrive; ++i) {
+    ASSERT_TRUE(Upload(upload(i)));
+  }
+  intact_ = Digest();
+  Close();
+  // Of keyframe 5 and its time, 1,500 ms.
+  testing::TurnBits(Database(), "", std::string("\0\0\x80\0\0\x06\x05\xDC", 8), 1, 1);
+  ASSERT_EQ(testing::AskDatabase(Database(), "SELECT sequence FROM keyframes WHERE id = 6"),
+            (std::int64_t{1} << 32) + kFirst + 5);
+  Open(1);
+  const auto found = service_->Verify({}, Long());
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_GT(found->damaged, 0U);
+  const auto made_anew = Await<std::uint32_t>([this](auto done) {
+    store_->RepairTables(TableRepair::kIndexes, "tester", std::move(done));
+  });
+  EXPECT_FALSE(made_anew) << "an index tells what the row was";
+  const auto repaired = Repair();
+  ASSERT_TRUE(repaired) << repaired.error().message();
+  EXPECT_EQ(repaired->given_up, 0U);
+  EXPECT_TRUE(Upload(upload(5))->is_duplicate);
+  ExpectWhole(intact_);
 }
 
 // Of another keyframe, of one that is damaged, and of none.
@@ -212,21 +278,28 @@ TEST_F(LostKeysTest, ALineOfPosesWithTheKeyOfAnotherGetsItsOwnBack) {
   EXPECT_EQ(DigestAt(kDrive).sha256, DigestAt(kDrive).sha256) << "its past can be read";
 }
 
+// The older one has the key of the other, or the younger one.
 TEST_F(LostKeysTest, OfTwoLinesOfPosesWithOneKeyTheWholeOneStays) {
-  Fill();
-  ASSERT_TRUE(Move({{{{"bus", "day"}, 4}, PoseOf({3.0, 1.0, 1.8, 5.0})},
-                    {{{"bus", "day"}, 5}, PoseOf({4.0, 1.0, 1.8, 5.0})}}));
-  const AtlasDigest moved = Digest();
-  Close();
-  const std::string revision(1, static_cast<char>(testing::AskDatabase(
-                                    Database(), "SELECT max(revision) FROM pose_history")));
-  testing::TurnBits(Database(), "pose_history", "\x06" + revision + "tester", 0, 3);
-  testing::TurnBits(Database(), "sqlite_autoindex_pose_history_1", std::string("\x06") + revision,
-                    0, 64);
-  Open(1);
-  const auto repaired = Repair();
-  ASSERT_TRUE(repaired) << repaired.error().message();
-  ExpectWhole(moved);
+  for (const char* const id : {"\x05", "\x06"}) {
+    SCOPED_TRACE(int{*id});
+    Fill();
+    ASSERT_TRUE(Move({{{{"bus", "day"}, 4}, PoseOf({3.0, 1.0, 1.8, 5.0})},
+                      {{{"bus", "day"}, 5}, PoseOf({4.0, 1.0, 1.8, 5.0})}}));
+    const AtlasDigest moved = Digest();
+    Close();
+    const std::string revision(1, static_cast<char>(testing::AskDatabase(
+                                      Database(), "SELECT max(revision) FROM pose_history")));
+    testing::TurnBits(Database(), "pose_history", id + revision + "tester", 0, 3);
+    testing::TurnBits(Database(), "sqlite_autoindex_pose_history_1", id + revision, 0, 64);
+    Open(1);
+    const auto repaired = Repair();
+    ASSERT_TRUE(repaired) << repaired.error().message();
+    ExpectWhole(moved);
+    EXPECT_EQ(store_->CheckRevision(kDrive).code(), StatusCode::kNotFound)
+        << "where one of them was is not known";
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
 }
 
 // The history of its states is gone, too, so that who opens the atlas cannot tell what it was.
@@ -263,15 +336,27 @@ TEST_F(LostKeysTest, ARetractionOfTheSecondSessionIsOfBoth) {
   ExpectWhole(intact_);
 }
 
-TEST_F(LostKeysTest, APurgeOfTheSecondSessionIsOfBoth) {
-  Fill();
-  LoseSession();
-  ASSERT_TRUE(Upload(DriveUpload(5)));
-  ASSERT_TRUE(Change("day", SessionAction::kPurge));
-  ASSERT_TRUE(Repair());
-  EXPECT_EQ(Digest().tiles, 0U);
-  EXPECT_EQ(store_->ReadCounts()->keyframes, 0U);
-  EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0U);
+TEST_F(LostKeysTest, APurgeOfOneSessionIsOfBoth) {
+  for (const bool is_of_the_first : {false, true}) {
+    SCOPED_TRACE(is_of_the_first);
+    Fill();
+    if (is_of_the_first) {
+      ASSERT_TRUE(Change("day", SessionAction::kPurge));
+      Digest();
+    }
+    LoseSession();
+    ASSERT_TRUE(Upload(DriveUpload(5)));
+    if (!is_of_the_first) {
+      ASSERT_TRUE(Change("day", SessionAction::kPurge));
+    }
+    ASSERT_TRUE(Repair());
+    EXPECT_EQ(Digest().tiles, 0U);
+    EXPECT_EQ(store_->ReadCounts()->keyframes, 0U);
+    EXPECT_EQ(store_->FindSession({"bus", "day"}).value()->state, SessionState::kPurged);
+    EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->damaged, 0U);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
+  }
 }
 
 }  // namespace

@@ -117,6 +117,29 @@ TEST_F(DamagedCompactionsTest, ARowOutOfOrderGetsItsPlaceBack) {
             1234);
 }
 
+// What was dropped at its revision can be read at no earlier one.
+TEST_F(DamagedCompactionsTest, TheHorizonStaysWhereTheLastOneWas) {
+  for (const char* const damage :
+       {"DELETE FROM compactions WHERE id = 3", "UPDATE compactions SET author = 'x' WHERE id = 3",
+        "DELETE FROM compactions WHERE id = 2"}) {
+    SCOPED_TRACE(damage);
+    store_.reset();
+    std::filesystem::remove_all(options_.directory);
+    Live();
+    store_.reset();
+    const auto horizon = static_cast<std::uint64_t>(
+        testing::AskDatabase(Database(), "SELECT max(revision) FROM compactions"));
+    Tamper(damage);
+    Open();
+    Repair();
+    EXPECT_EQ(Findings(), "");
+    EXPECT_TRUE(store_->CheckRevision(horizon).ok());
+    EXPECT_EQ(store_->CheckRevision(horizon - 1).code(), StatusCode::kNotFound);
+    store_.reset();
+    EXPECT_GE(testing::AskDatabase(Database(), "SELECT min(revision) FROM compactions"), 3);
+  }
+}
+
 // Of what nobody tells any more.
 TEST_F(DamagedCompactionsTest, WhatADamagedTombstoneStoodForIsStoredAnew) {
   Live();

@@ -134,7 +134,12 @@ TEST_F(DamagedSessionsTest, TheNextStartPutsThemRight) {
   Begin({"a", "b"});
   Spoil("UPDATE sessions SET keyframes = 9 WHERE session = 'b'");
   EXPECT_THAT(Names(List()), ElementsAre("a", "b row"));
+  std::vector<std::string> told;
+  options_.on_repair = [&told](const std::string& what) {
+    told.push_back(what);
+  };
   Open();
+  EXPECT_THAT(told, ElementsAre("tables_repaired: session number 2: its row was damaged"));
   const auto sessions = List();
   EXPECT_THAT(Names(sessions), ElementsAre("a", "b"));
   EXPECT_EQ(sessions[1].keyframes, 1U);

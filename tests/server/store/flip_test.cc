@@ -318,6 +318,7 @@ TEST_F(FlipTest, NothingElseIsSaidThanWasWritten) {
       outcomes[Outcome::kNamedAtOnce], outcomes[Outcome::kNoticedByChecks],
       outcomes[Outcome::kUnnoticed], mended_, only_said_);
   EXPECT_EQ(outcomes[Outcome::kUnnoticed], 0);
+  EXPECT_EQ(outcomes[Outcome::kNoticedByChecks], 0) << "by nobody but who verifies";
 }
 
 }  // namespace

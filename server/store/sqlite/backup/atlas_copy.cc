@@ -33,6 +33,9 @@ void RemovePartial(const fs::path& file) {
 }
 
 Status RequireRoom(const fs::path& folder, std::uint64_t bytes, std::uint64_t reserve) {
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) != 0) {
+    return DiskError("cannot write to", folder, errno);
+  }
   std::error_code error;
   const fs::space_info room = fs::space(folder, error);
   if (error) {

@@ -99,15 +99,26 @@ Query& Query::BindNull() {
 }
 
 std::int64_t Query::Int() {
-  return statement_->getColumn(column_++).getInt64();
+  const SQLite::Column column = statement_->getColumn(column_++);
+  fits_ = fits_ && column.isInteger();
+  return column.getInt64();
+}
+
+bool Query::Bool() {
+  const std::int64_t value = Int();
+  fits_ = fits_ && (value == 0 || value == 1);
+  return value != 0;
 }
 
 std::string Query::Text() {
-  return statement_->getColumn(column_++).getString();
+  const SQLite::Column column = statement_->getColumn(column_++);
+  fits_ = fits_ && column.isText();
+  return column.getString();
 }
 
 Bytes Query::Blob() {
   const SQLite::Column column = statement_->getColumn(column_++);
+  fits_ = fits_ && column.isBlob();
   const auto* data = static_cast<const std::uint8_t*>(column.getBlob());
   return {data, data + column.getBytes()};
 }

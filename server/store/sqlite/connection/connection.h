@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -46,20 +47,42 @@ class Query {
   // Runs a statement without rows; the number of rows it changed.
   int Run() { return statement_->exec(); }
 
-  // The next column of the row, in order.
+  // The next column of the row, in order. What is of another type, or out of range, is noted and
+  // cut.
   std::int64_t Int();
   std::uint64_t Unsigned() { return static_cast<std::uint64_t>(Int()); }
-  std::int32_t Int32() { return static_cast<std::int32_t>(Int()); }
-  std::uint32_t Unsigned32() { return static_cast<std::uint32_t>(Int()); }
+  std::int32_t Int32() { return Within<std::int32_t>(); }
+  std::uint32_t Unsigned32() { return Within<std::uint32_t>(); }
+  bool Bool();
+  template <typename Enum>
+  Enum Enumerator() {
+    return static_cast<Enum>(Within<std::underlying_type_t<Enum>>());
+  }
   std::string Text();
   Bytes Blob();
+  // False: a column since the first was cut. The checksum of what it was cut to may be right, and
+  // the row is another.
+  bool fits() const { return fits_; }
+  // Whether the next column is that, and none before it was cut.
+  bool IsChecksum(std::int64_t checksum) { return Int() == checksum && fits_; }
   // Back to the first column: after each Step() of a statement with several rows.
-  void Rewind() { column_ = 0; }
+  void Rewind() {
+    column_ = 0;
+    fits_ = true;
+  }
 
  private:
+  template <typename Integer>
+  Integer Within() {
+    const std::int64_t value = Int();
+    fits_ = fits_ && std::in_range<Integer>(value);
+    return static_cast<Integer>(value);
+  }
+
   SQLite::Statement* statement_;
   int parameter_ = 0;
   int column_ = 0;
+  bool fits_ = true;  // every column so far
 };
 
 struct DatabaseOptions {

@@ -49,6 +49,11 @@ bool IsWithoutTable(const SQLite::Exception& error) {
           what.find("ON CONFLICT clause does not match") != std::string_view::npos);
 }
 
+// SQLite's own word for it.
+bool IsUnreadablePage(const SQLite::Exception& error) {
+  return std::string_view(error.what()) == sqlite3_errstr(SQLITE_CORRUPT);
+}
+
 }  // namespace
 
 Status StatusFromSqlite(const SQLite::Exception& error) {
@@ -60,9 +65,16 @@ Status StatusFromSqlite(const SQLite::Exception& error) {
     return Status(StatusCode::kInvalidData,
                   StrCat("store: the database is damaged: ", error.what(), "; restore a backup"));
   }
+  if (error.getExtendedErrorCode() == SQLITE_IOERR_SHMSIZE) {
+    return Status(
+        StatusCode::kResourceExhausted,
+        StrCat("store: no room on the disk for the index of the log, atlas.db-shm (SQLite ",
+               SQLITE_IOERR_SHMSIZE, ")"));
+  }
   const int primary = error.getErrorCode() & 0xFF;
   return Status(CodeOf(primary),
-                StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")"));
+                StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")",
+                       IsUnreadablePage(error) ? "; restore a backup" : ""));
 }
 
 Status StatusFromSqliteCode(int code, const char* what) {

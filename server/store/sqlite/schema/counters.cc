@@ -30,7 +30,7 @@ std::optional<std::uint64_t> Find(Connection& connection, Counter counter) {
     return std::nullopt;
   }
   const std::uint64_t value = row.Unsigned();
-  return row.Int() == HashOf(counter, value) ? std::optional(value) : std::nullopt;
+  return row.IsChecksum(HashOf(counter, value)) ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace

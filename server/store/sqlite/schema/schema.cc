@@ -236,7 +236,7 @@ Result<StoreIdentity> ReadMeta(Connection& connection) {
   StoreIdentity identity;
   identity.epoch = row.Unsigned();
   if (atlas_id.size() != identity.atlas_id.size() ||
-      row.Int() != MetaHash(profile_bytes, atlas_id, identity.epoch)) {
+      !row.IsChecksum(MetaHash(profile_bytes, atlas_id, identity.epoch))) {
     return Error(StatusCode::kInvalidData, "store: the meta row is damaged");
   }
   std::copy(atlas_id.begin(), atlas_id.end(), identity.atlas_id.begin());

@@ -31,7 +31,7 @@ Result<CompactionRow> ReadCompaction(Query& row) {
   result.author = row.Text();
   result.dropped = row.Unsigned();
   result.bytes = row.Unsigned();
-  if (row.Int() != HashOf(result)) {
+  if (!row.IsChecksum(HashOf(result))) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the row of compaction ", result.id, " is damaged: wrong checksum"));
   }
@@ -48,7 +48,7 @@ Result<TombstoneRow> ReadTombstone(Query& row) {
   result.blob_bytes = row.Unsigned32();
   result.blob_hash = row.Unsigned();
   result.compaction_id = row.Int();
-  if (row.Int() != HashOf(result)) {
+  if (!row.IsChecksum(HashOf(result))) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the tombstone of keyframe ", result.sequence, " of session ",
                         result.session_id, " is damaged: wrong checksum"));
@@ -211,27 +211,24 @@ Status CheckTombstones(Connection& connection, std::int64_t session_id, std::uin
                              " dropped keyframes, and ", found, " tombstones are there"));
 }
 
-std::vector<TombstoneRow> ListDamagedTombstones(Connection& connection) {
+std::vector<TombstoneKey> ListDamagedTombstones(Connection& connection) {
   Query row = connection.Prepare(
       "SELECT session_id, sequence, time_ms, blob_bytes, blob_hash, compaction_id, checksum "
       "FROM tombstones");
-  std::vector<TombstoneRow> damaged;
+  std::vector<TombstoneKey> damaged;
   while (row.Step()) {
     if (!ReadTombstone(row)) {
       row.Rewind();
-      TombstoneRow tombstone;
-      tombstone.session_id = row.Int();
-      tombstone.sequence = row.Unsigned32();
-      damaged.push_back(tombstone);
+      damaged.push_back({row.Int(), row.Int()});
     }
   }
   return damaged;
 }
 
-void DeleteTombstone(Connection& connection, std::int64_t session_id, std::uint32_t sequence) {
+void DeleteTombstone(Connection& connection, const TombstoneKey& key) {
   connection.Prepare("DELETE FROM tombstones WHERE session_id = ? AND sequence = ?")
-      .Bind(session_id)
-      .Bind(sequence)
+      .Bind(key.session_id)
+      .Bind(key.sequence)
       .Run();
 }
 
@@ -248,6 +245,7 @@ std::vector<StoredCompaction> ListCompactions(Connection& connection) {
     CompactionRow& r = stored.row;
     r = {row.Int(), row.Unsigned(), row.Int(), row.Text(), row.Unsigned(), row.Unsigned()};
     stored.checksum = row.Int();
+    stored.fits = row.fits();
     stored.tombstones = row.Unsigned();
     stored.tombstone_bytes = row.Unsigned();
     compactions.push_back(std::move(stored));

@@ -30,6 +30,7 @@ void DeleteCompaction(Connection& connection, std::int64_t id);
 struct StoredCompaction {
   CompactionRow row;
   std::int64_t checksum = 0;
+  bool fits = true;  // no column was cut
   std::uint64_t tombstones = 0;
   std::uint64_t tombstone_bytes = 0;
 };
@@ -56,9 +57,13 @@ bool HasTombstoneBetween(Connection& connection,
                          std::int64_t session_id,
                          std::uint32_t after,
                          std::uint32_t before);
-// Of damaged ones only session and sequence number are told, as their columns have them.
-std::vector<TombstoneRow> ListDamagedTombstones(Connection& connection);
-void DeleteTombstone(Connection& connection, std::int64_t session_id, std::uint32_t sequence);
+// As the columns of one have it that is damaged: a number may be none that a keyframe has.
+struct TombstoneKey {
+  std::int64_t session_id = 0;
+  std::int64_t sequence = 0;
+};
+std::vector<TombstoneKey> ListDamagedTombstones(Connection& connection);
+void DeleteTombstone(Connection& connection, const TombstoneKey& key);
 // All of a session, and out of what their compactions say that they dropped. How many.
 Result<std::uint64_t> DeleteTombstones(Connection& connection, std::int64_t session_id);
 

@@ -1,5 +1,6 @@
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 
+#include <cstdint>
 #include <string_view>
 #include <utility>
 
@@ -18,12 +19,29 @@ std::int64_t HashOf(const DamagedKeyframe& row) {
       .value();
 }
 
+// Columns: keyframe_id, revision, time_ms, reason, checksum.
+Result<DamagedKeyframe> ReadRow(Query& row) {
+  row.Rewind();
+  DamagedKeyframe keyframe;
+  keyframe.id = row.Int();
+  keyframe.revision = row.Unsigned();
+  keyframe.time_ms = row.Int();
+  keyframe.reason = row.Text();
+  if (!row.IsChecksum(HashOf(keyframe))) {
+    return Error(StatusCode::kInvalidData, StrCat("store: what is noted of the damaged keyframe ",
+                                                  keyframe.id, " is damaged: wrong checksum"));
+  }
+  return keyframe;
+}
+
 }  // namespace
 
 bool IsListedAsDamaged(Connection& connection, std::int64_t keyframe_id) {
-  Query row = connection.Prepare("SELECT 1 FROM damaged_keyframes WHERE keyframe_id = ?");
+  Query row = connection.Prepare(
+      "SELECT keyframe_id, revision, time_ms, reason, checksum FROM damaged_keyframes "
+      "WHERE keyframe_id = ?");
   row.Bind(keyframe_id);
-  return row.Step();
+  return row.Step() && ReadRow(row).has_value();
 }
 
 Result<std::vector<DamagedKeyframe>> ReadDamagedKeyframes(Connection& connection) {
@@ -32,17 +50,11 @@ Result<std::vector<DamagedKeyframe>> ReadDamagedKeyframes(Connection& connection
       "ORDER BY keyframe_id");
   std::vector<DamagedKeyframe> keyframes;
   while (row.Step()) {
-    row.Rewind();
-    DamagedKeyframe keyframe;
-    keyframe.id = row.Int();
-    keyframe.revision = row.Unsigned();
-    keyframe.time_ms = row.Int();
-    keyframe.reason = row.Text();
-    if (row.Int() != HashOf(keyframe)) {
-      return Error(StatusCode::kInvalidData, StrCat("store: what is noted of the damaged keyframe ",
-                                                    keyframe.id, " is damaged: wrong checksum"));
+    auto keyframe = ReadRow(row);
+    if (!keyframe) {
+      return Error(keyframe.error());
     }
-    keyframes.push_back(std::move(keyframe));
+    keyframes.push_back(*std::move(keyframe));
   }
   return keyframes;
 }
@@ -58,6 +70,29 @@ void WriteDamagedKeyframe(Connection& connection, const DamagedKeyframe& keyfram
       .Bind(std::string_view(keyframe.reason))
       .Bind(HashOf(keyframe))
       .Run();
+}
+
+Status CheckDamagedKeyframes(Connection& connection) {
+  const auto keyframes = ReadDamagedKeyframes(connection);
+  return keyframes ? Status() : keyframes.error();
+}
+
+int ForgetUnknownDamage(Connection& connection) {
+  std::vector<std::int64_t> unknown;
+  {
+    Query row = connection.Prepare(
+        "SELECT keyframe_id, revision, time_ms, reason, checksum FROM damaged_keyframes");
+    while (row.Step()) {
+      if (!ReadRow(row)) {
+        row.Rewind();
+        unknown.push_back(row.Int());
+      }
+    }
+  }
+  for (const std::int64_t id : unknown) {
+    DeleteDamagedKeyframe(connection, id);
+  }
+  return static_cast<int>(unknown.size());
 }
 
 bool DeleteDamagedKeyframe(Connection& connection, std::int64_t keyframe_id) {

@@ -127,7 +127,7 @@ Result<std::vector<TileClaim>> FreeMarks(Connection& connection,
     claim.generation = row.Unsigned();
     claim.since = row.Unsigned();
     claim.attempts = row.Unsigned32();
-    if (!id || row.Int() != HashOf(claim)) {
+    if (!id || !row.IsChecksum(HashOf(claim))) {
       return Error(StatusCode::kInvalidData, StrCat("store: the mark on the tile with the key ",
                                                     key, " is damaged: wrong checksum"));
     }

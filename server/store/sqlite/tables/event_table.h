@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -26,13 +27,13 @@ Result<std::vector<Event>> ReadEvents(Connection& connection,
                                       std::uint64_t after_id,
                                       std::uint32_t limit);
 
-// Of all of a kind, in order; damaged ones are left out.
-std::vector<std::uint64_t> RevisionsOf(Connection& connection, EventKind kind);
+// Of all; of damaged ones nothing is told but that they are there.
+void ScanEvents(Connection& connection, const std::function<void(const Event&)>& visit);
 
 // kInvalidData names the first that is damaged.
 Status CheckEvents(Connection& connection);
-// Of damaged ones nobody knows more than that they were; when, and at which revision, as far as
-// their rows say. How many.
+// One whose number has a turned bit gets it back. Of others nobody knows more than that they were;
+// when, as far as their rows say, and at which revision at the latest. How many.
 int RepairEvents(Connection& connection);
 
 }  // namespace atlas

@@ -50,8 +50,8 @@ bool ReadIntactRow(Query& query, Row& row) {
   row.tile_key = query.Unsigned();
   row.keyframe_id = query.Int();
   row.revision = query.Unsigned();
-  row.is_current = query.Int() != 0;
-  return query.Int() == row.Checksum();
+  row.is_current = query.Bool();
+  return query.IsChecksum(row.Checksum());
 }
 
 // Throws where it is damaged.

@@ -60,11 +60,11 @@ Result<FullKeyframeRow> ReadFullKeyframeRow(Query& query) {
   row.row.blob_hash = query.Unsigned();
   row.shard = query.Int();
   row.revision = query.Unsigned();
-  const bool has_prior = query.Int() != 0;
+  const bool has_prior = query.Bool();
   const PositionPrior prior{query.Int(), query.Int(), query.Int(), query.Unsigned32()};
   row.prior = has_prior ? std::optional(prior) : std::nullopt;
   const std::int64_t checksum = query.Int();
-  if (checksum != HashOf(row) && checksum != FormerHashOf(row)) {
+  if (!query.fits() || (checksum != HashOf(row) && checksum != FormerHashOf(row))) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the row of keyframe ", r.id, " is damaged: wrong checksum"));
   }

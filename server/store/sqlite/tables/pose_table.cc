@@ -68,7 +68,7 @@ Result<PoseChange> ReadCurrent(Connection& connection, std::int64_t keyframe_id)
   stored.revision = row.Unsigned();
   stored.batch = row.Unsigned();
   ReadPoseColumns(row, stored.pose);
-  if (row.Int() != CurrentHash(stored)) {
+  if (!row.IsChecksum(CurrentHash(stored))) {
     return Error(StatusCode::kInvalidData, StrCat("store: the pose of keyframe ", keyframe_id,
                                                   " is damaged: wrong checksum"));
   }
@@ -101,7 +101,7 @@ Result<PoseChange> ReadHistoryRow(Query& row) {
   stored.batch = row.Unsigned();
   stored.author = row.Text();
   ReadPoseColumns(row, stored.pose);
-  if (row.Int() != HistoryHash(stored)) {
+  if (!row.IsChecksum(HistoryHash(stored))) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the pose of keyframe ", stored.keyframe_id, " at revision ",
                         stored.revision, " is damaged: wrong checksum"));
@@ -149,7 +149,7 @@ std::optional<std::uint64_t> IdOneBitAway(PoseBatchRow batch) {
 // The first `most`.
 std::vector<PoseBatchRow> ListDamagedBatches(Connection& connection, std::size_t most) {
   Query row = connection.Prepare(
-      "SELECT id, revision, author, updated, if_revision, checksum FROM pose_batches");
+      "SELECT id, revision, author, updated, coalesce(if_revision, 0), checksum FROM pose_batches");
   std::vector<PoseBatchRow> damaged;
   while (damaged.size() < most && row.Step()) {
     row.Rewind();
@@ -160,7 +160,7 @@ std::vector<PoseBatchRow> ListDamagedBatches(Connection& connection, std::size_t
     batch.updated = row.Unsigned();
     batch.if_revision = row.Unsigned();
     batch.checksum = row.Int();
-    if (batch.checksum != batch.Hash()) {
+    if (!row.fits() || batch.checksum != batch.Hash()) {
       damaged.push_back(std::move(batch));
     }
   }

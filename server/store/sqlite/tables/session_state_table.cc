@@ -26,10 +26,10 @@ Result<SessionStateRow> ReadRow(Query& row) {
   SessionStateRow result;
   result.session_id = row.Int();
   result.revision = row.Unsigned();
-  result.state = static_cast<SessionState>(row.Int());
+  result.state = row.Enumerator<SessionState>();
   result.author = row.Text();
   result.reason = row.Text();
-  if (row.Int() != HashOf(result)) {
+  if (!row.IsChecksum(HashOf(result))) {
     return Error(StatusCode::kInvalidData,
                  StrCat("store: the state of session ", result.session_id, " at revision ",
                         result.revision, " is damaged: wrong checksum"));

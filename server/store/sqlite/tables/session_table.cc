@@ -56,14 +56,14 @@ Result<SessionRow> ReadRow(Query& row) {
   SessionRecord& r = result.record;
   r.key.vehicle = row.Text();
   r.key.session = row.Text();
-  r.state = static_cast<SessionState>(row.Int());
+  r.state = row.Enumerator<SessionState>();
   r.keyframes = row.Unsigned();
   r.bytes = row.Unsigned();
   r.first_time_ms = row.Int();
   r.last_time_ms = row.Int();
   r.last_sequence = row.Unsigned32();
   r.compacted = row.Unsigned();
-  if (row.Int() != HashOf(result)) {
+  if (!row.IsChecksum(HashOf(result))) {
     return Error(StatusCode::kInvalidData, StrCat("store: the row of session ", result.id, " (",
                                                   r.key, ") is damaged: wrong checksum"));
   }
@@ -128,7 +128,8 @@ void CountRows(Connection& connection, SessionRow& session) {
   SessionRecord& r = session.record;
   Query row = connection.Prepare(
       "SELECT count(*) FILTER (WHERE is_stored), coalesce(sum(bytes) FILTER (WHERE is_stored), 0), "
-      "coalesce(min(time_ms), 0), coalesce(max(time_ms), 0), coalesce(max(sequence), 0), "
+      "coalesce(min(time_ms), 0), coalesce(max(time_ms), 0), coalesce(max(sequence) FILTER (WHERE "
+      "sequence BETWEEN 0 AND 0xFFFFFFFF), 0), "
       "count(*) FILTER (WHERE NOT is_stored) FROM ("
       "SELECT 1 AS is_stored, blob_bytes AS bytes, time_ms, sequence FROM keyframes "
       "WHERE session_id = ?1 UNION ALL "

@@ -57,7 +57,7 @@ std::vector<AtlasStart> ReadStarts(Connection& connection) {
     const Bytes id = row.Blob();
     AtlasStart start;
     start.revision = row.Unsigned();
-    if (id.size() != start.id.size() || row.Int() != HashOf(number, id, start.revision)) {
+    if (id.size() != start.id.size() || !row.IsChecksum(HashOf(number, id, start.revision))) {
       starts.clear();
       continue;
     }
@@ -78,14 +78,15 @@ int DropUnknownStarts(Connection& connection) {
   std::int64_t last = 0;
   bool is_damaged = false;
   {
-    Query row = connection.Prepare("SELECT number, id, revision, checksum FROM starts");
+    Query row =
+        connection.Prepare("SELECT number, id, revision, checksum FROM starts ORDER BY number");
     while (row.Step()) {
       row.Rewind();
       const std::int64_t number = row.Int();
       const Bytes id = row.Blob();
       const std::uint64_t revision = row.Unsigned();
-      if (id.size() != AtlasStart().id.size() || row.Int() != HashOf(number, id, revision)) {
-        last = is_damaged ? std::max(last, number) : number;
+      if (id.size() != AtlasStart().id.size() || !row.IsChecksum(HashOf(number, id, revision))) {
+        last = number;
         is_damaged = true;
       }
     }

@@ -29,7 +29,7 @@ struct TileRow {
   std::uint32_t multilayer_cells = 0;
   std::uint32_t blob_bytes = 0;
   std::uint64_t blob_hash = 0;
-  std::int64_t checksum = 0;
+  bool is_vouched = true;  // by its checksum
   Bytes blob;
 
   std::int64_t ExpectedChecksum() const {
@@ -45,7 +45,7 @@ struct TileRow {
         .value();
   }
   bool is_intact() const {
-    return checksum == ExpectedChecksum() && blob.size() == blob_bytes && Hash64(blob) == blob_hash;
+    return is_vouched && blob.size() == blob_bytes && Hash64(blob) == blob_hash;
   }
 };
 
@@ -58,7 +58,7 @@ void ReadNumbers(Query& query, TileRow& row) {
   row.multilayer_cells = query.Unsigned32();
   row.blob_bytes = query.Unsigned32();
   row.blob_hash = query.Unsigned();
-  row.checksum = query.Int();
+  row.is_vouched = query.IsChecksum(row.ExpectedChecksum());
 }
 
 // The rows of a range of keys by the index, which is small, and by the table.
@@ -101,7 +101,7 @@ std::optional<TileRow> ReadListed(Connection& connection, const TileId& id) {
   TileRow row;
   row.key = query.Unsigned();
   ReadNumbers(query, row);
-  return row.checksum == row.ExpectedChecksum() ? std::optional(row) : std::nullopt;
+  return row.is_vouched ? std::optional(row) : std::nullopt;
 }
 
 // Adds (sign 1) or takes away (sign -1) what the row counts for.
@@ -182,7 +182,7 @@ bool AddSummaries(Query& query, Damaged damaged, std::vector<TileSummary>& tiles
     TileRow row;
     row.key = query.Unsigned();
     ReadNumbers(query, row);
-    if (damaged == Damaged::kFails && row.checksum != row.ExpectedChecksum()) {
+    if (damaged == Damaged::kFails && !row.is_vouched) {
       return false;
     }
     if (const auto id = TileId::FromKey(row.key)) {
@@ -281,7 +281,7 @@ std::uint32_t RestoreTileRows(Connection& connection) {
       row.key = query.Unsigned();
       ReadNumbers(query, row);
       const auto id = TileId::FromKey(row.key);
-      if (row.checksum == row.ExpectedChecksum() || !id) {
+      if (row.is_vouched || !id) {
         continue;
       }
       if (auto listed = ReadListed(connection, *id)) {
@@ -302,7 +302,7 @@ std::uint32_t RestoreTileRows(Connection& connection) {
           .Bind(row.multilayer_cells)
           .Bind(row.blob_bytes)
           .Bind(row.blob_hash)
-          .Bind(row.checksum)
+          .Bind(row.ExpectedChecksum())
           .Bind(row.key)
           .Run();
     }

@@ -20,7 +20,7 @@ namespace {
 constexpr std::int64_t kMostMissing = 1 << 20;
 
 bool IsIntact(const StoredCompaction& stored) {
-  return HashOf(stored.row) == stored.checksum;
+  return stored.fits && HashOf(stored.row) == stored.checksum;
 }
 
 // The row as it was, where one bit of its id turned, or what it dropped is what is left of it.
@@ -60,9 +60,9 @@ class CompactionRepair {
 
  private:
   void DropDamagedTombstones() {
-    const std::vector<TombstoneRow> damaged = ListDamagedTombstones(connection_);
-    for (const TombstoneRow& row : damaged) {
-      DeleteTombstone(connection_, row.session_id, row.sequence);
+    const std::vector<TombstoneKey> damaged = ListDamagedTombstones(connection_);
+    for (const TombstoneKey& key : damaged) {
+      DeleteTombstone(connection_, key);
     }
     if (!damaged.empty()) {
       Note("tombstones", StrCat(damaged.size(),

@@ -6,6 +6,7 @@
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
+#include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/start_table.h"
@@ -93,7 +94,7 @@ Status CheckCounters(Connection& connection) {
     }
   }
   for (const auto check : {&CheckTableSums, &CheckIndexes, &CheckStructure, &CheckEvents,
-                           &CheckPoseBatches, &CheckStarts}) {
+                           &CheckPoseBatches, &CheckStarts, &CheckDamagedKeyframes}) {
     if (const Status status = check(connection); status.code() == StatusCode::kInvalidData) {
       add(status.message());
     } else if (!status.ok()) {

@@ -163,6 +163,8 @@ Result<std::uint32_t> RepairRows(Connection& connection,
   repaired += RepairStarts(connection, author);
   repaired += static_cast<std::uint32_t>(RepairEvents(connection));
   repaired += static_cast<std::uint32_t>(RepairPoseBatches(connection));
+  // Who looks at all keyframes behind this finds again what is damaged.
+  repaired += static_cast<std::uint32_t>(ForgetUnknownDamage(connection));
   const auto sessions = RepairSessions(connection, names, author);
   if (!sessions) {
     return Error(sessions.error());

@@ -158,7 +158,7 @@ class SessionRepair {
         return {};
       }
     }
-    names.push_back({kLostVehicle, StrCat("session-", id)});
+    names.push_back(LostName(id));
     const auto row = TellNamedSession(connection_, id, names.front(), Vouching::kByNobody);
     if (!row) {
       return row.error();
@@ -199,8 +199,17 @@ class SessionRepair {
     return {};
   }
 
+  // A vehicle may be called so, too.
+  SessionKey LostName(std::int64_t id) {
+    SessionKey name{kLostVehicle, StrCat("session-", id)};
+    for (int i = 2; IsNameOfAnother(connection_, name, id); ++i) {
+      name.session = StrCat("session-", id, "-", i);
+    }
+    return name;
+  }
+
   void NameLost(std::int64_t id) {
-    const SessionKey key{kLostVehicle, StrCat("session-", id)};
+    const SessionKey key = LostName(id);
     const auto state =
         ReadSessionStateAt(connection_, id, std::numeric_limits<std::int64_t>::max());
     AddLostSession(connection_, id, key, state ? *state : SessionState::kLive);

@@ -67,9 +67,10 @@ Status JoinSessions(Connection& connection,
         PurgeSession(connection, *joined, {key, SessionAction::kPurge, author, kReason});
     return purged ? Status() : purged.error();
   }
-  const std::uint64_t revision = NextRevision(connection);
-  EnterState(connection, *joined, {younger.record.state, revision, author, kReason});
-  MarkSession(connection, older.id, revision);
+  // Tiles of keyframes that stay are what they were, unless both come into the map, or leave it:
+  // the two had one name.
+  EnterState(connection, *joined,
+             {younger.record.state, NextRevision(connection), author, kReason});
   return {};
 }
 
