@@ -27,9 +27,13 @@ RelocalizerSource RelocalizerOf(MapView& view, const RelocalizerOptions& options
 
 class AtlasScanLocalizer : public ScanLocalizer {
  public:
-  AtlasScanLocalizer(const DriveSurvey& survey, const LocalizerOptions& options, MapView& view)
+  AtlasScanLocalizer(const DriveSurvey& survey,
+                     const LocalizerOptions& options,
+                     MapView& view,
+                     OnLocalization on_localization)
       : survey_(survey),
-        localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})) {}
+        localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})),
+        on_localization_(std::move(on_localization)) {}
 
   void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
 
@@ -39,6 +43,10 @@ class AtlasScanLocalizer : public ScanLocalizer {
         SegmentScan(cloud, survey_.layout, survey_.ring_step, R_level_sensor, {});
     const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor);
     if (!result) return Error(result.error());
+    if (on_localization_) {
+      Status status = on_localization_(leveled, R_level_sensor, *result);
+      if (!status.ok()) return Error(std::move(status));
+    }
     return LocatedScan{result->T_world_sensor, result->health, result->registration.fit,
                        result->covariance, result->cover};
   }
@@ -46,6 +54,7 @@ class AtlasScanLocalizer : public ScanLocalizer {
  private:
   DriveSurvey survey_;
   Localizer localizer_;
+  OnLocalization on_localization_;
 };
 
 class PaperScanLocalizer : public ScanLocalizer {
@@ -74,10 +83,11 @@ class PaperScanLocalizer : public ScanLocalizer {
 
 std::unique_ptr<ScanLocalizer> MakeAtlasLocalizer(const DriveSurvey& survey,
                                                   double max_range_m,
-                                                  MapView& view) {
+                                                  MapView& view,
+                                                  OnLocalization on_localization) {
   LocalizerOptions options;
   options.features.max_range_m = static_cast<float>(max_range_m);
-  return std::make_unique<AtlasScanLocalizer>(survey, options, view);
+  return std::make_unique<AtlasScanLocalizer>(survey, options, view, std::move(on_localization));
 }
 
 Result<std::unique_ptr<ScanLocalizer>> MakePaperLocalizer(const DriveSurvey& survey,
