@@ -18,6 +18,7 @@ import bench_follow
 import bench_load
 import bench_localization
 import bench_memory
+import bench_monitoring
 import bench_nginx
 import bench_places
 import bench_planning
@@ -197,7 +198,7 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
                                    **bench_memory.BENCHMARKS, **bench_planning.BENCHMARKS, **bench_unread.BENCHMARKS,
                                    **bench_crowd.BENCHMARKS, **bench_localization.BENCHMARKS,
-                                   **bench_places.BENCHMARKS,
+                                   **bench_monitoring.BENCHMARKS, **bench_places.BENCHMARKS,
                                    **bench_tracking.BENCHMARKS}.items()},
               **{name: lambda bin_dir, name=name: bench_with_client(name, bin_dir) for name in WITH_CLIENT}}
 

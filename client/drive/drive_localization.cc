@@ -67,6 +67,7 @@ class DriveLocalization {
                   const PointCloud& cloud,
                   const Eigen::Quaterniond& R_level_sensor,
                   LocalizedScan localized) {
+    if (options_.monitor != nullptr) options_.monitor->Begin(scan.number);
     const CpuTimer timer;
     Result<LocatedScan> located = localizer_.Locate(cloud, R_level_sensor);
     localized.cpu_s = timer.elapsed_s();
@@ -100,6 +101,14 @@ class DriveLocalization {
   DriveLocalizationReport report_;
 };
 
+OnLocalization ListenerOf(DriveMonitor* monitor) {
+  if (monitor == nullptr) return {};
+  return [monitor](const LeveledScan& leveled, const Eigen::Quaterniond& R_level_sensor,
+                   const LocalizationResult& result) {
+    return monitor->Observe(leveled, R_level_sensor, result);
+  };
+}
+
 SurveyOptions SurveyOptionsFor(const DriveLocalizationOptions& options) {
   SurveyOptions survey;
   survey.rings = options.rings;
@@ -120,7 +129,8 @@ Result<std::unique_ptr<ScanLocalizer>> MakeLocalizer(const DriveSurvey& survey,
   }
   const double revolutions = RevolutionsBetween(options.selection.parity);
   return MakeAtlasLocalizer(survey, options.range_m(), view,
-                            is_deskewed ? std::optional(revolutions) : std::nullopt);
+                            is_deskewed ? std::optional(revolutions) : std::nullopt,
+                            ListenerOf(options.monitor));
 }
 
 }  // namespace
@@ -138,6 +148,10 @@ Status DriveLocalizationOptions::Validate() const {
   }
   if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
+  }
+  if (monitor != nullptr && (shots || mode != LocalizationMode::kAtlas)) {
+    return {StatusCode::kInvalidArgument,
+            "contradictions: only a drive that is tracked in mode atlas shows them"};
   }
   return {};
 }

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "client/drive/drive_monitor.h"
 #include "client/drive/drive_selection.h"
 #include "client/drive/drive_skew.h"
 #include "client/drive/scan_localizer.h"
@@ -37,6 +38,9 @@ struct DriveLocalizationOptions {
   std::optional<Shots> shots;             // tracking, if not given
   std::uint64_t seed = 0;
   bool is_restarted = true;  // tracking is told where it is after a jump
+  // Tracking in mode kAtlas: is shown each scan that is not lost, and outlives the run; may be
+  // null.
+  DriveMonitor* monitor = nullptr;
   double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;  // a cheap IMU's
 
   double range_m() const {

@@ -30,10 +30,12 @@ class AtlasScanLocalizer : public ScanLocalizer {
   AtlasScanLocalizer(const DriveSurvey& survey,
                      const LocalizerOptions& options,
                      MapView& view,
-                     std::optional<double> revolutions)
+                     std::optional<double> revolutions,
+                     OnLocalization on_localization)
       : survey_(survey),
         revolutions_(revolutions),
-        localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})) {}
+        localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})),
+        on_localization_(std::move(on_localization)) {}
 
   void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
 
@@ -43,6 +45,10 @@ class AtlasScanLocalizer : public ScanLocalizer {
                                             R_level_sensor, {}, DuringRevolution());
     const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor);
     if (!result) return Error(result.error());
+    if (on_localization_) {
+      Status status = on_localization_(leveled, R_level_sensor, *result);
+      if (!status.ok()) return Error(std::move(status));
+    }
     return LocatedScan{result->T_world_sensor, result->health, result->registration.fit,
                        result->covariance, result->cover};
   }
@@ -62,6 +68,7 @@ class AtlasScanLocalizer : public ScanLocalizer {
   DriveSurvey survey_;
   std::optional<double> revolutions_;
   Localizer localizer_;
+  OnLocalization on_localization_;
 };
 
 class PaperScanLocalizer : public ScanLocalizer {
@@ -91,10 +98,12 @@ class PaperScanLocalizer : public ScanLocalizer {
 std::unique_ptr<ScanLocalizer> MakeAtlasLocalizer(const DriveSurvey& survey,
                                                   double max_range_m,
                                                   MapView& view,
-                                                  std::optional<double> revolutions) {
+                                                  std::optional<double> revolutions,
+                                                  OnLocalization on_localization) {
   LocalizerOptions options;
   options.features.max_range_m = static_cast<float>(max_range_m);
-  return std::make_unique<AtlasScanLocalizer>(survey, options, view, revolutions);
+  return std::make_unique<AtlasScanLocalizer>(survey, options, view, revolutions,
+                                              std::move(on_localization));
 }
 
 Result<std::unique_ptr<ScanLocalizer>> MakePaperLocalizer(const DriveSurvey& survey,

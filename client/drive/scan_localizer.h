@@ -1,6 +1,7 @@
 // One way to find scans in a map, behind one face: ours, the paper's, or a benchmark's own.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -34,14 +35,21 @@ class ScanLocalizer {
                                      const Eigen::Quaterniond& R_level_sensor) = 0;
 };
 
+// A scan as it was matched, and where; an error ends the localization.
+using OnLocalization = std::function<Status(const LeveledScan& leveled,
+                                            const Eigen::Quaterniond& R_level_sensor,
+                                            const LocalizationResult& result)>;
+
 // Both match what is within `max_range_m`; `view` outlives them.
 //
 // The product's (core/localization/localizer.h). With `revolutions`, how many the sensor makes from
 // one scan to the next, scans are deskewed by the motion that the localizer predicts.
+// `on_localization` may be empty.
 std::unique_ptr<ScanLocalizer> MakeAtlasLocalizer(const DriveSurvey& survey,
                                                   double max_range_m,
                                                   MapView& view,
-                                                  std::optional<double> revolutions = std::nullopt);
+                                                  std::optional<double> revolutions = std::nullopt,
+                                                  OnLocalization on_localization = {});
 // The paper's encode, decode and ICP (core/localization/icp). `survey` with its mount;
 // kInvalidArgument for a range that no keyframe has.
 Result<std::unique_ptr<ScanLocalizer>> MakePaperLocalizer(const DriveSurvey& survey,

@@ -4,6 +4,7 @@
 
 #include "client/render/color_map.h"
 #include "client/render/map_picture.h"
+#include "client/render/mark_overlay.h"
 #include "client/render/route_overlay.h"
 #include "client/render/scale_bar.h"
 #include "core/geometry/nibble.h"
@@ -161,6 +162,7 @@ Image DrawPicture(const MapRaster& raster, const RenderOptions& options, double 
                static_cast<std::uint32_t>(box.max_y - y + margin)) = painter.Color(x, y);
     }
   }
+  DrawMarks(options.marks, box, metres_per_pixel, margin, image);
   DrawRoute(options.route, box, metres_per_pixel, margin, image);
   if (options.has_scale_bar) DrawScaleBar(metres_per_pixel, margin, image);
   return image;

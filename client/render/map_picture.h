@@ -10,6 +10,7 @@
 
 #include "client/render/image.h"
 #include "client/render/map_raster.h"
+#include "client/render/mark_overlay.h"
 #include "core/base/status.h"
 #include "core/geometry/map_profile.h"
 
@@ -32,6 +33,7 @@ struct RenderOptions {
   std::int64_t margin_px = 12;
   bool has_scale_bar = true;
   std::vector<Eigen::Vector3d> route;  // drawn over the map, world frame; may be empty
+  std::vector<MapMark> marks;          // likewise, below the route
 };
 
 struct MapPicture {

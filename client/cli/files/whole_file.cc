@@ -5,6 +5,8 @@
 #include <fstream>
 #include <system_error>
 
+#include <unistd.h>
+
 #include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 
@@ -28,6 +30,14 @@ Status MakeDirectory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   return error ? DiskError("cannot make folder", directory, error.value()) : Status();
+}
+
+Status CheckPlace(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (::access((folder / ".").c_str(), W_OK) != 0) return DiskError("cannot write", path, errno);
+  if (std::filesystem::is_directory(path, error)) return DiskError("cannot write", path, EISDIR);
+  return {};
 }
 
 Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes) {

@@ -13,6 +13,9 @@ namespace atlas {
 // With its parents; fine when it exists. kPermissionDenied, kConflict when a file has its name.
 Status MakeDirectory(const std::filesystem::path& directory);
 
+// Whether a file may stand or be made there: kNotFound, kPermissionDenied, kConflict for a folder.
+Status CheckPlace(const std::filesystem::path& path);
+
 // Written beside `path` and renamed over it.
 Status WriteWholeFile(const std::filesystem::path& path, ByteSpan bytes);
 Status WriteTextFile(const std::filesystem::path& path, std::string_view text);

@@ -161,8 +161,9 @@ def target_cases(cases, drives, work):
     cases.refused("render over a folder", ["render", "-o", drives.good], "conflict", "good")
     cases.refused("render into a file", ["render", "-o", file / "map.png"], "conflict", "map.png")
     cases.forbidden("render into a closed folder", ["render", "-o", closed / "map.png"], "map.png")
-    for line in (["localize", drives.good, "--output"], ["localize", drives.good, "--plot"], ["export", "--points"]):
-        ending = {"--output": "csv", "--plot": "svg", "--points": "ply"}[line[-1]]
+    for line in (["localize", drives.good, "--output"], ["localize", drives.good, "--plot"],
+                 ["localize", drives.good, "--contradictions"], ["export", "--points"]):
+        ending = {"--output": "csv", "--plot": "svg", "--contradictions": "geojson", "--points": "ply"}[line[-1]]
         cases.refused(f"{line[-1]} into a missing folder", [*line, closed / f"nowhere/map.{ending}"], "not_found",
                       "nowhere")
         cases.refused(f"{line[-1]} into a file", [*line, file / f"map.{ending}"], "conflict", f"map.{ending}")
@@ -170,6 +171,12 @@ def target_cases(cases, drives, work):
         folder.mkdir()
         cases.refused(f"{line[-1]} over a folder", [*line, folder], "conflict", f"folder.{ending}")
         cases.forbidden(f"{line[-1]} into a closed folder", [*line, closed / f"map.{ending}"], f"map.{ending}")
+    cases.refused("render contradictions that are none", ["render", "-o", drives.folder / "x.png", "--contradictions",
+                                                          drives.folder / "none.csv"], "not_found", "none.csv")
+    poses = drives.folder / "poses.csv"
+    poses.write_bytes(file.read_bytes())
+    cases.refused("render poses as contradictions", ["render", "-o", drives.folder / "x.png", "--contradictions", poses],
+                  "invalid_data", "poses.csv")
     cases.refused("export where nothing is", ["export", "--points", drives.folder / "far.pcd", "--center", "9000,0",
                                               "--radius", "1"], "not_found", "nothing to export")
     cases.refused("query into a file", ["query", *near, "-o", file], "conflict", "poses.txt", is_stream=True)

@@ -71,6 +71,9 @@ USAGE = {
         ["DRIVE", "--relocalize", "--perturb", "1,1"], ["DRIVE", "--relocalize", "--mode", "paper"],
         ["DRIVE", "--relocalize", "--output", "WORK/x.csv"], ["DRIVE", "--relocalize", "--no-restart"],
         ["DRIVE", "--output", "WORK/x.txt"], ["DRIVE", "--output", "WORK/x"], ["DRIVE", "--plot", "WORK/x.jpg"],
+        ["DRIVE", "--contradictions", "WORK/x.txt"], ["DRIVE", "--contradictions", "WORK/x"],
+        *(["DRIVE", "--contradictions", "WORK/x.csv", *other] for other in (
+            ["--relocalize"], ["--perturb", "1,1"], ["--mode", "paper"])),
         ["DRIVE", "--output", "WORK/x.tum", "--perturb", "1,1"], ["DRIVE", "--mode", "paper", "--max-range", "150"],
     ],
     "plan": [
@@ -88,7 +91,7 @@ USAGE = {
                ["--points", "WORK/x.ply", "--center", "0,0", "--radius", "-5"],
                ["--points", "WORK/x.ply", "--center", "0,nan", "--radius", "5"]],
     "render": [[], ["-o"], ["-o", "WORK/x.png", "--layer", "middle"], ["-o", "WORK/x.png", "--layer", "-1"],
-               ["-o", "WORK/x.png", "--color", "pink"]],
+               ["-o", "WORK/x.png", "--color", "pink"], ["-o", "WORK/x.png", "--contradictions", "WORK/x.txt"]],
     "simulate": [[], ["street"], ["moon", "-o", "WORK/moon"], ["street", "-o", "WORK/s", "--sensor", "sonar"],
                  ["street", "-o", "WORK/s", "--seed", "-1"], ["WORK/x.obj", "-o", "WORK/s"],
                  ["street", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt"],

@@ -158,6 +158,18 @@ def track_cases(cases, work, drive):
     cases.report.equal("track.png: a picture", pathlib.Path(work, "track.png").read_bytes()[:4], b"\x89PNG")
 
 
+def contradiction_cases(cases, work, drive):
+    """What `localize --contradictions` writes and `render` draws."""
+    for ending in ("csv", "geojson"):
+        file = pathlib.Path(work) / f"contradictions.{ending}"
+        found = cases.run("localize", drive, "--max-range", "12", "--contradictions", file)["contradictions"]
+        has_keys(cases, "contradictions", found, "appeared vanished moving scans ms_per_scan")
+        text = file.read_text(encoding="ascii")
+        count = len(text.splitlines()) - 1 if ending == "csv" else len(json.loads(text)["features"])
+        cases.report.equal(f"{file.name}: contradictions", count, found["appeared"] + found["vanished"] + found["moving"])
+        cases.run("render", "-o", f"{work}/contradictions.png", "--contradictions", file)
+
+
 def export_cases(cases, work):
     """Of an area, and from a file: the same points."""
     area = ["--center", "0,0", "--radius", "8"]
@@ -291,6 +303,7 @@ def main():
             content_cases(cases, found)
             stream_cases(cases, found, work)
             track_cases(cases, work, drives.good)
+            contradiction_cases(cases, work, drives.good)
             export_cases(cases, work)
             backup_cases(cases, work)
             unlabelled_case(cases, drives)

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "client/cli/commands/drive/contradiction_output.h"
 #include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
@@ -103,6 +104,7 @@ class LocalizeCommand : public Command {
     arguments.Choice("--mode", {"atlas", "paper"}, mode_,
                      "How scans are matched; paper: its encode, decode and ICP, to compare with");
     track_.Declare(arguments);
+    contradictions_.Declare(arguments);
   }
 
   Status Run(CommandContext& context) override {
@@ -112,14 +114,15 @@ class LocalizeCommand : public Command {
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
     if (relocalize_) return Relocalize(*drive, map->source(), context);
-    const auto report = Localize(*drive, map->source(), context);
+    MapView view(map->source());
+    DriveMonitor monitor(view, {}, [this](const Contradiction& c) { contradictions_.Add(c); });
+    if (contradictions_.is_wanted()) options_.monitor = &monitor;
+    const auto report = Localize(*drive, view, context);
     if (!report) return report.error();
+    monitor.Finish();
     ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
-    if (context.is_json) {
-      context.PrintJson(SummaryJson(*report, map->bytes_received()));
-    } else {
-      PrintSummary(*report, map->bytes_received(), context.out);
-    }
+    ATLAS_RETURN_IF_ERROR(contradictions_.Write(map->profile().cell_size_m()));
+    PrintReport(*report, monitor, map->bytes_received(), context);
     return {};
   }
 
@@ -140,6 +143,12 @@ class LocalizeCommand : public Command {
     if (prior_radius_m_ && !relocalize_) {
       return {StatusCode::kInvalidArgument, "--prior-radius needs --relocalize"};
     }
+    if (contradictions_.is_wanted() && (relocalize_ || perturbation_ || mode_ != "atlas")) {
+      return {StatusCode::kInvalidArgument,
+              "--contradictions needs a drive that is tracked: without --relocalize, --perturb and "
+              "--mode paper"};
+    }
+    ATLAS_RETURN_IF_ERROR(contradictions_.Check());
     if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off" ||
                         track_.is_wanted())) {
       return {StatusCode::kInvalidArgument,
@@ -155,6 +164,24 @@ class LocalizeCommand : public Command {
     return relocalize_ ? RelocalizationOptions().Validate() : options_.Validate();
   }
 
+  void PrintReport(const DriveLocalizationReport& report,
+                   const DriveMonitor& monitor,
+                   std::uint64_t bytes_received,
+                   const CommandContext& context) const {
+    if (context.is_json) {
+      boost::json::object summary = SummaryJson(report, bytes_received);
+      if (contradictions_.is_wanted()) summary["contradictions"] = contradictions_.Json(monitor);
+      context.PrintJson(summary);
+      return;
+    }
+    PrintSummary(report, bytes_received, context.out);
+    if (contradictions_.is_wanted()) {
+      FactList facts;
+      facts.Add("contradictions", contradictions_.Text(monitor));
+      facts.Print(context.out);
+    }
+  }
+
   // Of the picture: the folder's own name.
   std::string Title(const DriveFolder& drive) const {
     const std::filesystem::path folder = std::filesystem::absolute(drive.path).lexically_normal();
@@ -162,9 +189,8 @@ class LocalizeCommand : public Command {
   }
 
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,
-                                           MapSource& source,
+                                           MapView& view,
                                            const CommandContext& context) {
-    MapView view(source);
     // Lines of a stream would run into the bar on the same terminal.
     const bool is_stream_seen = context.is_json && context.is_out_terminal;
     const std::uint32_t first = drive.scans.front().number;
@@ -207,6 +233,7 @@ class LocalizeCommand : public Command {
   bool no_restart_ = false;
   std::optional<double> prior_radius_m_;
   TrackOutput track_;
+  ContradictionOutput contradictions_;
   std::string mode_ = "atlas";
   std::string deskew_ = "off";
   std::optional<Perturbation> perturbation_;

@@ -1,17 +1,12 @@
 #include "client/cli/commands/drive/track_output.h"
 
-#include <cerrno>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <numbers>
-
-#include <unistd.h>
 
 #include "client/cli/files/whole_file.h"
 #include "client/render/image.h"
 #include "client/render/plot/line_plot.h"
-#include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -21,15 +16,6 @@ constexpr Rgb kBlue{31, 119, 180};
 constexpr Rgb kOrange{255, 127, 14};
 constexpr Rgb kGreen{44, 160, 44};
 constexpr Rgb kViolet{148, 103, 189};
-
-// A file may stand or be made there.
-Status CheckPlace(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  if (::access((folder / ".").c_str(), W_OK) != 0) return DiskError("cannot write", path, errno);
-  if (std::filesystem::is_directory(path, error)) return DiskError("cannot write", path, EISDIR);
-  return {};
-}
 
 template <typename Value>
 PlotCurve CurveOf(const std::string& name,

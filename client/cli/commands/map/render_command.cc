@@ -1,5 +1,6 @@
 // `atlas render`: a picture of the whole atlas.
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/files/contradiction_file.h"
 #include "client/cli/files/route_file.h"
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
@@ -20,6 +21,27 @@ LevelReader ReaderOf(MapSource& source) {
   };
 }
 
+Rgb ColorOf(ContradictionKind kind) {
+  switch (kind) {
+    case ContradictionKind::kAppeared:
+      return {255, 48, 48};
+    case ContradictionKind::kVanished:
+      return {64, 144, 255};
+    case ContradictionKind::kMoving:
+      return {72, 224, 96};
+  }
+  return {};
+}
+
+std::vector<MapMark> MarksOf(const std::vector<ContradictionPlace>& places, double cell_size_m) {
+  std::vector<MapMark> marks;
+  marks.reserve(places.size());
+  for (const ContradictionPlace& place : places) {
+    marks.push_back({place.center_m, cell_size_m, ColorOf(place.kind)});
+  }
+  return marks;
+}
+
 class RenderCommand : public Command {
  public:
   std::string Name() const override { return "render"; }
@@ -32,6 +54,9 @@ class RenderCommand : public Command {
                        "Which surface of a cell is shown; 0 is the lowest [highest]");
     arguments.Choice("--color", {"height", "occupancy", "layers", "columns"}, color_,
                      "What colours mean");
+    arguments.Optional("--contradictions", "FILE", contradictions_,
+                       "What `atlas localize --contradictions` wrote, drawn over it: red appeared, "
+                       "blue vanished, green moves");
     arguments.Optional("--path", "FILE", path_, "A route of `atlas plan --output`, drawn over it");
   }
 
@@ -48,8 +73,15 @@ class RenderCommand : public Command {
       if (!route) return route.error();
       options.route = *std::move(route);
     }
+    std::vector<ContradictionPlace> contradictions;
+    if (!contradictions_.empty()) {
+      auto read = ReadContradictions(contradictions_);
+      if (!read) return read.error();
+      contradictions = *std::move(read);
+    }
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
+    options.marks = MarksOf(contradictions, map->profile().cell_size_m());
     const auto picture = RenderMap(ReaderOf(map->source()), options, map->profile());
     if (!picture) return picture.error();
     ATLAS_RETURN_IF_ERROR(WritePng(picture->image, file_));
@@ -71,6 +103,7 @@ class RenderCommand : public Command {
 
   std::string file_;
   std::string path_;
+  std::string contradictions_;
   std::string layer_ = "highest";
   std::string color_ = "height";
 };

@@ -1,5 +1,5 @@
 // What of an atlas's past its answers depend upon. The rows of events tell it, and may be damaged:
-// what else tells it is asked, too (docs/decisions/0508-a-damaged-past.md).
+// what else tells it is asked, too (docs/decisions/0509-a-damaged-past.md).
 #pragma once
 
 #include <vector>

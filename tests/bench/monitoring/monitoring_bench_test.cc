@@ -1,0 +1,187 @@
+// A piece of a simulated street tracked in its own map, damaged on purpose: the benchmark in small.
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "client/drive/drive_localization.h"
+#include "core/scan/scan_reader.h"
+#include "core/simulation/simulated_drive.h"
+#include "tests/bench/localization/fused_drive.h"
+#include "tests/bench/monitoring/change_score.h"
+#include "tests/bench/monitoring/damaged_map.h"
+
+namespace atlas::testing {
+namespace {
+
+constexpr std::size_t kFirstScan = 40;
+constexpr std::size_t kScans = 20;
+
+class MonitoringBenchTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    // Each test is a process of its own, and they run side by side.
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              ("monitoring_bench_test_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    const auto simulated = SimulatedDrive::Create(MakeWorld(WorldKind::kStreet).value(), {});
+    ASSERT_TRUE(simulated.has_value());
+    drive_ = DriveFolder{folder_, {}};
+    for (std::size_t i = kFirstScan; i < kFirstScan + kScans; ++i) {
+      DriveScan scan;
+      scan.number = static_cast<std::uint32_t>(i);
+      scan.scan = folder_ / (std::to_string(i) + ".bin");
+      scan.T_world_sensor = simulated->sensor_pose(i);
+      std::ofstream file(scan.scan, std::ios::binary);
+      for (const SimulatedPoint& p : simulated->Scan(i).points) {
+        const std::array<float, 4> row{p.x, p.y, p.z, 0.0F};
+        file.write(reinterpret_cast<const char*>(row.data()), sizeof(row));
+      }
+      drive_.scans.push_back(scan);
+    }
+  }
+  static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+
+  static FusedDrive Map() {
+    return FusedDrive::Fuse(drive_, SurveyDrive(drive_, {}).value(), {}).value();
+  }
+
+  static std::vector<Eigen::Vector3d> Way() {
+    std::vector<Eigen::Vector3d> way;
+    for (const DriveScan& scan : drive_.scans) way.push_back(scan.T_world_sensor.translation());
+    return way;
+  }
+
+  static DamagedMap Damaged(const DamageOptions& options) {
+    FusedDrive map = Map();
+    return DamagedMap::Make(map, Way(), options).value();
+  }
+
+  static std::vector<Contradiction> Track(MapSource& map) {
+    std::vector<Contradiction> found;
+    MapView view(map);
+    DriveMonitor monitor(view, {}, [&found](const Contradiction& c) { found.push_back(c); });
+    DriveLocalizationOptions options;
+    options.monitor = &monitor;
+    const auto report = LocalizeDrive(drive_, options, view, [](const LocalizedScan& scan) {
+      EXPECT_NE(scan.located.health, LocalizationHealth::kLost);
+      EXPECT_LT(scan.error.translation_m, 0.15);
+    });
+    EXPECT_TRUE(report.has_value());
+    monitor.Finish();
+    EXPECT_EQ(monitor.scans(), kScans);
+    return found;
+  }
+
+  static ChangesSeen See(const DamagedMap& map) {
+    ChangesSeen seen(map.changes(), map.profile(), 2.0, 30.0);
+    for (const DriveScan& scan : drive_.scans) {
+      std::vector<Eigen::Vector3d> returns;
+      const PointCloud cloud = ReadScan(scan.scan).value();
+      for (const Eigen::Vector3f& p : cloud.points) {
+        returns.push_back(scan.T_world_sensor * p.cast<double>());
+      }
+      seen.Add(scan.T_world_sensor.translation(), returns);
+    }
+    return seen;
+  }
+
+  inline static std::filesystem::path folder_;
+  inline static DriveFolder drive_;
+};
+
+TEST_F(MonitoringBenchTest, NextToNothingLastsInTheMapAsItIs) {
+  FusedDrive map = Map();
+  std::size_t lasting = 0;
+  for (const Contradiction& c : Track(map)) {
+    lasting += c.kind == ContradictionKind::kMoving ? 0U : 1U;
+  }
+  EXPECT_LT(lasting, 60U);
+}
+
+TEST_F(MonitoringBenchTest, WhatIsReportedWasMadeAndWhatWasMadeIsReported) {
+  DamagedMap map = Damaged({.column_share = 0.3, .cars = 2, .is_building_gone = true});
+  const std::vector<Contradiction> found = Track(map);
+  const ChangeScore score = ScoreChanges(found, map.changes(), See(map), 6, map.profile());
+  for (const std::size_t kind : {0U, 1U}) {
+    EXPECT_GT(score.reported[kind], 200U);
+    EXPECT_GT(static_cast<double>(score.right[kind]),
+              0.8 * static_cast<double>(score.reported[kind]));
+  }
+  std::size_t cells = 0;
+  std::size_t reported = 0;
+  for (const auto& parts : score.recall) {
+    for (const Found& part : parts) {
+      cells += part.cells;
+      reported += part.found;
+    }
+  }
+  EXPECT_GT(cells, 5'000U);
+  EXPECT_GT(static_cast<double>(reported), 0.8 * static_cast<double>(cells));
+}
+
+TEST_F(MonitoringBenchTest, DamageIsWhatItSaysItIs) {
+  EXPECT_TRUE(Damaged({}).changes().cells.empty());
+  const DamagedMap gone = Damaged({.is_building_gone = true});
+  EXPECT_GT(gone.changes().cells.size(), 100U);
+  for (const ChangedCell& cell : gone.changes().cells) {
+    EXPECT_EQ(cell.part, ChangePart::kBuilding);
+    EXPECT_EQ(cell.vanished, 0U);
+    EXPECT_NE(cell.appeared, 0U);
+    EXPECT_EQ(gone.changes().At(cell.x, cell.y)->appeared, cell.appeared);
+  }
+  const DamagedMap again = Damaged({.is_building_gone = true});
+  EXPECT_EQ(again.changes().cells.size(), gone.changes().cells.size());
+}
+
+TEST(ChangesSeenTest, RaysSeeWhereTheyPassAndWhereTheyEnd) {
+  MapProfile profile;
+  ChangedSegments changes;
+  changes.Add({50, 0, 0, 1, ChangePart::kCars});   // put at (5.05, 0.05)
+  changes.Add({100, 0, 1, 0, ChangePart::kCars});  // taken from (10.05, 0.05)
+  ChangesSeen seen(changes, profile, 2.0, 30.0);
+  const std::vector<Eigen::Vector3d> returns{{10.05, 0.05, 0.5}};
+  seen.Add({0.0, 0.05, 0.5}, returns);
+  EXPECT_EQ(seen.scans(0, ContradictionKind::kVanished), 1U);
+  EXPECT_EQ(seen.scans(1, ContradictionKind::kAppeared), 1U);
+  // Above both, and too short.
+  seen.Add({0.0, 0.05, 1.5}, std::vector<Eigen::Vector3d>{{10.05, 0.05, 1.5}});
+  seen.Add({0.0, 0.05, 0.5}, std::vector<Eigen::Vector3d>{{4.0, 0.05, 0.5}});
+  EXPECT_EQ(seen.scans(0, ContradictionKind::kVanished), 1U);
+  EXPECT_EQ(seen.scans(1, ContradictionKind::kAppeared), 1U);
+}
+
+TEST(ChangeScoreTest, ACellBesideIsNearEnoughAndAnotherKindIsNot) {
+  MapProfile profile;
+  ChangedSegments changes;
+  changes.Add({50, 0, 0, 1, ChangePart::kCars});
+  ChangesSeen seen(changes, profile, 2.0, 30.0);
+  seen.Add({0.0, 0.05, 0.5}, std::vector<Eigen::Vector3d>{{10.05, 0.05, 0.5}});
+  Contradiction beside;
+  beside.kind = ContradictionKind::kVanished;
+  beside.cell_x = 51;
+  beside.high_mm = 1'000;
+  Contradiction other = beside;
+  other.kind = ContradictionKind::kAppeared;
+  Contradiction above = beside;
+  above.low_mm = 1'000;
+  above.high_mm = 2'000;
+  Contradiction away = beside;
+  away.cell_x = 53;
+  const std::vector<Contradiction> reported{beside, other, above, away};
+  const ChangeScore score = ScoreChanges(reported, changes, seen, 1, profile);
+  EXPECT_EQ(score.reported[1], 3U);
+  EXPECT_EQ(score.right[1], 1U);
+  EXPECT_EQ(score.right[0], 0U);
+  EXPECT_EQ(score.recall[1][1].cells, 1U);
+  EXPECT_EQ(score.recall[1][1].found, 1U);
+  EXPECT_EQ(score.exact.found, 0U);
+  EXPECT_EQ(ScoreChanges(reported, changes, seen, 2, profile).recall[1][1].cells, 0U);
+}
+
+}  // namespace
+}  // namespace atlas::testing
