@@ -126,6 +126,7 @@ SessionState LedgerJudge::StateAfter(int vehicle,
     case SessionAction::kRetract:
       return SessionState::kRetracted;
     case SessionAction::kRestore:
+    case SessionAction::kPublish:
       return IsImplausible(vehicle, session) ? SessionState::kQuarantined : SessionState::kLive;
     case SessionAction::kRelease:
       return SessionState::kReleased;
