@@ -1,7 +1,9 @@
 #include "core/localization/monitor/watched_tile.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -20,6 +22,15 @@ std::uint64_t KeyOf(std::size_t cell, std::int32_t segment) {
 
 // Of a column: looks at which it stood where it should, before it is looked at less often.
 constexpr std::uint8_t kCalm = 4;
+
+// The segments of a column that vanished, but for the ends of what stands: something that reaches a
+// little way into a segment is not seen by rays through the rest of it.
+std::uint32_t WithoutEnds(std::uint32_t vanished, std::uint32_t occupied) {
+  const std::uint32_t standing = occupied & ~vanished;
+  const std::uint32_t tops = (standing << 1) & ~(occupied >> 1);
+  const std::uint32_t bottoms = (standing >> 1) & ~(occupied << 1);
+  return vanished & ~tops & ~bottoms;
+}
 
 // Segment by segment in, contradictions of one kind on top of each other as one out.
 class Joined {
@@ -197,13 +208,19 @@ Contradiction WatchedTile::ContradictionAt(std::uint32_t cell,
 std::vector<Contradiction> WatchedTile::Vanished(const EvidenceOptions& options) const {
   std::vector<Contradiction> found;
   for (const Column& column : columns_) {
+    std::array<std::optional<Verdict>, 16> verdicts;
+    std::uint32_t vanished = 0;
     std::uint32_t evidence = column.first;
     for (std::uint32_t left = column.segments; left != 0; left &= left - 1, ++evidence) {
       const int k = std::countr_zero(left);
-      if (const auto verdict = occupied_[evidence].Judge(HalvesOf(column, k), options)) {
-        found.push_back(
-            ContradictionAt(column.cell, column.altitude_mm, column.base + k, *verdict));
-      }
+      const auto at = static_cast<std::size_t>(k);
+      verdicts[at] = occupied_[evidence].Judge(HalvesOf(column, k), options);
+      vanished |= verdicts[at] ? std::uint32_t{1} << k : 0;
+    }
+    for (std::uint32_t left = WithoutEnds(vanished, column.segments); left != 0; left &= left - 1) {
+      const int k = std::countr_zero(left);
+      found.push_back(ContradictionAt(column.cell, column.altitude_mm, column.base + k,
+                                      *verdicts[static_cast<std::size_t>(k)]));
     }
   }
   return found;

@@ -127,6 +127,13 @@ TEST(MapMonitorTest, AWallThatIsGoneVanished) {
   }
 }
 
+// Its bonnet reaches 0.05 m into a segment that rays pass through.
+TEST(MapMonitorTest, TheTopOfWhatStandsHasNotVanished) {
+  ShapeWorld world = Houses();
+  world.boxes.push_back(Box{{1.05, 2.55, -0.1}, {5.05, 4.35, 1.06}});
+  EXPECT_TRUE(Watch(MapOf(world), world).empty());
+}
+
 TEST(MapMonitorTest, ABoxThatIsNewAppeared) {
   const ShapeWorld mapped = Houses();
   ShapeWorld now = mapped;
