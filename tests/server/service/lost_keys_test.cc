@@ -298,6 +298,10 @@ TEST_F(LostKeysTest, OfTwoLinesOfPosesWithOneKeyTheWholeOneStays) {
     EXPECT_EQ(store_->CheckRevision(kDrive).code(), StatusCode::kNotFound)
         << "where one of them was is not known";
     Close();
+    EXPECT_EQ(testing::AskDatabase(
+                  Database(), "SELECT sum(keyframe_id) FROM pose_history WHERE author = 'tester'"),
+              *id == 5 ? 6 : 5)
+        << "by whom the other was moved is told as ever";
     std::filesystem::remove_all(directory_ / "data");
   }
 }
