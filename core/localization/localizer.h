@@ -60,6 +60,10 @@ struct LocalizerOptions {
   double map_sigma_rad = 0.0006;
   double evidence_share = 0.2;
 
+  // A direction that all features together hold no better than this is held by what errs together,
+  // such as the slope that noise gives a plain: it counts as unseen.
+  double max_held_sigma_m = 0.3;
+
   // Where the place is less certain than this, starts are tried along the least certain direction,
   // two sigmas either way ...
   double fan_sigma_m = 0.4;

@@ -21,7 +21,7 @@ SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
 WATCH = atlas_pb2.Envelope(request_id=3, watch_request=atlas_pb2.WatchRequest(
     area=geometry.disc(1.5, -2, 100), interval_ms=1000))
 HELLO_REPLY = atlas_pb2.Envelope(request_id=1, hello_reply=atlas_pb2.HelloReply(
-    protocol_major=1, protocol_minor=9, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
+    protocol_major=1, protocol_minor=10, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
     max_frame_bytes=MAX_PAYLOAD_BYTES, name="car.7", role="vehicle", last_sequence=11))
 UPLOAD = atlas_pb2.Envelope(request_id=4, upload_keyframe=atlas_pb2.UploadKeyframe(
     key=atlas_pb2.KeyframeKey(vehicle="car.7", session="monday", sequence=12), time_ms=1_790_000_000_000,
@@ -35,13 +35,23 @@ PAGE = atlas_pb2.Envelope(request_id=5, sessions_reply=atlas_pb2.SessionsReply(
     sessions=[atlas_pb2.SessionInfo(vehicle="car.7", session="tuesday", state="live", keyframes=2, bytes=300,
                                     first_time_ms=1_790_000_000_000, last_time_ms=1_790_000_001_000,
                                     last_sequence=1)], has_more=True))
+KEYFRAMES = atlas_pb2.Envelope(request_id=6, keyframes_request=atlas_pb2.KeyframesRequest(
+    vehicle="car.7", session="monday", after_sequence=11))
+KEYFRAMES_REPLY = atlas_pb2.Envelope(request_id=6, keyframes_reply=atlas_pb2.KeyframesReply(keyframes=[
+    atlas_pb2.KeyframeInfo(sequence=12, time_ms=1_790_000_000_000, pose=UPLOAD.upload_keyframe.pose)]))
+STAGED = atlas_pb2.Envelope(request_id=7, upload_keyframe=atlas_pb2.UploadKeyframe(
+    key=atlas_pb2.KeyframeKey(vehicle="car.7", session="tuesday"), time_ms=1_790_000_000_000,
+    pose=UPLOAD.upload_keyframe.pose, blob=b"\xaa\xbb\xcc", staged=True))
+PUBLICATION = atlas_pb2.Envelope(request_id=8, change_session=atlas_pb2.ChangeSession(
+    vehicle="car.7", session="tuesday", action=atlas_pb2.ChangeSession.PUBLISH))
 MANIFEST = atlas_pb2.Envelope(request_id=2, sync_manifest=atlas_pb2.SyncManifest(
     keys=[geometry.tile_key(1, 1, 1)], revisions=[42], payload_hashes=[0x0807060504030201], bytes=[3], errors_mm=[200],
     current_tiles=b"\1", not_modified=1))
 TILE = atlas_pb2.Envelope(request_id=2, tile=atlas_pb2.TileMessage(
     key=geometry.tile_key(1, 1, 1), revision=42, payload_hash=0x0807060504030201, blob=b"\xaa\xbb\xcc"))
 END = atlas_pb2.Envelope(request_id=2, sync_end=atlas_pb2.SyncEnd(tiles=1, bytes=116, revision=42))
-ENVELOPES = [HELLO, BACKUP, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, SESSIONS, PAGE, MANIFEST, TILE, END]
+ENVELOPES = [HELLO, BACKUP, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, SESSIONS, PAGE, KEYFRAMES,
+             KEYFRAMES_REPLY, STAGED, PUBLICATION, MANIFEST, TILE, END]
 
 
 def leading_bytes(line):
