@@ -115,6 +115,7 @@ TEST_F(DamagedPurgeTest, TheNextStartEmptiesTheLogWhateverBecameOfTheEvent) {
   for (const char* const damage :
        {"UPDATE events SET author = 'x'", "UPDATE events SET kind = 1", "DELETE FROM events",
         "UPDATE sessions SET state = 1; DELETE FROM session_states",
+        "UPDATE events SET kind = 1; UPDATE sessions SET state = 1; DELETE FROM session_states",
         "DELETE FROM events; UPDATE sessions SET state = 1 WHERE state = 5"}) {
     SCOPED_TRACE(damage);
     store_.reset();
