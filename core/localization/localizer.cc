@@ -23,14 +23,6 @@ Eigen::Matrix4d PoseInformation(const Eigen::Matrix<double, 6, 6>& information) 
   return information(kAxes, kAxes);
 }
 
-// What is known of (x, y, z, yaw) where nothing is of one horizontal direction.
-Eigen::Matrix4d Without(const Eigen::Vector2d& direction, const Eigen::Matrix4d& information) {
-  Eigen::Vector4d unknown = Eigen::Vector4d::Zero();
-  unknown.head<2>() = direction;
-  const Eigen::Matrix4d beside = Eigen::Matrix4d::Identity() - unknown * unknown.transpose();
-  return beside * information * beside;
-}
-
 bool AreApart(const Pose& a, const Pose& b, const PoseSearchOptions& options) {
   const Eigen::AngleAxisd turned(a.linear().transpose() * b.linear());
   return (a.translation() - b.translation()).norm() > options.apart_m ||
@@ -177,11 +169,13 @@ Eigen::Matrix4d Localizer::Seen(const RegistrationResult& registration,
   const Eigen::Vector4d map_sigmas(place_m, place_m, options_.map_sigma_m, options_.map_sigma_rad);
   const Eigen::Matrix4d map = map_sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
   seen -= (seen * (seen + map).inverse() * seen).eval();  // of the sum of both covariances
-  const WorstDirection worst = WorstDirectionOf(registration);
-  if (worst.sigma_m > options_.max_held_sigma_m) {
-    seen = Without(worst.direction, seen);
+  if (rival) {
+    Eigen::Vector4d towards = Eigen::Vector4d::Zero();
+    towards.head<2>() = rival->normalized();
+    const Eigen::Matrix4d beside = Eigen::Matrix4d::Identity() - towards * towards.transpose();
+    seen = (beside * seen * beside).eval();
   }
-  return rival ? Without(rival->normalized(), seen) : seen;
+  return seen;
 }
 
 void Localizer::Remember(const LocalizationResult& result,

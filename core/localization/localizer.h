@@ -53,16 +53,12 @@ struct LocalizerOptions {
   // feature counts as much in a log likelihood. However many there are, no place is known better
   // than the map is: standard deviations, of a place also as a share of a cell. Fitted to the
   // errors of single shots with 16 and 64 rings and along a simulated drive.
-  double information_share = 0.15;
+  double information_share = 0.08;
   double map_sigma_m = 0.01;
   double map_sigma_cells = 0.04;
   double coarse_sigma_cells = 0.4;  // a coarse cell stands where any of its fine ones does
   double map_sigma_rad = 0.0006;
   double evidence_share = 0.2;
-
-  // A direction that all features together hold no better than this is held by what errs together,
-  // such as the slope that noise gives a plain: it counts as unseen.
-  double max_held_sigma_m = 0.3;
 
   // Where the place is less certain than this, starts are tried along the least certain direction,
   // two sigmas either way ...

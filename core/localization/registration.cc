@@ -156,7 +156,7 @@ double Share(int part, std::size_t whole) {
 
 }  // namespace
 
-WorstDirection WorstDirectionOf(const RegistrationResult& result) {
+double WorstSigma(const RegistrationResult& result) {
   // What is left of the place's information when height and heading are free.
   constexpr std::array<int, 2> kPlace{0, 1};
   constexpr std::array<int, 2> kOthers{2, 5};
@@ -166,13 +166,8 @@ WorstDirection WorstDirectionOf(const RegistrationResult& result) {
   Eigen::Matrix2d others = result.information(kOthers, kOthers);
   others.diagonal().array() += kLittle;
   const Eigen::Matrix2d left = place - mixed * others.inverse() * mixed.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(left);
-  WorstDirection worst;
-  worst.direction = solver.eigenvectors().col(0);
-  if (const double least = solver.eigenvalues()(0); least > 0.0) {
-    worst.sigma_m = std::min(worst.sigma_m, 1.0 / std::sqrt(least));
-  }
-  return worst;
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(left).eigenvalues()(0);
+  return least > 0.0 ? std::min(1.0 / std::sqrt(least), 1e9) : 1e9;
 }
 
 RegistrationResult Register(const MapWindow& map,

@@ -50,16 +50,9 @@ struct RegistrationResult {
   bool is_converged = false;
 };
 
-// The least certain horizontal direction, with height and heading as uncertain as they are, as far
-// as features are independent.
-struct WorstDirection {
-  double sigma_m = 1e9;  // that where nothing holds it
-  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();
-};
-WorstDirection WorstDirectionOf(const RegistrationResult& result);
-inline double WorstSigma(const RegistrationResult& result) {
-  return WorstDirectionOf(result).sigma_m;
-}
+// Standard deviation of the least certain horizontal direction with height and heading as uncertain
+// as they are, as far as features are independent, metres; 1e9 where nothing holds it.
+double WorstSigma(const RegistrationResult& result);
 
 RegistrationResult Register(const MapWindow& map,
                             const ScanFeatures& features,
