@@ -8,6 +8,7 @@ import tempfile
 
 from bench_daemon import Atlas, rows_of
 
+IMAGES = pathlib.Path(__file__).parent.parent / "docs/images"
 RINGS = 16
 ASKED = 0.8
 # name, drive of the map, its scans, tracked drive, its scans; WORLD:SEED is simulated
@@ -93,7 +94,8 @@ def is_near(cell, cells, reach):
 
 
 def bench_parked(bin_dir, emit, work):
-    """Cars of the second day where none stood on the first appeared; those of the first day alone vanished."""
+    """Cars of the second day where none stood on the first appeared; those of the first day alone vanished. Draws
+    docs/images/contradictions.png."""
     days = [simulate(bin_dir, pathlib.Path(work) / f"day{day}", "street", "--parked", str(day), "--seed", str(day))
             for day in (1, 2)]
     cars = [car_cells(day) for day in days]
@@ -102,6 +104,7 @@ def bench_parked(bin_dir, emit, work):
         atlas.run("ingest", days[0], "--max-range", "40", "--every", "0")
         atlas.run("wait")
         atlas.run("localize", days[1], "--contradictions", file)
+        atlas.run("render", "-o", IMAGES / "contradictions.png", "--contradictions", file)
     with open(file, newline="", encoding="ascii") as lines:
         rows = list(csv.DictReader(lines))
     for kind, here, elsewhere in (("appeared", cars[1], cars[0]), ("vanished", cars[0], cars[1])):

@@ -136,10 +136,12 @@ float WatchedTile::FootOf(std::int32_t altitude_mm, double sensor_z_m) const {
 }
 
 std::uint8_t WatchedTile::HalvesOf(const Column& column, int segment) const {
+  // Less of the lower half than this is no gap that rays would find.
+  constexpr std::int64_t kLeast_mm = 150;
   const std::int64_t middle_mm = std::int64_t{column.base + segment} * profile_.segment_height_mm +
                                  profile_.segment_height_mm / 2;
-  const bool is_ground = middle_mm <= column.altitude_mm + profile_.column_base_offset_mm;
-  return is_ground ? kUpperHalf : kLowerHalf | kUpperHalf;
+  const std::int64_t foot_mm = column.altitude_mm + profile_.column_base_offset_mm;
+  return middle_mm - foot_mm < kLeast_mm ? kUpperHalf : kLowerHalf | kUpperHalf;
 }
 
 // What stands there look after look and what is hidden is looked at less often, neighbours in turn.

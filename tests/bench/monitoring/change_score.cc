@@ -106,6 +106,7 @@ void ChangesSeen::March(const Eigen::Vector3d& sensor, const Eigen::Vector3d& en
     const std::uint32_t index = grid_[static_cast<std::size_t>(y * width_ + x)];
     if (index == 0) continue;
     const ChangedCell& cell = changes_.cells[index - 1];
+    if (p.z() < cell.foot_m) continue;
     const int bit =
         static_cast<int>(std::floor(p.z() / profile_.segment_height_m())) - changes_.lowest;
     if (bit < 0 || bit >= 64) continue;

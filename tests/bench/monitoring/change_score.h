@@ -15,8 +15,8 @@
 
 namespace atlas::testing {
 
-// Which changed cells rays passed through or ended in, scan by scan: by marching along each ray,
-// without anything of the monitor.
+// Which changed cells rays passed through or ended in, above their ground, scan by scan: by
+// marching along each ray, without anything of the monitor.
 class ChangesSeen {
  public:
   // Rays count from `min_range_m` to `max_range_m` from the sensor, in plan.

@@ -21,6 +21,9 @@ struct ChangedCell {
   std::uint64_t appeared = 0;  // taken out of the map
   std::uint64_t vanished = 0;  // put into it
   ChangePart part = ChangePart::kColumns;
+  // Lower than this, world frame, returns are ground and no column (the profile's base offset above
+  // the lowest layer that was changed).
+  double foot_m = -1e9;
 
   std::uint64_t Of(ContradictionKind kind) const {
     return kind == ContradictionKind::kVanished ? vanished : appeared;

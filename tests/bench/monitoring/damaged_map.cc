@@ -267,7 +267,11 @@ ChangedSegments Compare(const OpenMap& before, const OpenMap& after, const MapPr
       const bool is_none_measured = std::none_of(layers.begin(), layers.end(), IsMeasured);
       for (std::size_t i = tile.cell_begin[c]; i < tile.cell_begin[c + 1]; ++i) {
         if (!is_none_measured && !IsMeasured(tile.layers[i])) continue;
+        const bool is_first = (cell.appeared | cell.vanished) == 0;
         Compare(tile.layers[i], other.layers[i], profile, changes.lowest, cell);
+        if (is_first && (cell.appeared | cell.vanished) != 0) {
+          cell.foot_m = (tile.layers[i].altitude_mm + profile.column_base_offset_mm) * 1e-3;
+        }
         cell.part = std::max(cell.part, after.part(id, i));
       }
       if ((cell.appeared | cell.vanished) != 0) changes.Add(cell);
