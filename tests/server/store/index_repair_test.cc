@@ -1,5 +1,7 @@
 // Indexes that have something else than their tables: each is found, and made anew where the rows
 // are whole. Where they are not, nothing is made of them.
+#include <fstream>
+
 #include <gmock/gmock.h>
 
 #include "tests/server/store/lost_rows.h"
@@ -106,6 +108,36 @@ TEST_F(IndexRepairTest, EveryTileIsFusedAgainByOneThatWasMadeAnew) {
   EXPECT_GT(tiles_, 3U);
   EXPECT_GE(Dirty().dirty_tiles, tiles_);
   EXPECT_EQ(Dirty().oldest_since, kReflectsNothing) << "they reflect nothing for sure";
+}
+
+// What to do about it is said where it is met: an index can be made anew, a page cannot.
+TEST_F(IndexRepairTest, WhoMeetsOneIsToldWhatHelps) {
+  Live();
+  store_.reset();
+  testing::TurnBits(Database(), "sqlite_autoindex_keyframes_1", {4, 9, 1, 1, 3, 3}, 4, 64);
+  Open();
+  const auto compact = [this] {
+    return Await<CompactionResult>([this](auto done) {
+      store_->Compact({Dirty().revision, 5'000, {3}, "tester"}, std::move(done));
+    });
+  };
+  const auto lacking = compact();
+  ASSERT_FALSE(lacking);
+  EXPECT_THAT(lacking.error().message(), HasSubstr("(SQLite 779); atlas verify --repair"));
+  ASSERT_TRUE(Repair());
+  EXPECT_TRUE(compact());
+
+  store_.reset();
+  const std::size_t page = testing::RootPage(Database(), "sqlite_autoindex_keyframes_1");
+  std::fstream file(Database(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(static_cast<std::streamoff>((page - 1) * testing::kPageBytes));
+  file << std::string(testing::kPageBytes, '\0');
+  file.close();
+  Open();
+  const auto gone = Put(MakeKeyframe(7, {{0, 1, 2}}));
+  ASSERT_FALSE(gone);
+  EXPECT_EQ(gone.error().code(), StatusCode::kInvalidData);
+  EXPECT_THAT(gone.error().message(), HasSubstr("; restore a backup"));
 }
 
 // The table has the damage, and an index what was there.

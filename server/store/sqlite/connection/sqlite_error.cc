@@ -49,9 +49,14 @@ bool IsWithoutTable(const SQLite::Exception& error) {
           what.find("ON CONFLICT clause does not match") != std::string_view::npos);
 }
 
-// SQLite's own word for it.
-bool IsUnreadablePage(const SQLite::Exception& error) {
-  return std::string_view(error.what()) == sqlite3_errstr(SQLITE_CORRUPT);
+// Where SQLite says itself that the file is damaged: an index that lacks a row can be made anew, a
+// page that cannot be read is gone.
+const char* AdviceOf(const SQLite::Exception& error) {
+  if (std::string_view(error.what()) != sqlite3_errstr(SQLITE_CORRUPT)) {
+    return "";
+  }
+  return error.getExtendedErrorCode() == SQLITE_CORRUPT_INDEX ? "; atlas verify --repair"
+                                                              : "; restore a backup";
 }
 
 }  // namespace
@@ -72,9 +77,8 @@ Status StatusFromSqlite(const SQLite::Exception& error) {
                SQLITE_IOERR_SHMSIZE, ")"));
   }
   const int primary = error.getErrorCode() & 0xFF;
-  return Status(CodeOf(primary),
-                StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")",
-                       IsUnreadablePage(error) ? "; restore a backup" : ""));
+  return Status(CodeOf(primary), StrCat("store: ", error.what(), " (SQLite ",
+                                        error.getExtendedErrorCode(), ")", AdviceOf(error)));
 }
 
 Status StatusFromSqliteCode(int code, const char* what) {
