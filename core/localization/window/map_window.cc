@@ -85,17 +85,25 @@ void MapWindow::ReadPlaces(const std::vector<const std::shared_ptr<const Tile>*>
     return *places_[i];
   };
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (sources[i] == nullptr) {
+    const bool is_known =
+        places_[i] != nullptr &&
+        places_[i]->IsOf(sources[i] == nullptr ? nullptr : *sources[i], grid_.first_segment());
+    if (sources[i] == nullptr && !is_known) {
       give_back(i);
-    } else if (places_[i] == nullptr || !places_[i]->IsOf(*sources[i], grid_.first_segment())) {
+    } else if (sources[i] != nullptr && !is_known) {
       place_at(i).Read(*sources[i], grid_.IdOf(i), profile_, grid_.first_segment(),
                        options_.content, ++serial_);
     }
   }
   // Beside what stands at a place's edge points find it from outside, too.
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (sources[i] == nullptr && IsBesideOccupied(i)) {
-      place_at(i).ReadNothing();
+    if (sources[i] != nullptr) {
+      continue;
+    }
+    if (!IsBesideOccupied(i)) {
+      give_back(i);
+    } else if (places_[i] == nullptr) {
+      place_at(i).ReadNothing(++serial_);
     }
   }
   constexpr std::size_t kMaxSpare = 64;

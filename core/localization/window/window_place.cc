@@ -30,15 +30,16 @@ void WindowPlace::Read(const std::shared_ptr<const Tile>& tile,
   serial_ = serial;
 }
 
-void WindowPlace::ReadNothing() {
+void WindowPlace::ReadNothing(std::uint64_t serial) {
   content_.Clear();
   tile_.reset();
   level_ = 0;
-  serial_ = 0;
+  serial_ = serial;
 }
 
 bool WindowPlace::IsOf(const std::shared_ptr<const Tile>& tile, std::int64_t first_segment) const {
-  return first_segment == first_segment_ && tile_.lock() == tile;
+  return tile == nullptr ? content_.is_empty()
+                         : first_segment == first_segment_ && tile_.lock() == tile;
 }
 
 void WindowPlace::Link(const Nine& around,

@@ -51,9 +51,9 @@ class WindowPlace {
             std::int64_t first_segment,
             const ContentOptions& options,
             std::uint64_t serial);
-  // Nothing.
-  void ReadNothing();
-  // Whether it was read from `tile`, for `first_segment`.
+  // Nothing: there is no tile.
+  void ReadNothing(std::uint64_t serial);
+  // Whether it was read from `tile`, for `first_segment`; null: from none.
   bool IsOf(const std::shared_ptr<const Tile>& tile, std::int64_t first_segment) const;
 
   // What stands around it; nothing is done where that is what it was linked with. All of `around`

@@ -164,6 +164,34 @@ TEST(MovingWindowTest, APlaceKnowsWhatIsBesideItNow) {
   EXPECT_FALSE(nearest({}));
 }
 
+// Places without a tile leave the window, and their memory becomes another place's.
+TEST(MovingWindowTest, APlaceForgetsWhoWasBesideIt) {
+  PaintedMap map;  // tiles of 64 cells
+  TileLayer free = testing::GroundLayer(0.0);
+  free.column = 1;
+  for (int y = 22; y <= 42; ++y) {
+    for (const int wall : {1, 62}) map.Put(wall, y, ColumnLayer(0.0, 0b0001));
+    for (int x = 3; x <= 60; ++x) map.Put(x, y, free);     // between the walls alone
+    for (int x = 192; x <= 255; ++x) map.Put(x, y, free);  // all across tile 3
+  }
+  const Tiles tiles = map.Tiles();
+  ASSERT_EQ(tiles.size(), 2U);
+  MapWindow window(map.profile(), PlaceOptions());
+  window.Renew(std::span(tiles).first(1), {3.2, 3.2, 1.0}, 5.0);
+  // Now the place to the west is out of sight, and those to the east come in.
+  window.Renew(tiles, {13.0, 3.2, 1.0}, 12.0);
+  MapWindow made(map.profile(), PlaceOptions());
+  made.Renew(tiles, {13.0, 3.2, 1.0}, 12.0);
+  for (const double x : {0.15, 6.25}) {
+    const auto line = window.NearestLine(In(window, {x, 3.25, 0.5}), 0.3F);
+    ASSERT_TRUE(line);
+    EXPECT_TRUE(line->is_one_sided) << "nothing is known beyond the wall at " << x;
+  }
+  for (const double x : testing::Steps(0.05, 7.0, 0.1)) {
+    ASSERT_NO_FATAL_FAILURE(ExpectSame(window, made, {x, 3.25, 0.5})) << x;
+  }
+}
+
 TEST(MovingWindowTest, WhatStandsAtThePlacesEdgeIsFoundFromBesideIt) {
   PaintedMap map;
   map.Put(0, 0, ColumnLayer(0.0, 0b0001));  // the lowest corner of its tile; no other is there
