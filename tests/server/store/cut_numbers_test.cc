@@ -1,5 +1,6 @@
-// Numbers beyond what a column is read as: rows with them are damaged, whatever the rest of their
-// bits is, and come back where an index tells what they were.
+// Numbers beyond what a column is read as, or that do not follow from their key as they should:
+// rows with them are damaged, whatever the rest of their bits is, and come back where an index
+// tells what they were.
 #include "tests/server/store/backup_fixture.h"
 
 namespace atlas {
@@ -88,6 +89,7 @@ TEST_F(CutNumbersTest, AreDamageThatVerificationAndRestoreName) {
         "tiles SET cells = cells + 4294967296",
         "tiles SET multilayer_cells = multilayer_cells + 4294967296",
         "tiles SET blob_bytes = blob_bytes + 4294967296",
+        "tiles SET shard = shard + 1",
         "keyframe_tiles SET is_current = 2 WHERE is_current = 1",
         "keyframe_tiles SET is_current = 4294967297 WHERE is_current = 1",
         "events SET kind = kind + 256",
@@ -108,6 +110,24 @@ TEST_F(CutNumbersTest, AreDamageThatVerificationAndRestoreName) {
     Spoil(damage);
     EXPECT_NE(Findings(), "") << "while it is served";
     store_.reset();
+  }
+}
+
+// Marks are looked at when the daemon starts.
+TEST_F(CutNumbersTest, MarksThatDoNotFollowFromTheirKeyAreSetAgain) {
+  Live();
+  for (const char* const damage : {"shard = shard + 1", "level = level + 1"}) {
+    SCOPED_TRACE(damage);
+    store_.reset();
+    Spoil(std::string("dirty_tiles SET ") + damage);
+    std::filesystem::copy_file(Database(), backup(),
+                               std::filesystem::copy_options::overwrite_existing);
+    const auto taken = Restore();
+    ASSERT_FALSE(taken);
+    EXPECT_EQ(taken.error().code(), StatusCode::kInvalidData) << taken.error().message();
+    Open();
+    const auto events = store_->ListEvents(0, 1'000).value();
+    EXPECT_EQ(events.back().kind, EventKind::kMarksRestored);
   }
 }
 

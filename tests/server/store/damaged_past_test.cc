@@ -121,20 +121,14 @@ TEST_F(DamagedPurgeTest, TheNextStartEmptiesTheLogWhateverBecameOfTheEvent) {
     store_.reset();
     std::filesystem::remove_all(options_.directory);
     Fill();
-    sqlite3* reader = nullptr;
-    ASSERT_EQ(sqlite3_open(Database().c_str(), &reader), SQLITE_OK);
-    ASSERT_EQ(sqlite3_exec(reader, "BEGIN; SELECT count(*) FROM meta", nullptr, nullptr, nullptr),
-              SQLITE_OK);
+    Reader reader(Database());
     ASSERT_TRUE(Change(SessionAction::kPurge).has_value());
     store_.reset();  // the reader keeps the log where it is
-    ASSERT_EQ(
-        sqlite3_exec(reader, "COMMIT; PRAGMA wal_autocheckpoint = 0", nullptr, nullptr, nullptr),
-        SQLITE_OK);
-    ASSERT_EQ(sqlite3_exec(reader, damage, nullptr, nullptr, nullptr), SQLITE_OK);
+    reader.Run("COMMIT; PRAGMA wal_autocheckpoint = 0");
+    reader.Run(damage);
     EXPECT_GT(InTheFiles(Secret()), 1'000U);
     Open();
     EXPECT_TRUE(IsSoonGone(Secret()));
-    sqlite3_close(reader);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -15,6 +16,26 @@ namespace atlas {
 class PurgeTest : public StoreTest {
  protected:
   static constexpr std::uint32_t kCount = 4;
+
+  // Another process that reads what was before: the log is not emptied until it ends, nor when the
+  // store is closed while it is there.
+  class Reader {
+   public:
+    explicit Reader(const std::filesystem::path& database) {
+      EXPECT_EQ(sqlite3_open(database.c_str(), &db_), SQLITE_OK);
+      Run("BEGIN; SELECT count(*) FROM meta");
+    }
+    ~Reader() { sqlite3_close(db_); }
+    Reader(const Reader&) = delete;
+    Reader& operator=(const Reader&) = delete;
+
+    void Run(const char* sql) {
+      EXPECT_EQ(sqlite3_exec(db_, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+    }
+
+   private:
+    sqlite3* db_ = nullptr;
+  };
 
   static SessionKey Day() { return {"bus", "day"}; }
   static std::string Secret() { return "what nobody is to find"; }

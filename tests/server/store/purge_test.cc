@@ -57,31 +57,23 @@ TEST_F(PurgeTest, TheBytesAreGoneFromTheFiles) {
 // Who reads keeps the log from being emptied; and so does a process that is gone.
 TEST_F(PurgeTest, TheBytesAreGoneWhenNobodyReadsWhatWasBefore) {
   Fill();
-  sqlite3* reader = nullptr;
-  ASSERT_EQ(sqlite3_open(Database().c_str(), &reader), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(reader, "BEGIN; SELECT count(*) FROM meta", nullptr, nullptr, nullptr),
-            SQLITE_OK);
+  Reader reader(Database());
   ASSERT_TRUE(Change(SessionAction::kPurge).has_value());
   EXPECT_GT(InTheFiles(Secret()), 1'000U);
   EXPECT_TRUE(Put(Large(9, "night", "later")).has_value()) << "nobody waits for the reader";
-  ASSERT_EQ(sqlite3_exec(reader, "COMMIT", nullptr, nullptr, nullptr), SQLITE_OK);
+  reader.Run("COMMIT");
   EXPECT_TRUE(IsSoonGone(Secret()));
-  sqlite3_close(reader);
 }
 
 TEST_F(PurgeTest, TheNextStartEmptiesALogThatAKilledProcessLeft) {
   Fill();
-  sqlite3* reader = nullptr;
-  ASSERT_EQ(sqlite3_open(Database().c_str(), &reader), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(reader, "BEGIN; SELECT count(*) FROM meta", nullptr, nullptr, nullptr),
-            SQLITE_OK);
+  Reader reader(Database());
   ASSERT_TRUE(Change(SessionAction::kPurge).has_value());
   store_.reset();  // the reader keeps the log where it is
-  sqlite3_exec(reader, "COMMIT", nullptr, nullptr, nullptr);
+  reader.Run("COMMIT");
   EXPECT_GT(InTheFiles(Secret()), 1'000U);
   Open();
   EXPECT_TRUE(IsSoonGone(Secret()));
-  sqlite3_close(reader);
 }
 
 TEST_F(PurgeTest, NobodyUploadsToItAgain) {

@@ -72,7 +72,7 @@ constexpr const char* kByTable =
 
 std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
   Query query = connection.Prepare(
-      "SELECT revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
+      "SELECT shard, revision, fused_revision, payload_hash, cells, multilayer_cells, blob_bytes, "
       "blob_hash, checksum, blob FROM tiles WHERE key = ?");
   query.Bind(id.Key());
   if (!query.Step()) {
@@ -80,7 +80,9 @@ std::optional<TileRow> ReadRow(Connection& connection, const TileId& id) {
   }
   TileRow row;
   row.key = id.Key();
+  const bool is_in_shard = query.Int() == ShardOf(id);  // follows from the key: in no checksum
   ReadNumbers(query, row);
+  row.is_vouched = row.is_vouched && is_in_shard;
   row.blob = query.Blob();
   return row;
 }
