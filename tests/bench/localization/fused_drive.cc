@@ -4,12 +4,10 @@
 #include <memory>
 #include <utility>
 
-#include "client/map/cell_address.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/keyframe/vehicle_trail.h"
 #include "core/scan/scan_reader.h"
-#include "core/tile/tile_codec.h"
 
 namespace atlas::testing {
 namespace {
@@ -66,29 +64,9 @@ Result<FusedDrive> FusedDrive::Fuse(const DriveFolder& drive,
   }
   FusedDrive map(options.profile);
   for (const auto& [id, keyframes] : by_tile) {
-    EncodedTile encoded = EncodeTile(FuseTile(id, keyframes, options.profile), options.profile);
-    map.tiles_.push_back({id, 1, encoded.payload_hash, std::move(encoded.blob)});
+    map.Add(FuseTile(id, keyframes, options.profile));
   }
   return map;
-}
-
-Status FusedDrive::ReadLevel(std::uint8_t level,
-                             const std::optional<DiscArea>& disc,
-                             const OnTile& on_tile) {
-  if (level != 0) return {};
-  const double side_m = TileSideMetres(0, profile_);
-  for (const TileBlob& tile : tiles_) {
-    const bool is_near =
-        !disc || (TileCenter(tile.id, profile_) - disc->center_m).norm() < disc->radius_m + side_m;
-    if (is_near) ATLAS_RETURN_IF_ERROR(on_tile(tile));
-  }
-  return {};
-}
-
-std::uint64_t FusedDrive::blob_bytes() const {
-  std::uint64_t bytes = 0;
-  for (const TileBlob& tile : tiles_) bytes += tile.blob.size();
-  return bytes;
 }
 
 }  // namespace atlas::testing

@@ -1,16 +1,14 @@
 // The benchmark's map and its yardstick on a piece of a simulated street.
-#include <filesystem>
-#include <fstream>
+#include <memory>
 #include <set>
 #include <string>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "client/drive/drive_localization.h"
-#include "core/simulation/simulated_drive.h"
 #include "tests/bench/localization/fused_drive.h"
 #include "tests/bench/localization/raw_icp.h"
+#include "tests/bench/localization/street_piece.h"
 
 namespace atlas::testing {
 namespace {
@@ -21,29 +19,11 @@ constexpr std::size_t kScans = 8;
 class LocalizationBenchTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    // Each test is a process of its own, and they run side by side.
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              ("localization_bench_test_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-    const auto simulated = SimulatedDrive::Create(MakeWorld(WorldKind::kStreet).value(), {});
-    ASSERT_TRUE(simulated.has_value());
-    drive_ = DriveFolder{folder_, {}};
-    for (std::size_t i = kFirstScan; i < kFirstScan + kScans; ++i) {
-      DriveScan scan;
-      scan.number = static_cast<std::uint32_t>(i);
-      scan.scan = folder_ / (std::to_string(i) + ".bin");
-      scan.T_world_sensor = simulated->sensor_pose(i);
-      std::ofstream file(scan.scan, std::ios::binary);
-      for (const SimulatedPoint& p : simulated->Scan(i).points) {
-        const std::array<float, 4> row{p.x, p.y, p.z, 0.0F};
-        file.write(reinterpret_cast<const char*>(row.data()), sizeof(row));
-      }
-      drive_.scans.push_back(scan);
-    }
+    piece_ = std::make_unique<StreetPiece>("localization_bench_test", kFirstScan, kScans);
   }
-  static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+  static void TearDownTestSuite() { piece_.reset(); }
 
-  static DriveSurvey Survey() { return SurveyDrive(drive_, {}).value(); }
+  static DriveSurvey Survey() { return SurveyDrive(piece_->drive(), {}).value(); }
   static SelectionOptions Even() { return {.parity = ScanParity::kEven}; }
 
   static DriveLocalizationOptions Shots() {
@@ -58,17 +38,16 @@ class LocalizationBenchTest : public ::testing::Test {
     FusedDriveOptions options;
     options.profile.cell_size_um = 200'000;
     options.selection = Even();
-    return FusedDrive::Fuse(drive_, Survey(), options).value();
+    return FusedDrive::Fuse(piece_->drive(), Survey(), options).value();
   }
 
-  inline static std::filesystem::path folder_;
-  inline static DriveFolder drive_;
+  inline static std::unique_ptr<StreetPiece> piece_;
 };
 
 TEST_F(LocalizationBenchTest, RawReturnsPlaceScansWithinCentimetres) {
-  const auto icp = RawIcp::Make(drive_, Survey(), Even(), {});
+  const auto icp = RawIcp::Make(piece_->drive(), Survey(), Even(), {});
   ASSERT_TRUE(icp.has_value());
-  const auto report = LocalizeDrive(drive_, Shots(), **icp, [](const LocalizedScan& scan) {
+  const auto report = LocalizeDrive(piece_->drive(), Shots(), **icp, [](const LocalizedScan& scan) {
     EXPECT_FALSE(scan.normalized_square.has_value());
   });
   ASSERT_TRUE(report.has_value());
@@ -79,9 +58,9 @@ TEST_F(LocalizationBenchTest, RawReturnsPlaceScansWithinCentimetres) {
 }
 
 TEST_F(LocalizationBenchTest, RawReturnsOfElsewhereAreNoPlace) {
-  const auto icp = RawIcp::Make(drive_, Survey(), Even(), {});
+  const auto icp = RawIcp::Make(piece_->drive(), Survey(), Even(), {});
   ASSERT_TRUE(icp.has_value());
-  Pose elsewhere = drive_.scans[1].T_world_sensor;
+  Pose elsewhere = piece_->drive().scans[1].T_world_sensor;
   elsewhere.translation().x() += 500.0;
   (*icp)->Start(elsewhere);
   const PointCloud cloud{{{5.0F, 0.0F, 0.0F}, {6.0F, 0.0F, 0.0F}}};
@@ -96,10 +75,11 @@ TEST_F(LocalizationBenchTest, TheMapInMemoryHoldsTheScansOfBothMethods) {
     DriveLocalizationOptions options = Shots();
     options.mode = mode;
     const bool is_sure = mode == LocalizationMode::kAtlas;
-    const auto report = LocalizeDrive(drive_, options, view, [&](const LocalizedScan& scan) {
-      EXPECT_EQ(scan.normalized_square.has_value(), is_sure);
-      EXPECT_GT(scan.located.fit, 0.3);
-    });
+    const auto report =
+        LocalizeDrive(piece_->drive(), options, view, [&](const LocalizedScan& scan) {
+          EXPECT_EQ(scan.normalized_square.has_value(), is_sure);
+          EXPECT_GT(scan.located.fit, 0.3);
+        });
     ASSERT_TRUE(report.has_value());
     EXPECT_EQ(report->score.failures(), 0U);
     EXPECT_LT(report->score.translation_rmse_m(), is_sure ? 0.1 : 0.4);
@@ -110,7 +90,8 @@ TEST_F(LocalizationBenchTest, AreasAreAnsweredWithTheirTiles) {
   FusedDrive map = Map();
   std::set<std::uint64_t> every;
   std::set<std::uint64_t> near;
-  const Eigen::Vector2d place = drive_.scans.front().T_world_sensor.translation().head<2>();
+  const Eigen::Vector2d place =
+      piece_->drive().scans.front().T_world_sensor.translation().head<2>();
   EXPECT_TRUE(map.ReadLevel(0, std::nullopt,
                             [&](const TileBlob& tile) {
                               every.insert(tile.id.Key());

@@ -5,10 +5,8 @@
 #include <tuple>
 #include <utility>
 
-#include "client/map/cell_address.h"
 #include "core/base/hash_random.h"
 #include "core/geometry/nibble.h"
-#include "core/tile/tile_codec.h"
 #include "tests/bench/monitoring/open_map.h"
 
 namespace atlas::testing {
@@ -286,10 +284,10 @@ Result<DamagedMap> DamagedMap::Make(MapSource& whole,
                                     std::span<const Eigen::Vector3d> way,
                                     const DamageOptions& options) {
   DamagedMap map(whole.profile());
-  OpenMap before(map.profile_);
+  OpenMap before(map.profile());
   if (Status status = before.Read(whole); !status.ok()) return Error(std::move(status));
   OpenMap after = before;
-  Vandal vandal(after, map.profile_, way, options);
+  Vandal vandal(after, map.profile(), way, options);
   if (options.is_building_gone) vandal.TakeBuilding();
   if (options.cars > 0) {
     map.cars_gone_ = vandal.TakeCars();
@@ -297,24 +295,10 @@ Result<DamagedMap> DamagedMap::Make(MapSource& whole,
   }
   if (options.column_share > 0.0) vandal.TurnColumns();
   for (const auto& [id, tile] : after.tiles()) {
-    EncodedTile encoded = EncodeTile(tile, map.profile_);
-    map.tiles_.push_back({id, 1, encoded.payload_hash, std::move(encoded.blob)});
+    map.Add(tile);
   }
-  map.changes_ = Compare(before, after, map.profile_);
+  map.changes_ = Compare(before, after, map.profile());
   return map;
-}
-
-Status DamagedMap::ReadLevel(std::uint8_t level,
-                             const std::optional<DiscArea>& disc,
-                             const OnTile& on_tile) {
-  if (level != 0) return {};
-  const double side_m = TileSideMetres(0, profile_);
-  for (const TileBlob& tile : tiles_) {
-    const bool is_near =
-        !disc || (TileCenter(tile.id, profile_) - disc->center_m).norm() < disc->radius_m + side_m;
-    if (is_near) ATLAS_RETURN_IF_ERROR(on_tile(tile));
-  }
-  return {};
 }
 
 }  // namespace atlas::testing

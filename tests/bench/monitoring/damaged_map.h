@@ -4,9 +4,7 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <span>
-#include <vector>
 
 #include <Eigen/Core>
 
@@ -14,6 +12,7 @@
 #include "core/base/status.h"
 #include "core/geometry/tile_id.h"
 #include "core/tile/tile.h"
+#include "tests/bench/localization/memory_map.h"
 #include "tests/bench/monitoring/changed_segments.h"
 
 namespace atlas::testing {
@@ -28,8 +27,7 @@ struct DamageOptions {
   std::uint64_t seed = 1;
 };
 
-// Level 0 only; the other levels are empty.
-class DamagedMap : public MapSource {
+class DamagedMap : public MemoryMap {
  public:
   // `way`: where the vehicle will drive (places of its sensor); cars and the building are chosen
   // along it. Errors are those of the source.
@@ -37,20 +35,13 @@ class DamagedMap : public MapSource {
                                  std::span<const Eigen::Vector3d> way,
                                  const DamageOptions& options);
 
-  const MapProfile& profile() const override { return profile_; }
-  Status ReadLevel(std::uint8_t level,
-                   const std::optional<DiscArea>& disc,
-                   const OnTile& on_tile) override;
-
   const ChangedSegments& changes() const { return changes_; }
   std::size_t cars_gone() const { return cars_gone_; }
   std::size_t cars_put() const { return cars_put_; }
 
  private:
-  explicit DamagedMap(const MapProfile& profile) : profile_(profile) {}
+  using MemoryMap::MemoryMap;
 
-  MapProfile profile_;
-  std::vector<TileBlob> tiles_;
   ChangedSegments changes_;
   std::size_t cars_gone_ = 0;
   std::size_t cars_put_ = 0;

@@ -1,18 +1,16 @@
 // A piece of a simulated street tracked in its own map, damaged on purpose: the benchmark in small.
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <fstream>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "client/drive/drive_localization.h"
 #include "core/scan/scan_reader.h"
-#include "core/simulation/simulated_drive.h"
 #include "tests/bench/localization/fused_drive.h"
+#include "tests/bench/localization/street_piece.h"
 #include "tests/bench/monitoring/change_score.h"
 #include "tests/bench/monitoring/damaged_map.h"
 
@@ -25,39 +23,21 @@ constexpr std::size_t kScans = 24;
 class MonitoringBenchTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    // Each test is a process of its own, and they run side by side.
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              ("monitoring_bench_test_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-    const auto simulated = SimulatedDrive::Create(MakeWorld(WorldKind::kStreet).value(), {});
-    ASSERT_TRUE(simulated.has_value());
-    drive_ = DriveFolder{folder_, {}};
-    for (std::size_t i = kFirstScan; i < kFirstScan + kScans; ++i) {
-      DriveScan scan;
-      scan.number = static_cast<std::uint32_t>(i);
-      scan.scan = folder_ / (std::to_string(i) + ".bin");
-      scan.T_world_sensor = simulated->sensor_pose(i);
-      std::ofstream file(scan.scan, std::ios::binary);
-      for (const SimulatedPoint& p : simulated->Scan(i).points) {
-        const std::array<float, 4> row{p.x, p.y, p.z, 0.0F};
-        file.write(reinterpret_cast<const char*>(row.data()), sizeof(row));
-      }
-      drive_.scans.push_back(scan);
-      const std::vector<TruthBox> moving = simulated->moving_boxes(i);
-      traffic_.insert(traffic_.end(), moving.begin(), moving.end());
-    }
+    piece_ = std::make_unique<StreetPiece>("monitoring_bench_test", kFirstScan, kScans);
   }
-  static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+  static void TearDownTestSuite() { piece_.reset(); }
 
   static FusedDrive Map() {
     FusedDriveOptions options;
     options.profile.cell_size_um = 200'000;
-    return FusedDrive::Fuse(drive_, SurveyDrive(drive_, {}).value(), options).value();
+    return FusedDrive::Fuse(piece_->drive(), SurveyDrive(piece_->drive(), {}).value(), options)
+        .value();
   }
 
   static std::vector<Eigen::Vector3d> Way() {
     std::vector<Eigen::Vector3d> way;
-    for (const DriveScan& scan : drive_.scans) way.push_back(scan.T_world_sensor.translation());
+    for (const DriveScan& scan : piece_->drive().scans)
+      way.push_back(scan.T_world_sensor.translation());
     return way;
   }
 
@@ -72,10 +52,11 @@ class MonitoringBenchTest : public ::testing::Test {
     DriveMonitor monitor(view, {}, [&found](const Contradiction& c) { found.push_back(c); });
     DriveLocalizationOptions options;
     options.monitor = &monitor;
-    const auto report = LocalizeDrive(drive_, options, view, [](const LocalizedScan& scan) {
-      EXPECT_NE(scan.located.health, LocalizationHealth::kLost);
-      EXPECT_LT(scan.error.translation_m, 0.15);
-    });
+    const auto report =
+        LocalizeDrive(piece_->drive(), options, view, [](const LocalizedScan& scan) {
+          EXPECT_NE(scan.located.health, LocalizationHealth::kLost);
+          EXPECT_LT(scan.error.translation_m, 0.15);
+        });
     EXPECT_TRUE(report.has_value());
     monitor.Finish();
     EXPECT_EQ(monitor.scans(), kScans);
@@ -84,7 +65,7 @@ class MonitoringBenchTest : public ::testing::Test {
 
   static ChangesSeen See(const DamagedMap& map) {
     ChangesSeen seen(map.changes(), map.profile(), 2.0, 30.0);
-    for (const DriveScan& scan : drive_.scans) {
+    for (const DriveScan& scan : piece_->drive().scans) {
       std::vector<Eigen::Vector3d> returns;
       const PointCloud cloud = ReadScan(scan.scan).value();
       for (const Eigen::Vector3f& p : cloud.points) {
@@ -95,9 +76,7 @@ class MonitoringBenchTest : public ::testing::Test {
     return seen;
   }
 
-  inline static std::filesystem::path folder_;
-  inline static DriveFolder drive_;
-  inline static std::vector<TruthBox> traffic_;  // of all scans
+  inline static std::unique_ptr<StreetPiece> piece_;
 };
 
 // In so few scans what moved was mapped where it was last.
@@ -109,7 +88,7 @@ TEST_F(MonitoringBenchTest, InTheMapAsItIsNextToNothingLastsButWhereTrafficWas) 
     const Eigen::Vector3d p((static_cast<double>(c.cell_x) + 0.5) * cell_m,
                             (static_cast<double>(c.cell_y) + 0.5) * cell_m,
                             (c.low_mm + 500) * 1e-3);
-    const bool is_traffic = std::any_of(traffic_.begin(), traffic_.end(),
+    const bool is_traffic = std::any_of(piece_->traffic().begin(), piece_->traffic().end(),
                                         [&](const auto& box) { return box.Contains(p, 0.6); });
     others += c.kind == ContradictionKind::kMoving || is_traffic ? 0U : 1U;
   }
