@@ -1,6 +1,7 @@
 // Files with every error looked at, the closing one included.
 #include "core/simulation/drive_writer.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
@@ -94,18 +95,36 @@ Status WriteBoxes(const std::string& scan, const std::vector<TruthBox>& boxes, O
   return file.Write(text.data(), text.size());
 }
 
-Status WriteText(const SimulatedDrive& drive, const fs::path& folder) {
-  std::string poses;
-  std::string times;
-  for (std::size_t i = 0; i < drive.scans(); ++i) {
-    const std::array<double, 12> numbers = PoseToRowMajor(drive.sensor_pose(i));
+std::size_t EndOf(const SimulatedDrive& drive, const DriveWriteOptions& options) {
+  return std::min(drive.scans(), options.end);
+}
+
+Status WritePoses(const std::vector<Pose>& poses, const fs::path& file) {
+  std::string text;
+  for (const Pose& pose : poses) {
+    const std::array<double, 12> numbers = PoseToRowMajor(pose);
     for (std::size_t n = 0; n < numbers.size(); ++n) {
-      AppendNumber(numbers[n], n + 1 < numbers.size() ? " " : "\n", poses);
+      AppendNumber(numbers[n], n + 1 < numbers.size() ? " " : "\n", text);
     }
+  }
+  return WriteFile(file, text.data(), text.size());
+}
+
+Status WriteText(const SimulatedDrive& drive,
+                 const DriveWriteOptions& options,
+                 const fs::path& folder) {
+  std::vector<Pose> poses;
+  std::string times;
+  for (std::size_t i = options.begin; i < EndOf(drive, options); ++i) {
+    poses.push_back(drive.sensor_pose(i));
     AppendNumber(drive.time_s(i), "\n", times);
   }
   ATLAS_RETURN_IF_ERROR(WriteFile(folder / "times.txt", times.data(), times.size()));
-  return WriteFile(folder / "poses.txt", poses.data(), poses.size());
+  if (options.drift) {
+    ATLAS_RETURN_IF_ERROR(WritePoses(poses, folder / "truth.txt"));
+    poses = Drifted(poses, *options.drift);
+  }
+  return WritePoses(poses, folder / "poses.txt");
 }
 
 Status MakeFolder(const fs::path& path) {
@@ -116,27 +135,29 @@ Status MakeFolder(const fs::path& path) {
 
 Status WriteInto(const SimulatedDrive& drive,
                  const fs::path& folder,
+                 const DriveWriteOptions& options,
                  const DriveProgress& progress) {
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "velodyne"));
   ATLAS_RETURN_IF_ERROR(MakeFolder(folder / "labels"));
   OutputFile boxes;
   ATLAS_RETURN_IF_ERROR(boxes.Open(folder / "boxes.txt"));
   ATLAS_RETURN_IF_ERROR(WriteBoxes("all", drive.parked_boxes(), boxes));
-  for (std::size_t i = 0; i < drive.scans(); ++i) {
+  for (std::size_t i = options.begin; i < EndOf(drive, options); ++i) {
     const SimulatedScan scan = drive.Scan(i);
+    const std::size_t number = i - options.begin;
     if (scan.points.empty()) {
       return Status(StatusCode::kInvalidData,
                     StrCat("scan ", i, " sees nothing: does the drive lead through the world?"));
     }
-    ATLAS_RETURN_IF_ERROR(WriteScan(scan, i, folder));
-    ATLAS_RETURN_IF_ERROR(WriteBoxes(std::to_string(i), drive.moving_boxes(i), boxes));
+    ATLAS_RETURN_IF_ERROR(WriteScan(scan, number, folder));
+    ATLAS_RETURN_IF_ERROR(WriteBoxes(std::to_string(number), drive.moving_boxes(i), boxes));
     if (progress) {
-      ATLAS_RETURN_IF_ERROR(progress(i + 1));
+      ATLAS_RETURN_IF_ERROR(progress(number + 1));
     }
   }
   ATLAS_RETURN_IF_ERROR(boxes.Close());
-  ATLAS_RETURN_IF_ERROR(WriteText(drive, folder));
-  return progress ? progress(drive.scans()) : Status();
+  ATLAS_RETURN_IF_ERROR(WriteText(drive, options, folder));
+  return progress ? progress(EndOf(drive, options) - options.begin) : Status();
 }
 
 Status CheckTarget(const fs::path& folder) {
@@ -209,16 +230,26 @@ class UnfinishedFolder {
 
 }  // namespace
 
+Status DriveWriteOptions::Validate(const SimulatedDrive& drive) const {
+  if (begin >= std::min(end, drive.scans())) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("scans ", begin, ":", end, ": none of the drive's ", drive.scans())};
+  }
+  return drift ? drift->Validate() : Status();
+}
+
 Status WriteDrive(const SimulatedDrive& drive,
                   const fs::path& folder,
-                  const DriveProgress& progress) {
+                  const DriveProgress& progress,
+                  const DriveWriteOptions& options) {
+  ATLAS_RETURN_IF_ERROR(options.Validate(drive));
   ATLAS_RETURN_IF_ERROR(CheckTarget(folder));
   // "a/b/" and "a/b" are the same folder.
   const fs::path target = folder.has_filename() ? folder : folder.parent_path();
   fs::path partial;
   ATLAS_RETURN_IF_ERROR(MakePartial(target, partial));
   UnfinishedFolder unfinished(partial);
-  ATLAS_RETURN_IF_ERROR(WriteInto(drive, partial, progress));
+  ATLAS_RETURN_IF_ERROR(WriteInto(drive, partial, options, progress));
   return unfinished.Name(target);
 }
 

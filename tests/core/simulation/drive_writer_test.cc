@@ -6,6 +6,7 @@
 #include <iterator>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -55,6 +56,47 @@ TEST_F(DriveWriterTest, WritesWhatTheDriveHolds) {
   EXPECT_EQ(std::memcmp(points.data(), scan.points.data(), points.size()), 0);
   EXPECT_EQ(ReadAll(folder_ / "new/drive/labels/000002.label").size(), scan.labels.size() * 4);
   EXPECT_FALSE(fs::exists(folder_ / "new/drive.partial"));
+}
+
+TEST_F(DriveWriterTest, APartIsNumberedFromZeroAndMayDrift) {
+  const SimulatedDrive drive = ShortDrive();
+  ASSERT_GE(drive.scans(), 3U);
+  ASSERT_TRUE(WriteDrive(drive, folder_ / "whole", {}).ok());
+  DriveWriteOptions options;
+  options.begin = 1;
+  options.end = 3;
+  options.drift.emplace();
+  ASSERT_TRUE(WriteDrive(drive, folder_ / "part", {}, options).ok());
+  EXPECT_EQ(ReadAll(folder_ / "part/velodyne/000001.bin"),
+            ReadAll(folder_ / "whole/velodyne/000002.bin"));
+  EXPECT_FALSE(fs::exists(folder_ / "part/velodyne/000002.bin"));
+  std::istringstream whole(ReadAll(folder_ / "whole/poses.txt"));
+  std::istringstream truth(ReadAll(folder_ / "part/truth.txt"));
+  std::istringstream poses(ReadAll(folder_ / "part/poses.txt"));
+  std::string line;
+  std::string true_line;
+  std::string drifted;
+  std::getline(whole, line);
+  for (int i = 0; i < 2; ++i) {
+    std::getline(whole, line);
+    std::getline(truth, true_line);
+    std::getline(poses, drifted);
+    EXPECT_EQ(true_line, line);
+    EXPECT_NE(drifted, line);
+  }
+  EXPECT_FALSE(std::getline(truth, true_line));
+}
+
+TEST_F(DriveWriterTest, APartThatIsNoneIsRefused) {
+  const SimulatedDrive drive = ShortDrive();
+  for (const auto& [begin, end] : {std::pair<std::size_t, std::size_t>{2, 2}, {999, SIZE_MAX}}) {
+    DriveWriteOptions options;
+    options.begin = begin;
+    options.end = end;
+    EXPECT_EQ(WriteDrive(drive, folder_ / "none", {}, options).code(),
+              StatusCode::kInvalidArgument);
+    EXPECT_FALSE(fs::exists(folder_ / "none"));
+  }
 }
 
 TEST_F(DriveWriterTest, WhatOthersHaveBesideItStays) {
