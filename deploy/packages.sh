@@ -2,7 +2,7 @@
 BUILD_PACKAGES=(
   g++ cmake ninja-build ccache pkg-config git
   libboost1.81-dev libboost-json1.81-dev
-  libeigen3-dev libexpected-dev libnanoflann-dev libzstd-dev libxxhash-dev
+  libeigen3-dev libceres-dev libexpected-dev libnanoflann-dev libzstd-dev libxxhash-dev
   libprotobuf-dev protobuf-compiler
   libsqlite3-dev libsqlitecpp-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev

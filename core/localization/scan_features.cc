@@ -81,21 +81,33 @@ FeatureExtractor::FeatureExtractor(const FeatureOptions& options)
       ground_(options.ground_voxel_m, kAnyHeight_m) {}
 
 const ScanFeatures& FeatureExtractor::Extract(const LeveledScan& scan) {
-  columns_.Clear();
-  ground_.Clear();
-  obstacles_.clear();
+  Begin();
   for (std::size_t i = 0; i < scan.size(); ++i) {
     if (scan.range_m[i] > options_.max_range_m) {
       continue;
     }
     const Eigen::Vector3f p(scan.x[i], scan.y[i], scan.z[i]);
     if (scan.is_ground[i] != 0) {
-      ground_.Add(p);
+      AddGround(p);
     } else {
-      columns_.Add(p);
-      obstacles_.push_back(p);
+      AddObstacle(p);
     }
   }
+  return Finish();
+}
+
+void FeatureExtractor::Begin() {
+  columns_.Clear();
+  ground_.Clear();
+  obstacles_.clear();
+}
+
+void FeatureExtractor::AddObstacle(const Eigen::Vector3f& p) {
+  columns_.Add(p);
+  obstacles_.push_back(p);
+}
+
+const ScanFeatures& FeatureExtractor::Finish() {
   columns_.Means(features_.columns);
   ground_.Means(features_.ground);
   Interleave(obstacles_, options_.max_returns, features_.returns);

@@ -58,6 +58,11 @@ class FeatureExtractor {
 
   // Valid until the next scan.
   const ScanFeatures& Extract(const LeveledScan& scan);
+  // The same of points that are no scan: Begin, each of them, Finish.
+  void Begin();
+  void AddObstacle(const Eigen::Vector3f& p);
+  void AddGround(const Eigen::Vector3f& p) { ground_.Add(p); }
+  const ScanFeatures& Finish();
 
  private:
   FeatureOptions options_;

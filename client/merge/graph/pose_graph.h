@@ -1,0 +1,70 @@
+// All submaps' poses at once, so that what is known of them fits best: least squares on SE(3), with
+// a robust loss where a measurement may be wrong (Ceres).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/status.h"
+#include "core/geometry/pose.h"
+
+namespace atlas {
+
+using PoseInformation6 = Eigen::Matrix<double, 6, 6>;
+
+struct GraphNode {
+  Pose T_world_submap = Pose::Identity();  // where it begins
+  bool is_fixed = false;
+};
+
+// Submap `to` lies at T_from_to in submap `from`; `information` of (translation, rotation vector),
+// axes of `from`, about the origin of `to`.
+struct GraphEdge {
+  std::size_t from = 0;
+  std::size_t to = 0;
+  Pose T_from_to = Pose::Identity();
+  PoseInformation6 information = PoseInformation6::Identity();
+  bool may_be_wrong = false;
+};
+
+// A point of a submap is known to be somewhere, as a GNSS says.
+struct GraphPrior {
+  std::size_t node = 0;
+  Eigen::Vector3d p_submap = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma_m = Eigen::Vector3d::Ones();
+};
+
+struct PoseGraph {
+  std::vector<GraphNode> nodes;
+  std::vector<GraphEdge> edges;
+  std::vector<GraphPrior> priors;
+};
+
+struct PoseGraphOptions {
+  // An edge that may be wrong pulls less the more sigmas it is off: Cauchy, from here on.
+  double robust_sigmas = 3.0;
+  // A submap's grids were levelled by an IMU.
+  double tilt_sigma_rad = 0.006;
+  int max_iterations = 100;
+  int threads = 2;
+};
+
+struct PoseGraphResult {
+  std::vector<Pose> T_world_submap;     // of each node
+  std::vector<double> edge_off_sigmas;  // of each edge, what is left: the root of r' I r
+  int iterations = 0;
+  double cost_before = 0.0;
+  double cost_after = 0.0;
+};
+
+// kInvalidArgument: an edge or prior of a node that is not there, or with itself; a part of the
+// graph in which nothing is fixed and no prior says where it is gets its first node fixed.
+// kInternal where no solution is found.
+Result<PoseGraphResult> Optimize(const PoseGraph& graph, const PoseGraphOptions& options);
+
+}  // namespace atlas

@@ -1,0 +1,206 @@
+#include "client/merge/plan/closure_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+#include <tuple>
+
+#include "client/merge/plan/parallel.h"
+#include "core/alignment/place_search.h"
+
+namespace atlas {
+namespace {
+
+// What was found in two ways is one, the likelier.
+void KeepLikeliest(std::vector<FoundClosure>& closures) {
+  std::stable_sort(closures.begin(), closures.end(), [](const auto& one, const auto& other) {
+    return std::tie(one.a, one.b, other.match.explained) <
+           std::tie(other.a, other.b, one.match.explained);
+  });
+  const auto last = std::unique(closures.begin(), closures.end(), [](const auto& x, const auto& y) {
+    return x.a == y.a && x.b == y.b;
+  });
+  closures.erase(last, closures.end());
+}
+
+}  // namespace
+
+SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions) {
+  SubmapPoses stored;
+  for (const MergeSession& session : sessions) {
+    std::vector<Pose>& poses = stored.emplace_back();
+    for (const MergeSubmap& submap : session.submaps) {
+      poses.push_back(StoredPose(session, submap));
+    }
+  }
+  return stored;
+}
+
+ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
+                             const std::vector<SessionWay>& ways,
+                             const MapProfile& profile,
+                             const MergeOptions& options)
+    : sessions_(sessions), ways_(ways), options_(options) {
+  for (std::size_t session = 0; session < sessions.size(); ++session) {
+    for (std::size_t submap = 0; submap < sessions[session].submaps.size(); ++submap) {
+      all_.push_back({session, submap});
+    }
+  }
+  for (std::size_t worker = 0; worker < options.workers; ++worker) {
+    workers_.emplace_back(sessions, profile, options.match);
+  }
+}
+
+Result<std::vector<FoundClosure>> ClosureSearch::SearchAnywhere(const Progress& progress) {
+  std::vector<Task> tasks = LookAlike();
+  const std::vector<Task> near =
+      LieNear(StoredPoses(sessions_), std::vector<std::size_t>(sessions_.size(), 0),
+              {options_.near_m, options_.near_height_m, 1}, options_.reach);
+  tasks.insert(tasks.end(), near.begin(), near.end());
+  Result<std::vector<FoundClosure>> closures = Run(std::move(tasks), progress);
+  if (closures) KeepLikeliest(*closures);
+  return closures;
+}
+
+Result<std::vector<FoundClosure>> ClosureSearch::SearchNear(const SubmapPoses& T_world_submap,
+                                                            const std::vector<std::size_t>& part_of,
+                                                            const std::vector<FoundClosure>& known,
+                                                            const Progress& progress) {
+  for (const FoundClosure& closure : known) {
+    looked_at_.emplace(closure.a, closure.b);
+  }
+  std::vector<Task> tasks = LieNear(
+      T_world_submap, part_of,
+      {options_.guided_m, options_.guided_height_m, options_.guided_neighbours}, std::nullopt);
+  std::erase_if(tasks,
+                [&](const Task& task) { return !looked_at_.emplace(task.a, task.b).second; });
+  return Run(std::move(tasks), progress);
+}
+
+Result<std::vector<FoundClosure>> ClosureSearch::MatchAgain(const std::vector<FoundClosure>& known,
+                                                            const SubmapPoses& T_world_submap,
+                                                            const Progress& progress) {
+  std::vector<Task> tasks;
+  for (const FoundClosure& closure : known) {
+    const Pose& a = T_world_submap[closure.a.session][closure.a.submap];
+    const Pose& b = T_world_submap[closure.b.session][closure.b.submap];
+    tasks.push_back({closure.a, closure.b, a.inverse() * b, std::nullopt});
+  }
+  return Run(std::move(tasks), progress);
+}
+
+// Neighbours in a session are linked, not closed.
+bool ClosureSearch::MayMeet(const SubmapRef& a, const SubmapRef& b) const {
+  if (a.session != b.session) {
+    return true;
+  }
+  const std::vector<double>& way_m = ways_[a.session].way_m;
+  return std::abs(way_m[a.submap] - way_m[b.submap]) >= options_.min_loop_m;
+}
+
+// The earlier one first.
+ClosureSearch::Task ClosureSearch::TaskOf(const SubmapRef& from,
+                                          const SubmapRef& to,
+                                          const Pose& T_from_to,
+                                          const std::optional<SearchReach>& reach) {
+  return from < to ? Task{from, to, T_from_to, reach} : Task{to, from, T_from_to.inverse(), reach};
+}
+
+std::vector<ClosureSearch::Task> ClosureSearch::LookAlike() const {
+  // A place's own profile is right within a sector and a few metres.
+  const SearchReach reach{2.0, 2.0, 4.0 * std::numbers::pi / 180.0};
+  std::vector<const Submap*> submaps;
+  for (const SubmapRef& ref : all_) {
+    submaps.push_back(&At(sessions_, ref).submap);
+  }
+  std::vector<Task> tasks;
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    if (all_[i].submap % options_.probe_stride != 0) continue;
+    const auto may_be = [&](std::size_t other) {
+      return MayMeet(all_[i], all_[other]);
+    };
+    for (const SubmapCandidate& candidate :
+         SearchPlaces(submaps, *submaps[i], may_be, options_.places)) {
+      tasks.push_back(TaskOf(all_[candidate.submap], all_[i], candidate.T_submap_searcher, reach));
+    }
+  }
+  return tasks;
+}
+
+std::vector<ClosureSearch::Task> ClosureSearch::LieNear(
+    const SubmapPoses& T_world_submap,
+    const std::vector<std::size_t>& part_of,
+    const Near& near,
+    const std::optional<SearchReach>& reach) const {
+  struct Neighbour {
+    double distance_m;
+    SubmapRef ref;
+  };
+  std::vector<Task> tasks;
+  for (const SubmapRef& one : all_) {
+    const Pose& here = T_world_submap[one.session][one.submap];
+    for (std::size_t session = 0; session <= one.session; ++session) {
+      if (part_of[session] != part_of[one.session]) continue;
+      std::vector<Neighbour> neighbours;
+      for (std::size_t i = 0; i < sessions_[session].submaps.size(); ++i) {
+        const SubmapRef other{session, i};
+        if (!(other < one) || !MayMeet(other, one)) continue;
+        const Eigen::Vector3d away = T_world_submap[session][i].translation() - here.translation();
+        if (away.head<2>().norm() > near.distance_m || std::abs(away.z()) > near.height_m) continue;
+        neighbours.push_back({away.norm(), other});
+      }
+      std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
+        return std::tie(a.distance_m, a.ref) < std::tie(b.distance_m, b.ref);
+      });
+      neighbours.resize(std::min(neighbours.size(), near.neighbours));
+      for (const Neighbour& other : neighbours) {
+        const Pose& there = T_world_submap[other.ref.session][other.ref.submap];
+        tasks.push_back(TaskOf(other.ref, one, there.inverse() * here, reach));
+      }
+    }
+  }
+  return tasks;
+}
+
+bool ClosureSearch::IsExpected(const Task& task, const SubmapMatch& match) const {
+  if (task.reach) {
+    return true;  // it was looked for
+  }
+  const double turned = Eigen::Quaterniond(match.T_a_b.linear())
+                            .angularDistance(Eigen::Quaterniond(task.T_a_b.linear()));
+  return (match.T_a_b.translation() - task.T_a_b.translation()).norm() <= options_.max_surprise_m &&
+         turned <= options_.max_surprise_rad;
+}
+
+// Pairs of one submap are done after each other: what is prepared of it serves all of them.
+Result<std::vector<FoundClosure>> ClosureSearch::Run(std::vector<Task> tasks,
+                                                     const Progress& progress) {
+  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) {
+    return std::tie(a.a, a.b) < std::tie(b.a, b.b);
+  });
+  std::vector<std::optional<FoundClosure>> found(tasks.size());
+  std::mutex mutex;
+  std::size_t done = 0;
+  Status status =
+      RunParallel(tasks.size(), workers_.size(), [&](std::size_t worker, std::size_t i) -> Status {
+        const Task& task = tasks[i];
+        const auto match = task.reach
+                               ? workers_[worker].Search(task.a, task.b, task.T_a_b, *task.reach)
+                               : workers_[worker].Match(task.a, task.b, task.T_a_b);
+        if (!match) return match.error();
+        if (IsBelieved(*match, options_.match) && IsExpected(task, *match)) {
+          found[i] = FoundClosure{task.a, task.b, *match};
+        }
+        const std::lock_guard lock(mutex);
+        return progress ? progress(++done, tasks.size()) : Status();
+      });
+  if (!status.ok()) return Error(std::move(status));
+  std::vector<FoundClosure> closures;
+  for (const std::optional<FoundClosure>& one : found) {
+    if (one) closures.push_back(*one);
+  }
+  return closures;
+}
+
+}  // namespace atlas

@@ -1,0 +1,89 @@
+// Where submaps of different sessions, or of different visits of one, show the same place.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "client/merge/plan/match_worker.h"
+#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_session.h"
+#include "core/alignment/closure_sets.h"
+#include "core/base/status.h"
+#include "core/geometry/map_profile.h"
+
+namespace atlas {
+
+// `a` is of an earlier session than `b`, or of the same one and earlier in it.
+struct FoundClosure {
+  SubmapRef a;
+  SubmapRef b;
+  SubmapMatch match;
+};
+
+// By session and submap.
+using SubmapPoses = std::vector<std::vector<Pose>>;
+SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions);
+
+class ClosureSearch {
+ public:
+  using Progress = std::function<Status(std::size_t done, std::size_t all)>;
+
+  // `sessions` and `ways` (of each session) outlive it.
+  ClosureSearch(const std::vector<MergeSession>& sessions,
+                const std::vector<SessionWay>& ways,
+                const MapProfile& profile,
+                const MergeOptions& options);
+
+  // By what places look like, and by where the stored poses have them.
+  Result<std::vector<FoundClosure>> SearchAnywhere(const Progress& progress);
+  // By poses that are nearly right, one a submap of each session; between sessions of one part
+  // (`part_of` each). Pairs that are `known` are left out, and those that it looked at before.
+  Result<std::vector<FoundClosure>> SearchNear(const SubmapPoses& T_world_submap,
+                                               const std::vector<std::size_t>& part_of,
+                                               const std::vector<FoundClosure>& known,
+                                               const Progress& progress);
+
+  // What is known, from where it is thought to be.
+  Result<std::vector<FoundClosure>> MatchAgain(const std::vector<FoundClosure>& known,
+                                               const SubmapPoses& T_world_submap,
+                                               const Progress& progress);
+
+ private:
+  struct Task {
+    SubmapRef a;
+    SubmapRef b;
+    Pose T_a_b = Pose::Identity();
+    std::optional<SearchReach> reach;  // none: it is there or not
+  };
+  struct Near {
+    double distance_m;
+    double height_m;
+    std::size_t neighbours;  // of each session
+  };
+
+  bool MayMeet(const SubmapRef& a, const SubmapRef& b) const;
+  static Task TaskOf(const SubmapRef& from,
+                     const SubmapRef& to,
+                     const Pose& T_from_to,
+                     const std::optional<SearchReach>& reach);
+  std::vector<Task> LookAlike() const;
+  std::vector<Task> LieNear(const SubmapPoses& T_world_submap,
+                            const std::vector<std::size_t>& part_of,
+                            const Near& near,
+                            const std::optional<SearchReach>& reach) const;
+  Result<std::vector<FoundClosure>> Run(std::vector<Task> tasks, const Progress& progress);
+  bool IsExpected(const Task& task, const SubmapMatch& match) const;
+
+  const std::vector<MergeSession>& sessions_;
+  const std::vector<SessionWay>& ways_;
+  const MergeOptions& options_;
+  std::vector<SubmapRef> all_;
+  std::vector<MatchWorker> workers_;
+  std::set<std::pair<SubmapRef, SubmapRef>> looked_at_;  // by SearchNear
+};
+
+}  // namespace atlas

@@ -1,0 +1,21 @@
+// Which sessions stay where they are: those in the map whose poses already say what their submaps
+// do, among themselves and of each other. Whoever was merged before is not moved for the sake of a
+// millimetre, and with him no tile.
+#pragma once
+
+#include <vector>
+
+#include "client/merge/plan/closure_search.h"
+#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_session.h"
+#include "client/merge/plan/session_links.h"
+
+namespace atlas {
+
+// By session.
+std::vector<bool> HeldSessions(const std::vector<MergeSession>& sessions,
+                               const std::vector<std::vector<SessionLink>>& links,
+                               const std::vector<FoundClosure>& closures,
+                               const MergeOptions& options);
+
+}  // namespace atlas

@@ -1,0 +1,35 @@
+// A merge as a pose graph: its links, closures and priors over all submaps, and back.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "client/merge/graph/pose_graph.h"
+#include "client/merge/plan/closure_search.h"
+#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_session.h"
+#include "client/merge/plan/session_links.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct MergeEvidence {
+  const std::vector<MergeSession>& sessions;
+  const std::vector<std::vector<SessionLink>>& links;  // by session
+  const std::vector<FoundClosure>& closures;
+  const std::vector<bool>& is_held;  // by session: it stays where it is
+};
+
+struct MergedPoses {
+  SubmapPoses T_world_submap;
+  std::vector<double> closure_off_sigmas;  // by closure
+  int iterations = 0;
+};
+
+// From `start`, where held sessions are as they are stored. The first submap of a part that nothing
+// else holds stays where it starts. Errors as Optimize.
+Result<MergedPoses> OptimizeMerge(const MergeEvidence& evidence,
+                                  const SubmapPoses& start,
+                                  const MergeOptions& options);
+
+}  // namespace atlas

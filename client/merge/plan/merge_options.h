@@ -1,0 +1,70 @@
+// All numbers of a merge.
+#pragma once
+
+#include <cstddef>
+#include <numbers>
+
+#include "client/merge/graph/pose_graph.h"
+#include "core/alignment/closure_sets.h"
+#include "core/alignment/place_search.h"
+#include "core/alignment/session_cut.h"
+#include "core/alignment/submap.h"
+#include "core/alignment/submap_match.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct MergeOptions {
+  CutOptions cut;
+  SubmapOptions submaps;
+  MatchOptions match;
+  PlaceSearchOptions places;
+  ConsistencyOptions consistency;
+  PoseGraphOptions graph;
+
+  // Odometry, as the stored poses have it from one keyframe to the next.
+  double odometry_drift = 0.01;  // of the way
+  double odometry_yaw_rad_a_m = 0.5 * std::numbers::pi / 180.0 / 100.0;
+  double odometry_sigma_m = 0.01;  // of each step between submaps, besides
+  double odometry_sigma_rad = 0.05 * std::numbers::pi / 180.0;
+
+  // A match informs as this share of its features would, and is no better than this.
+  double information_share = 0.05;
+  double match_sigma_m = 0.01;
+  double match_sigma_rad = 0.03 * std::numbers::pi / 180.0;
+
+  // Submaps of one session with less way between them do not meet: they are neighbours.
+  double min_loop_m = 50.0;
+  // Without an idea: every so many submaps of a session one is looked for in all others ...
+  std::size_t probe_stride = 2;
+  // ... and where the stored poses have it near others, around there.
+  double near_m = 8.0;
+  double near_height_m = 2.0;
+  SearchReach reach{4.0, 4.0, 6.0 * std::numbers::pi / 180.0};
+
+  // Two sessions meet where so many submaps agree that they do, and so many times as much speaks
+  // for it as for any other way in which they might.
+  std::size_t min_closures = 3;
+  double min_margin = 1.3;
+
+  // From the poses that were found all pairs are looked at that lie this near by them.
+  double guided_m = 8.0;
+  double guided_height_m = 1.0;
+  std::size_t guided_neighbours = 2;  // in each session
+  double max_surprise_m = 1.0;        // of a match from where it was expected
+  double max_surprise_rad = 3.0 * std::numbers::pi / 180.0;
+  int guided_rounds = 3;
+
+  int refinements = 2;  // times that submaps are fused again by the poses found
+
+  // Sessions in the map whose matches are this near their poses already, root mean square, stay.
+  double held_m = 0.04;
+  double held_rad = 0.15 * std::numbers::pi / 180.0;
+  // A keyframe that would move by less stays.
+  double min_move_m = 0.002;
+  double min_move_rad = 0.02 * std::numbers::pi / 180.0;
+
+  std::size_t workers = 2;
+};
+
+}  // namespace atlas

@@ -1,0 +1,231 @@
+#include "client/merge/plan/merge_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <set>
+#include <utility>
+
+#include "client/merge/plan/closure_search.h"
+#include "client/merge/plan/held_sessions.h"
+#include "client/merge/plan/merge_graph.h"
+#include "client/merge/plan/parallel.h"
+#include "client/merge/plan/pose_correction.h"
+#include "client/merge/plan/session_links.h"
+#include "client/merge/plan/session_parts.h"
+
+namespace atlas {
+namespace {
+
+class Planner {
+ public:
+  Planner(std::vector<MergeSession>& sessions,
+          const std::vector<BlobReader>& readers,
+          const MapProfile& profile,
+          const MergeOptions& options,
+          const MergeProgress& progress)
+      : sessions_(sessions),
+        readers_(readers),
+        profile_(profile),
+        options_(options),
+        progress_(progress) {}
+
+  Result<MergePlan> Plan() {
+    Status status = Run();
+    if (!status.ok()) return Error(std::move(status));
+    Conclude();
+    return std::move(plan_);
+  }
+
+ private:
+  Status Run() {
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      ATLAS_RETURN_IF_ERROR(Fuse(i, StoredPoses(sessions_[i])));
+    }
+    ATLAS_RETURN_IF_ERROR(Link(StoredPoses(sessions_)));
+    ATLAS_RETURN_IF_ERROR(Search());
+    for (int i = 0; i < options_.refinements; ++i) {
+      ATLAS_RETURN_IF_ERROR(Refine());
+    }
+    return {};
+  }
+
+  Status Fuse(std::size_t session, const std::vector<Pose>& T_world_sensor) {
+    return BuildSubmaps(sessions_[session], T_world_sensor, readers_[session], profile_, options_,
+                        Step("submaps"));
+  }
+
+  Status Search() {
+    ClosureSearch search(sessions_, ways_, profile_, options_);
+    auto found = search.SearchAnywhere(Step("search"));
+    if (!found) return found.error();
+    ATLAS_RETURN_IF_ERROR(Settle(*found, nullptr));
+    for (int round = 0; round < options_.guided_rounds; ++round) {
+      auto near = search.SearchNear(poses_.T_world_submap, parts_.part_of, choice_.believed,
+                                    Step("guided search"));
+      if (!near) return near.error();
+      if (near->empty()) break;
+      // What was not believed before had its chance.
+      near->insert(near->begin(), choice_.believed.begin(), choice_.believed.end());
+      const SubmapPoses before = poses_.T_world_submap;
+      ATLAS_RETURN_IF_ERROR(Settle(*near, &before));
+      ++plan_.rounds;
+    }
+    return {};
+  }
+
+  // Everything once more with submaps as they are by now.
+  Status Refine() {
+    const std::set<std::size_t> joined = JoinedParts();
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      if (is_held_[i] || !joined.contains(parts_.part_of[i])) continue;
+      ATLAS_RETURN_IF_ERROR(Fuse(i, CorrectedPoses(sessions_[i], poses_.T_world_submap[i])));
+    }
+    const SubmapPoses before = poses_.T_world_submap;
+    ATLAS_RETURN_IF_ERROR(Link(before));
+    ClosureSearch search(sessions_, ways_, profile_, options_);
+    auto again = search.MatchAgain(choice_.believed, before, Step("closures again"));
+    if (!again) return again.error();
+    return Settle(*again, &before);
+  }
+
+  ClosureSearch::Progress Step(std::string_view name) const {
+    return [this, name](std::size_t done, std::size_t all) {
+      return progress_ ? progress_(name, done, all) : Status();
+    };
+  }
+
+  Status Link(const SubmapPoses& T_world_submap) {
+    links_.assign(sessions_.size(), {});
+    std::vector<MatchWorker> workers;
+    for (std::size_t i = 0; i < options_.workers; ++i) {
+      workers.emplace_back(sessions_, profile_, options_.match);
+    }
+    std::mutex mutex;
+    std::size_t done = 0;
+    ATLAS_RETURN_IF_ERROR(RunParallel(
+        sessions_.size(), options_.workers, [&](std::size_t worker, std::size_t i) -> Status {
+          auto links = LinkSession(i, sessions_, T_world_submap[i], options_, workers[worker]);
+          if (!links) return links.error();
+          links_[i] = *std::move(links);
+          const std::lock_guard lock(mutex);
+          return Step("odometry")(++done, sessions_.size());
+        }));
+    ways_.clear();
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      ways_.push_back(WayOf(sessions_[i], links_[i]));
+    }
+    return {};
+  }
+
+  // Which closures are believed, who hangs together, and where everything is.
+  Status Settle(const std::vector<FoundClosure>& found, const SubmapPoses* start) {
+    choice_ = ChooseClosures(found, ways_, options_);
+    plan_.rejected += choice_.rejected.size();
+    parts_ = PutTogether(sessions_, ways_, choice_);
+    is_held_ = HeldSessions(sessions_, links_, choice_.believed, options_);
+    SubmapPoses begin = start != nullptr ? *start : parts_.T_world_submap;
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      if (!is_held_[i]) continue;
+      for (std::size_t k = 0; k < begin[i].size(); ++k) {
+        begin[i][k] = StoredPose(sessions_[i], sessions_[i].submaps[k]);
+      }
+    }
+    auto poses = OptimizeMerge({sessions_, links_, choice_.believed, is_held_}, begin, options_);
+    if (!poses) return poses.error();
+    poses_ = *std::move(poses);
+    return {};
+  }
+
+  // The part that the map is, or becomes.
+  std::set<std::size_t> JoinedParts() const {
+    std::set<std::size_t> joined;
+    std::map<std::size_t, std::size_t> keyframes;  // by part
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      if (!sessions_[i].is_staged) joined.insert(parts_.part_of[i]);
+      keyframes[parts_.part_of[i]] += sessions_[i].keyframes.size();
+    }
+    if (!joined.empty() || keyframes.empty()) return joined;
+    const auto largest =
+        std::max_element(keyframes.begin(), keyframes.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    return {largest->first};
+  }
+
+  void Conclude() {
+    const std::set<std::size_t> joined = JoinedParts();
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      SessionOutcome& outcome = plan_.sessions.emplace_back();
+      outcome.is_joined = joined.contains(parts_.part_of[i]);
+      outcome.is_held = is_held_[i];
+      outcome.submaps = sessions_[i].submaps.size();
+      if (outcome.is_joined && !outcome.is_held) Move(i, outcome);
+    }
+    CountClosures();
+    plan_.closures = choice_.believed;
+    plan_.meetings = choice_.meetings;
+    plan_.links = links_;
+  }
+
+  void Move(std::size_t session, SessionOutcome& outcome) const {
+    const MergeSession& own = sessions_[session];
+    const std::vector<Pose> corrected = CorrectedPoses(own, poses_.T_world_submap[session]);
+    double squares_m2 = 0.0;
+    for (std::size_t i = 0; i < corrected.size(); ++i) {
+      const Pose before = own.keyframes[i].T_world_sensor.ToPose();
+      const Pose step = before.inverse() * corrected[i];
+      const double move_m = step.translation().norm();
+      squares_m2 += move_m * move_m;
+      outcome.max_move_m = std::max(outcome.max_move_m, move_m);
+      if (move_m < options_.min_move_m &&
+          Eigen::AngleAxisd(step.linear()).angle() < options_.min_move_rad) {
+        continue;
+      }
+      outcome.moved.push_back({i, QuantizedPose::FromPose(corrected[i])});
+    }
+    outcome.rms_move_m = std::sqrt(squares_m2 / static_cast<double>(corrected.size()));
+  }
+
+  void CountClosures() {
+    std::set<SubmapRef> met;
+    for (const FoundClosure& closure : choice_.believed) {
+      ++plan_.sessions[closure.a.session].closures;
+      if (closure.a.session != closure.b.session) ++plan_.sessions[closure.b.session].closures;
+      met.insert({closure.a, closure.b});
+      const Pose found = poses_.T_world_submap[closure.a.session][closure.a.submap].inverse() *
+                         poses_.T_world_submap[closure.b.session][closure.b.submap];
+      const Pose off = closure.match.T_a_b.inverse() * found;
+      plan_.closure_off_m.push_back(off.translation().norm());
+      plan_.closure_off_rad.push_back(Eigen::AngleAxisd(off.linear()).angle());
+    }
+    for (const SubmapRef& ref : met) {
+      ++plan_.sessions[ref.session].submaps_met;
+    }
+  }
+
+  std::vector<MergeSession>& sessions_;
+  const std::vector<BlobReader>& readers_;
+  const MapProfile& profile_;
+  const MergeOptions& options_;
+  const MergeProgress& progress_;
+  std::vector<std::vector<SessionLink>> links_;
+  std::vector<SessionWay> ways_;
+  ClosureChoice choice_;
+  SessionParts parts_;
+  std::vector<bool> is_held_;
+  MergedPoses poses_;
+  MergePlan plan_;
+};
+
+}  // namespace
+
+Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
+                            const std::vector<BlobReader>& readers,
+                            const MapProfile& profile,
+                            const MergeOptions& options,
+                            const MergeProgress& progress) {
+  return Planner(sessions, readers, profile, options, progress).Plan();
+}
+
+}  // namespace atlas

@@ -1,0 +1,65 @@
+// A merge from sessions to corrected poses: links, closures, which of them to believe, all poses at
+// once; then again with what lies near each other by these.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/merge/plan/closure_choice.h"
+#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_session.h"
+#include "client/merge/plan/session_links.h"
+#include "client/merge/plan/submap_builder.h"
+#include "core/base/status.h"
+#include "core/geometry/map_profile.h"
+
+namespace atlas {
+
+// A step of the work, and how much of it is done. A failed status ends it.
+using MergeProgress =
+    std::function<Status(std::string_view step, std::size_t done, std::size_t all)>;
+
+struct MovedKeyframe {
+  std::size_t keyframe = 0;  // of the session
+  QuantizedPose T_world_sensor;
+};
+
+struct SessionOutcome {
+  // It is in the map, or belongs into it now: it meets sessions that are, or where none is, most of
+  // the others.
+  bool is_joined = false;
+  bool is_held = false;
+  // It would have to be tilted against how its grids were levelled by more than 2 degrees.
+  bool is_too_tilted = false;
+  std::size_t closures = 0;
+  std::size_t submaps_met = 0;  // that have one, of so many:
+  std::size_t submaps = 0;
+  double max_move_m = 0.0;
+  double rms_move_m = 0.0;
+  std::vector<MovedKeyframe> moved;  // none of a session that is not joined
+};
+
+struct MergePlan {
+  std::vector<SessionOutcome> sessions;  // as they were given
+  std::vector<FoundClosure> closures;    // that are believed
+  std::vector<double> closure_off_m;     // of each, what is left between the submaps
+  std::vector<double> closure_off_rad;
+  std::vector<SessionMeeting> meetings;
+  std::size_t rejected = 0;  // closures
+  int rounds = 0;
+  std::vector<std::vector<SessionLink>> links;  // by session
+};
+
+// Fills the sessions' submaps. `readers`: of each session's blobs, which are read twice: submaps
+// are fused again by poses that are nearly right, for within a submap, too, odometry drifts. Errors
+// are those of BuildSubmaps and of `progress`, and kInternal where no poses are found.
+Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
+                            const std::vector<BlobReader>& readers,
+                            const MapProfile& profile,
+                            const MergeOptions& options,
+                            const MergeProgress& progress);
+
+}  // namespace atlas

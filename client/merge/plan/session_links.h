@@ -1,0 +1,40 @@
+// How the submaps of a session follow each other: as its poses have it, and as its submaps fit onto
+// each other.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "client/merge/graph/pose_graph.h"
+#include "client/merge/plan/match_worker.h"
+#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_session.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+// From one submap of a session to a later one.
+struct SessionLink {
+  std::size_t from = 0;
+  std::size_t to = 0;
+  Pose T_from_to = Pose::Identity();
+  PoseInformation6 information = PoseInformation6::Zero();
+  bool is_matched = false;  // else as the poses have it
+};
+
+// What a match says, its features' dependence and the map's own error considered.
+PoseInformation6 InformationOf(const SubmapMatch& match, const MergeOptions& options);
+
+// From each to the next by the stored poses, unless there is a jump between them; and from each to
+// the next and the one after that by a match from `T_world_submap`, where the session is thought to
+// be, if it is believed and near what the stored poses say.
+Result<std::vector<SessionLink>> LinkSession(std::size_t session,
+                                             const std::vector<MergeSession>& sessions,
+                                             const std::vector<Pose>& T_world_submap,
+                                             const MergeOptions& options,
+                                             MatchWorker& worker);
+
+// The session by its links alone, from its first submap on; after a jump by its poses.
+SessionWay WayOf(const MergeSession& session, const std::vector<SessionLink>& links);
+
+}  // namespace atlas

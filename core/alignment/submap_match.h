@@ -1,0 +1,89 @@
+// How two submaps fit onto each other: each one's features are registered in the other's map, and
+// both have to come to the same answer.
+#pragma once
+
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/alignment/submap.h"
+#include "core/geometry/map_profile.h"
+#include "core/geometry/pose.h"
+#include "core/localization/pose_search.h"
+#include "core/localization/registration.h"
+#include "core/localization/window/map_window.h"
+
+namespace atlas {
+
+struct MatchOptions {
+  PlaceOptions window;
+  RegistrationOptions registration;
+  PoseSearchOptions search = {.step_m = 0.4, .max_columns = 160, .candidates = 3};
+  float coarse_block_m = 0.4F;
+
+  // Both ways: how well mapped features fit, which share of the columns stands on structure, how
+  // certain the place is in its worst horizontal direction, were features independent.
+  double min_fit = 0.6;
+  double min_columns = 0.3;
+  double max_sigma_m = 0.02;
+  // Between the two answers.
+  double max_apart_m = 0.1;
+  double max_apart_rad = 0.5 * std::numbers::pi / 180.0;
+};
+
+// A submap as others are registered in it. The submap outlives it; one thread at a time.
+class SubmapWindow {
+ public:
+  // kInvalidData as the submap's tiles.
+  static Result<SubmapWindow> Make(const Submap& submap,
+                                   const MapProfile& profile,
+                                   const MatchOptions& options);
+
+  const Submap& submap() const { return *submap_; }
+  const MapWindow& window() const { return window_; }
+  const CoarseOccupancy& coarse();  // made when first asked for
+
+ private:
+  SubmapWindow(const Submap& submap, const MapProfile& profile, const MatchOptions& options)
+      : submap_(&submap),
+        window_(profile, options.window),
+        coarse_block_m_(options.coarse_block_m) {}
+
+  const Submap* submap_;
+  MapWindow window_;
+  float coarse_block_m_;
+  std::optional<CoarseOccupancy> coarse_;
+};
+
+struct SubmapMatch {
+  Pose T_a_b = Pose::Identity();  // midway between the two answers
+  // Of both ways together, as far as features are independent: (translation, rotation vector), axes
+  // of a, about b's origin.
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  // The worse of both ways.
+  double fit = 0.0;
+  double columns = 0.0;    // share of columns on structure
+  double explained = 0.0;  // share of columns that are explained, less contradictions
+  double sigma_m = 0.0;    // WorstSigma
+  // Between the two answers.
+  double apart_m = 0.0;
+  double apart_rad = 0.0;
+};
+
+SubmapMatch MatchSubmaps(const SubmapWindow& a,
+                         const SubmapWindow& b,
+                         const Pose& T_a_b_start,
+                         const MatchOptions& options);
+bool IsBelieved(const SubmapMatch& match, const MatchOptions& options);
+
+// Where b may lie in a around a start, by how many of its columns fall on structure: the best
+// first.
+std::vector<Pose> SearchSubmap(SubmapWindow& a,
+                               const Submap& b,
+                               const Pose& T_a_b_start,
+                               const SearchReach& reach,
+                               const MatchOptions& options);
+
+}  // namespace atlas
