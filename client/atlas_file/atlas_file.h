@@ -8,7 +8,10 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "client/connection/requests.h"
 #include "client/map/map_source.h"
 #include "client/vehicle/tile_files.h"
 #include "core/base/status.h"
@@ -52,6 +55,16 @@ class AtlasFile final : public MapSource {
   Status List(std::uint8_t level,
               const BoxArea& box,
               const std::function<Status(const TileFacts&)>& on_tile);
+
+  // All, or all of a vehicle, by vehicle and session, with the revisions at which they changed
+  // last. kInvalidData: their index is damaged; damaged ones say so.
+  Result<std::vector<SessionSummary>> ListSessions(const std::string& vehicle = {});
+  // A session's keyframes with their blobs, by rising sequence number, behind one (nullopt: from
+  // the first one on): calls back once a keyframe, damaged ones too. A failing callback ends it
+  // with its status. kNotFound: there is no such session. kInvalidData: its row is damaged.
+  Result<SessionReading> ReadKeyframes(const SessionKey& session,
+                                       std::optional<std::uint32_t> after_sequence,
+                                       const std::function<Status(SessionKeyframe)>& on_keyframe);
 
  private:
   explicit AtlasFile(std::unique_ptr<StoreSnapshot> snapshot);

@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 constexpr std::uint32_t kMinorWithPast = 2;
 constexpr std::uint32_t kMinorWithSync = 4;
 constexpr std::uint32_t kMinorWithWatch = 5;
-constexpr std::uint32_t kMinorWithKeyframes = 10;
+constexpr std::uint32_t kMinorWithChanges = 11;
 
 // Of a call that is given up after this; 0: never.
 Clock::time_point EndAfter(milliseconds give_up) {
@@ -104,6 +104,7 @@ SessionSummary SessionFromWire(const wire::SessionInfo& info) {
   session.compacted = info.compacted();
   session.reason = info.reason();
   session.is_damaged = info.damaged();
+  session.changed_revision = info.changed_revision();
   return session;
 }
 
@@ -134,27 +135,6 @@ Result<AtlasClient> AtlasClient::Connect(const ConnectionOptions& options) {
   ConnectProgress progress = ConnectAttempt(options).Continue(options.connect_timeout);
   if (!progress.client) return Error(std::move(progress.failure));
   return *std::move(progress.client);
-}
-
-Result<PoseBatchSummary> AtlasClient::UpdatePoses(std::span<const PoseCorrection> corrections,
-                                                  const std::string& author) {
-  if (corrections.size() > kMaxRepeatedFields) {
-    return Error(StatusCode::kInvalidArgument, StrCat("pose batch: ", corrections.size(),
-                                                      " poses, at most ", kMaxRepeatedFields));
-  }
-  wire::Envelope request;
-  wire::UpdatePoses& update = *request.mutable_update_poses();
-  update.set_author(author);
-  for (const PoseCorrection& correction : corrections) {
-    wire::PoseUpdate& pose = *update.add_updates();
-    *pose.mutable_key() = KeyToWire(correction.key);
-    *pose.mutable_pose() = PoseToWire(correction.T_world_sensor);
-  }
-  const auto reply = channel_->Call(request, Body::kUpdatePosesReply);
-  if (!reply) return Error(reply.error());
-  const wire::UpdatePosesReply& done = reply->update_poses_reply();
-  return PoseBatchSummary{done.updated(), done.tiles_marked(), done.revision(), done.batch(),
-                          done.compacted()};
 }
 
 Result<RegionSummary> AtlasClient::QueryRegion(const RegionQuery& query,
@@ -249,7 +229,13 @@ Result<AtlasStatus> AtlasClient::ReadStatus() {
   return StatusFromWire(reply->status_reply());
 }
 
-Result<std::vector<SessionSummary>> AtlasClient::ListSessions(const std::string& vehicle) {
+Result<std::vector<SessionSummary>> AtlasClient::ListSessions(const std::string& vehicle,
+                                                              SessionDetail detail) {
+  const bool is_with_changes = detail == SessionDetail::kChanges;
+  if (is_with_changes) {
+    Status status = CheckMinor(kMinorWithChanges, "when sessions changed");
+    if (!status.ok()) return Error(std::move(status));
+  }
   std::vector<SessionSummary> sessions;
   SessionKey last{vehicle, {}};
   while (true) {
@@ -257,6 +243,7 @@ Result<std::vector<SessionSummary>> AtlasClient::ListSessions(const std::string&
     wire::SessionsRequest& page = *request.mutable_sessions_request();
     page.set_after_vehicle(last.vehicle);
     page.set_after_session(last.session);
+    page.set_changed(is_with_changes);
     const auto reply = channel_->Call(request, Body::kSessionsReply);
     if (!reply) return Error(reply.error());
     const SessionKey before = last;
@@ -276,39 +263,6 @@ Result<std::vector<SessionSummary>> AtlasClient::ListSessions(const std::string&
     if (!reply->sessions_reply().has_more()) return sessions;
     if (last == before) {
       return Error(StatusCode::kInvalidData, "sessions: the daemon has more of them and told none");
-    }
-  }
-}
-
-Result<std::vector<KeyframeSummary>> AtlasClient::ListKeyframes(const SessionKey& session) {
-  if (Status status = session.Validate(); !status.ok()) return Error(std::move(status));
-  if (Status status = CheckMinor(kMinorWithKeyframes, "a list of keyframes"); !status.ok()) {
-    return Error(std::move(status));
-  }
-  std::vector<KeyframeSummary> keyframes;
-  while (true) {
-    wire::Envelope request;
-    wire::KeyframesRequest& page = *request.mutable_keyframes_request();
-    page.set_vehicle(session.vehicle);
-    page.set_session(session.session);
-    if (!keyframes.empty()) page.set_after_sequence(keyframes.back().sequence);
-    const auto reply = channel_->Call(request, Body::kKeyframesReply);
-    if (!reply) return Error(reply.error());
-    const wire::KeyframesReply& told = reply->keyframes_reply();
-    for (const wire::KeyframeInfo& info : told.keyframes()) {
-      const Result<QuantizedPose> pose = PoseFromWire(info.pose());
-      if (!pose) return Error(pose.error().WithContext(StrCat("keyframes of ", session)));
-      if (!keyframes.empty() && info.sequence() <= keyframes.back().sequence) {
-        return Error(StatusCode::kInvalidData,
-                     StrCat("keyframes of ", session, ": the daemon told of ", info.sequence(),
-                            " behind ", keyframes.back().sequence, ", expected them in order"));
-      }
-      keyframes.push_back({info.sequence(), info.time_ms(), *pose});
-    }
-    if (!told.has_more()) return keyframes;
-    if (told.keyframes().empty()) {
-      return Error(StatusCode::kInvalidData,
-                   StrCat("keyframes of ", session, ": the daemon has more and told none"));
     }
   }
 }

@@ -48,6 +48,7 @@ struct ConnectionOptions {
 class AtlasClient {
  public:
   using TileCallback = std::function<Status(TileBlob)>;
+  using KeyframeCallback = std::function<Status(SessionKeyframe)>;
 
   // Connects and shakes hands within `connect_timeout` (connect_attempt.h: over several calls).
   // kUnsupported when the daemon speaks another protocol version.
@@ -62,9 +63,17 @@ class AtlasClient {
   const MapProfile& profile() const { return profile_; }
   const AtlasIdentity& atlas() const { return atlas_; }
 
-  // All or nothing: kNotFound names an unknown keyframe, kInvalidData a refused pose.
+  // All or nothing: kNotFound names an unknown keyframe, kInvalidData a refused pose. kConflict:
+  // with a condition, what changed; or a session to be published that is neither staged nor in the
+  // map. kUnsupported: with terms, a daemon before 1.11.
   Result<PoseBatchSummary> UpdatePoses(std::span<const PoseCorrection> corrections,
-                                       const std::string& author);
+                                       const std::string& author,
+                                       const BatchTerms& terms = {});
+  // Another batch, by which the poses that one changed are what they were before it, and the
+  // sessions that it published are staged again. kNotFound: there is none of that number, or what
+  // was before it is no longer kept. kConflict names a keyframe that was corrected since, or a
+  // session that is in another state since. kUnsupported: a daemon before 1.11.
+  Result<PoseBatchSummary> UndoPoses(std::uint64_t batch, const std::string& author);
   // Calls back once a tile, in the order sent. A failing callback ends the query with its status.
   // kUnsupported: an earlier revision, and the daemon is too old for that.
   Result<RegionSummary> QueryRegion(const RegionQuery& query, const TileCallback& on_tile);
@@ -90,11 +99,19 @@ class AtlasClient {
   // Returns when no tile is dirty; kTimeout after `timeout`.
   Result<WaitSummary> WaitUntilFused(std::chrono::milliseconds timeout);
   // All, or all of a vehicle, by vehicle and session. Page by page: one that begins or vanishes
-  // meanwhile may be in it or not, every other one is.
-  Result<std::vector<SessionSummary>> ListSessions(const std::string& vehicle = {});
+  // meanwhile may be in it or not, every other one is. kUnsupported: with changes, a daemon before
+  // 1.11.
+  Result<std::vector<SessionSummary>> ListSessions(const std::string& vehicle = {},
+                                                   SessionDetail detail = SessionDetail::kUsual);
   // Of a session, by rising sequence number: those that are stored. kNotFound: there is no such
   // session. kUnsupported: a daemon before 1.10.
   Result<std::vector<KeyframeSummary>> ListKeyframes(const SessionKey& session);
+  // The same with their blobs, behind a sequence number (nullopt: from the first one on): calls
+  // back once a keyframe, as they arrive, damaged ones too. A failing callback ends it with its
+  // status. kUnsupported: a daemon before 1.11.
+  Result<SessionReading> ReadKeyframes(const SessionKey& session,
+                                       std::optional<std::uint32_t> after_sequence,
+                                       const KeyframeCallback& on_keyframe);
   // Takes a session out of the map, or puts it back. kNotFound: unknown. One that is so already
   // stays as it is. The reason is for people: one line of at most 256 bytes, or none.
   Result<SessionChangeSummary> ChangeSession(const SessionKey& key,

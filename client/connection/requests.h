@@ -48,9 +48,52 @@ struct KeyframeSummary {
   QuantizedPose T_world_sensor;  // as it is now
 };
 
+// A position known from elsewhere (GNSS): the sensor was within the radius of it.
+struct KnownPosition {
+  std::int64_t x_um = 0;
+  std::int64_t y_um = 0;
+  std::int64_t z_um = 0;
+  std::uint32_t radius_mm = 0;
+
+  friend bool operator==(const KnownPosition&, const KnownPosition&) = default;
+};
+
+// A stored keyframe as it was uploaded, where it is now.
+struct SessionKeyframe {
+  std::uint32_t sequence = 0;
+  std::int64_t time_ms = 0;      // since 1970
+  QuantizedPose T_world_sensor;  // as it is now
+  std::optional<KnownPosition> prior = std::nullopt;
+  Bytes blob;  // docs/formats/keyframe.md
+  // Not empty: it is damaged, and how; nothing but its sequence number is known.
+  std::string damage;
+};
+
+// What became of a session's keyframes being read.
+struct SessionReading {
+  std::uint64_t keyframes = 0;  // damaged ones, too
+  std::uint64_t damaged = 0;
+  std::uint64_t revision = 0;  // of the atlas when it began: all that came is at least as new
+};
+
 struct PoseCorrection {
   KeyframeKey key;
   QuantizedPose T_world_sensor;
+};
+
+// Under which condition a batch of corrections is applied, and what else is done by it.
+struct BatchTerms {
+  // 0, or the revision that it was computed at: nothing may have changed since about the sessions
+  // of its keyframes, and those that it publishes.
+  std::uint64_t if_revision = 0;
+  std::vector<SessionKey> published = {};  // staged ones, that come into the map by the same step
+};
+
+// A session that a batch put into another state.
+struct SessionEntry {
+  SessionKey key;
+  std::string state;   // now: "live", "quarantined", or "staged" again
+  std::string reason;  // of a quarantine
 };
 
 struct PoseBatchSummary {
@@ -59,6 +102,7 @@ struct PoseBatchSummary {
   std::uint64_t revision = 0;
   std::uint64_t batch = 0;
   std::uint32_t compacted = 0;  // of keyframes that compactions dropped: nothing to move
+  std::vector<SessionEntry> sessions = {};
 };
 
 // Without a disc: the whole atlas. Tiles come coarse first.
@@ -122,6 +166,9 @@ struct WaitSummary {
   std::uint64_t dirty_tiles = 0;
 };
 
+// What is told of sessions besides: kChanges takes the daemon a look at each keyframe.
+enum class SessionDetail : std::uint8_t { kUsual, kChanges };
+
 struct SessionSummary {
   SessionKey key;
   std::string state;
@@ -133,6 +180,9 @@ struct SessionSummary {
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
   std::string reason;           // of a state that is not "live"; empty: of a daemon before 1.9, too
   bool is_damaged = false;      // `reason` says what; of a "damaged" one only the name is known
+  // The last revision at which a keyframe came to it or was dropped, a pose of it was corrected, or
+  // it entered another state; 0: that was not asked for, or nobody knows.
+  std::uint64_t changed_revision = 0;
 
   // Released ones are: somebody let them in.
   bool IsInMap() const { return state == "live" || state == "released"; }

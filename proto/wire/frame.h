@@ -19,7 +19,7 @@ namespace atlas {
 inline constexpr std::size_t kFrameHeaderBytes = 12;
 inline constexpr std::uint32_t kMaxFrameBytes = 48u << 20;  // payload
 inline constexpr std::uint32_t kProtocolMajor = 1;
-inline constexpr std::uint32_t kProtocolMinor = 10;
+inline constexpr std::uint32_t kProtocolMinor = 11;
 
 struct FrameHeader {
   std::uint32_t payload_bytes = 0;

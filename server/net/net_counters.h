@@ -31,13 +31,16 @@ enum class RequestKind : std::uint8_t {
   kLog,
   kBackup,
   kKeyframes,
+  kUndoPoses,
+  kReadKeyframes,
   kUnknown,
 };
 // As metrics and logs call them, in the order of the enumerators.
-inline constexpr std::array<std::string_view, 18> kRequestKindNames = {
-    "hello",  "upload_keyframe", "update_poses", "change_session", "query_region", "sync",
-    "status", "sessions",        "wait",         "digest",         "verify",       "compact",
-    "watch",  "cancel",          "log",          "backup",         "keyframes",    "unknown"};
+inline constexpr std::array<std::string_view, 20> kRequestKindNames = {
+    "hello",  "upload_keyframe", "update_poses", "change_session", "query_region",
+    "sync",   "status",          "sessions",     "wait",           "digest",
+    "verify", "compact",         "watch",        "cancel",         "log",
+    "backup", "keyframes",       "undo_poses",   "read_keyframes", "unknown"};
 inline constexpr std::size_t kRequestKinds = kRequestKindNames.size();
 inline constexpr std::size_t kStatusCodes = 1 + static_cast<std::size_t>(StatusCode::kInternal);
 

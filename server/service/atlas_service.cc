@@ -107,6 +107,16 @@ Result<KeyframePage> AtlasService::ListKeyframes(const SessionKey& session,
   return page;
 }
 
+Result<KeyframeContents> AtlasService::ReadKeyframes(const SessionKey& session,
+                                                     std::optional<std::uint32_t> after_sequence,
+                                                     std::size_t max_bytes) {
+  auto contents = store_.ReadKeyframes(session, after_sequence, max_bytes);
+  if (!contents && contents.error().code() == StatusCode::kInvalidData) {
+    return Error(OfTheStore(contents.error()));
+  }
+  return contents;
+}
+
 Result<std::optional<SessionRecord>> AtlasService::FindSession(const SessionKey& key) {
   auto found = store_.FindSession(key);
   if (!found && found.error().code() == StatusCode::kInvalidData) {
@@ -136,13 +146,44 @@ void AtlasService::Upload(UploadRequest request, AtlasStore::Done<PutKeyframeRes
   PutKeyframe(*std::move(keyframe), std::move(done));
 }
 
+// Of sessions that looked wrong when they were published.
+void AtlasService::LogQuarantined(const PoseBatchResult& batch) const {
+  for (const auto& [session, entered] : batch.sessions) {
+    if (entered.state == SessionState::kQuarantined) {
+      LogJudgement(session, entered);
+    }
+  }
+}
+
+AtlasStore::Done<PoseBatchResult> AtlasService::ReportingBatch(
+    AtlasStore::Done<PoseBatchResult> done) {
+  const auto report = [this, done = std::move(done)](Result<PoseBatchResult> result) {
+    if (result) {
+      LogQuarantined(*result);
+    }
+    done(std::move(result));
+  };
+  return Notifying<PoseBatchResult>(changes_, report);
+}
+
 void AtlasService::UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done) {
-  auto batch = PlacePoses(std::move(request));
+  auto batch = PlacePoses(store_, std::move(request));
   if (!batch) {
     done(Error(batch.error()));
     return;
   }
-  store_.UpdatePoses(std::move(*batch), Notifying(changes_, std::move(done)));
+  batch->limits = plausibility();
+  store_.UpdatePoses(std::move(*batch), ReportingBatch(std::move(done)));
+}
+
+void AtlasService::UndoPoses(PoseUndoRequest request, AtlasStore::Done<PoseBatchResult> done) {
+  auto undo = PlaceUndo(store_, std::move(request));
+  if (!undo) {
+    done(Error(undo.error()));
+    return;
+  }
+  undo->limits = plausibility();
+  store_.UndoPoses(*std::move(undo), ReportingBatch(std::move(done)));
 }
 
 void AtlasService::ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done) {
@@ -153,34 +194,6 @@ void AtlasService::ChangeSession(SessionChange change, AtlasStore::Done<SessionC
   }
   change.limits = plausibility();
   store_.ChangeSession(std::move(change), Notifying(changes_, std::move(done)));
-}
-
-Result<PoseBatch> AtlasService::PlacePoses(PoseBatchRequest request) {
-  if (Status status = CheckAuthor(request.author); !status.ok()) {
-    return Error(std::move(status));
-  }
-  std::vector<KeyframeKey> keys;
-  keys.reserve(request.updates.size());
-  for (const PoseBatchRequest::Update& update : request.updates) {
-    keys.push_back(update.key);
-  }
-  const auto keyframes = store_.FindKeyframes(keys);
-  if (!keyframes) {
-    return Error(keyframes.error());
-  }
-  PoseBatch batch{{}, std::move(request.author), request.if_revision};
-  batch.poses.reserve(keys.size());
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    const QuantizedPose& update = request.updates[i].pose;
-    const auto& keyframe = (*keyframes)[i];
-    auto pose = keyframe ? CheckPose(*keyframe, update, identity().profile)
-                         : CheckDroppedPose(keys[i], update);
-    if (!pose) {
-      return Error(pose.error());
-    }
-    batch.poses.push_back(std::move(*pose));
-  }
-  return batch;
 }
 
 std::function<Status()> AtlasService::CheckPast(std::uint64_t revision,

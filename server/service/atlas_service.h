@@ -19,6 +19,7 @@
 #include "server/service/fusion_wait.h"
 #include "server/service/history/past_atlas.h"
 #include "server/service/log_sink.h"
+#include "server/service/pose_requests.h"
 #include "server/service/region/region_query.h"
 #include "server/service/sync/sync_plan.h"
 #include "server/service/upload_check.h"
@@ -28,16 +29,6 @@
 #include "server/store/atlas_store.h"
 
 namespace atlas {
-
-struct PoseBatchRequest {
-  struct Update {
-    KeyframeKey key;
-    QuantizedPose pose;
-  };
-  std::vector<Update> updates;
-  std::string author;
-  std::uint64_t if_revision = 0;
-};
 
 struct ServiceStatus {
   StoreCounts counts;
@@ -87,6 +78,7 @@ class AtlasService {
   // Both. Checked on the calling thread.
   void Upload(UploadRequest request, AtlasStore::Done<PutKeyframeResult> done);
   void UpdatePoses(PoseBatchRequest request, AtlasStore::Done<PoseBatchResult> done);
+  void UndoPoses(PoseUndoRequest request, AtlasStore::Done<PoseBatchResult> done);
   void ChangeSession(SessionChange change, AtlasStore::Done<SessionChangeResult> done);
   // From now on.
   void set_sessions_per_hour(std::uint32_t sessions) { starts_->set_per_hour(sessions); }
@@ -125,10 +117,18 @@ class AtlasService {
   Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after, std::uint32_t limit) {
     return store_.ListSessions(after, limit);
   }
+  Result<SessionPage> ListChangedSessions(const SessionKey& after, std::uint32_t limit) {
+    return store_.ListChangedSessions(after, limit);
+  }
   // Behind `after_sequence`; atlas_store.h. kUnavailable: a row is damaged.
   Result<KeyframePage> ListKeyframes(const SessionKey& session,
                                      std::optional<std::uint32_t> after_sequence,
                                      std::uint32_t limit);
+  // The same with their blobs, as many as count for `max_bytes`; damaged ones say so. kUnavailable:
+  // the session's row is damaged, or the index of its keyframes.
+  Result<KeyframeContents> ReadKeyframes(const SessionKey& session,
+                                         std::optional<std::uint32_t> after_sequence,
+                                         std::size_t max_bytes);
   // nullopt: unknown. kUnavailable: its row is damaged.
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key);
   // Of the last change on disk; never blocks.
@@ -168,7 +168,8 @@ class AtlasService {
   PlausibilityLimits plausibility() const;
   std::function<Status()> CheckPast(std::uint64_t revision, const Patience& patience) const;
   void RebuildDamaged(const TileId& id);
-  Result<PoseBatch> PlacePoses(PoseBatchRequest request);
+  void LogQuarantined(const PoseBatchResult& batch) const;
+  AtlasStore::Done<PoseBatchResult> ReportingBatch(AtlasStore::Done<PoseBatchResult> done);
 
   AtlasStore& store_;
   WallClock clock_;

@@ -9,6 +9,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "server/store/compaction_types.h"
 #include "server/store/damage_types.h"
 #include "server/store/event_types.h"
+#include "server/store/keyframe_content.h"
 #include "server/store/store_types.h"
 #include "server/store/tile_index.h"
 #include "server/store/upload_limits.h"
@@ -47,8 +49,15 @@ class AtlasStore : public TileIndex {
   // All or nothing; kNotFound names the first unknown key. A pose equal to the stored one changes
   // and marks nothing. Marks the union of the old and the new footprints. Neither uploads nor poses
   // of a session that is not in the map mark anything. Of a keyframe that a compaction dropped
-  // nothing changes.
+  // nothing changes. With a condition: errors as CheckUnchanged. Sessions that it publishes come
+  // into the map by the same step, judged as when they are published by themselves; kConflict: one
+  // is neither staged nor in the map already. kInvalidData: something is named twice.
   virtual void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) = 0;
+  // Another batch, by which all that one changed becomes what it was before it: its poses, and the
+  // sessions that it published are staged again (or published, if it had staged them again).
+  // Keyframes that came to these since stay in them. `undo` is made of what ReadBatchToUndo tells,
+  // errors as there.
+  virtual void UndoPoses(PoseUndo undo, Done<PoseBatchResult> done) = 0;
 
   // One transaction: the state, its line in the history, a mark on every tile that a keyframe of
   // the session touches. A session that is so already: nothing changes. kNotFound: unknown. The
@@ -107,6 +116,16 @@ class AtlasStore : public TileIndex {
   // Returns when every write queued before it is done and has been reported.
   virtual void Flush() = 0;
 
+  // Whether these sessions are what they were at a revision: no keyframe came to one, no pose of
+  // theirs was corrected, none is in another state, nothing of them was dropped or deleted.
+  // kConflict names the first one that is not, what changed and when; or `revision` is so old, or
+  // lost, that nothing tells. kInvalidArgument: the atlas is not there yet. kNotFound: there is no
+  // such session.
+  virtual Status CheckUnchanged(const std::set<SessionKey>& sessions, std::uint64_t revision) = 0;
+  // What a batch changed, and the poses before it. kNotFound: there is no such batch, or what was
+  // before it is no longer kept. kConflict names the first keyframe that was corrected since, or
+  // the session that it put into a state that it is not in any more.
+  virtual Result<BatchToUndo> ReadBatchToUndo(std::uint64_t batch) = 0;
   // In the order of `keys`; kNotFound names the first unknown one.
   virtual Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) = 0;
   // Those of a session behind `after_sequence`, which nobody need have; nullopt: from the first one
@@ -114,6 +133,12 @@ class AtlasStore : public TileIndex {
   virtual Result<KeyframePage> ListKeyframes(const SessionKey& session,
                                              std::optional<std::uint32_t> after_sequence,
                                              std::uint32_t limit) = 0;
+  // Keyframes of a session behind `after_sequence` with their blobs, as many as count for
+  // `max_bytes` together: a blob's size and kKeyframeBesidesBlobBytes each. Damaged ones say so.
+  // kNotFound: there is no such session.
+  virtual Result<KeyframeContents> ReadKeyframes(const SessionKey& session,
+                                                 std::optional<std::uint32_t> after_sequence,
+                                                 std::size_t max_bytes) = 0;
   // The keyframes of live sessions whose footprints touch a level-0 tile: those that were not there
   // at revision `since`, or not as they are now. All of them, and `is_whole`, where `since` is 0 or
   // before the last compaction: nothing tells any more what it dropped.
@@ -159,6 +184,9 @@ class AtlasStore : public TileIndex {
   // damaged ones, too, which say so.
   virtual Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
                                                           std::uint32_t limit) = 0;
+  // The same with the revisions at which they changed last (CheckUnchanged), which takes a look at
+  // each of their keyframes: a page is shorter where these are many.
+  virtual Result<SessionPage> ListChangedSessions(const SessionKey& after, std::uint32_t limit) = 0;
   // nullopt: unknown.
   virtual Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) = 0;
   // Verifies every checksum of a session's history and of what is left of its dropped keyframes.

@@ -28,6 +28,8 @@ enum class EventKind : std::uint8_t {
   kBackup = 17,          // of the atlas as it was
   kLogDamaged = 18,      // what was committed last is lost
   kSessionPublished = 19,
+  kPosesUndone = 20,    // a batch of corrections was taken back, by another one
+  kSessionStaged = 21,  // again: what published it was undone
 };
 
 // The author of what nobody asked for.
@@ -74,6 +76,10 @@ constexpr std::string_view EventName(EventKind kind) {
       return "log_damaged";
     case EventKind::kSessionPublished:
       return "session_published";
+    case EventKind::kPosesUndone:
+      return "poses_undone";
+    case EventKind::kSessionStaged:
+      return "session_staged";
   }
   return "unknown";  // of a later version
 }

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/plausibility.h"
@@ -27,6 +29,25 @@ inline bool IsInMap(SessionState state) {
   return state == SessionState::kLive || state == SessionState::kReleased;
 }
 
+// As messages and people name it (docs/protocol.md).
+constexpr std::string_view SessionStateName(SessionState state) {
+  switch (state) {
+    case SessionState::kStaged:
+      return "staged";
+    case SessionState::kLive:
+      return "live";
+    case SessionState::kQuarantined:
+      return "quarantined";
+    case SessionState::kRetracted:
+      return "retracted";
+    case SessionState::kReleased:
+      return "released";
+    case SessionState::kPurged:
+      return "purged";
+  }
+  return "unknown";  // of a later version
+}
+
 // What a list of sessions found wrong with one of them.
 enum class SessionDamage : std::uint8_t {
   kNone,
@@ -46,6 +67,15 @@ struct SessionRecord {
   std::uint64_t compacted = 0;  // keyframes that compactions dropped
   std::string reason = {};      // of its state, unless it is live; may be empty. Or of its damage
   SessionDamage damage = SessionDamage::kNone;  // of one that is listed; others are an error
+  // The last revision at which anything about it changed (session_changes.h). 0: nobody asked, or
+  // its row is damaged.
+  std::uint64_t changed_revision = 0;
+};
+
+// A page of them, by vehicle and session.
+struct SessionPage {
+  std::vector<SessionRecord> sessions;
+  bool has_more = false;  // behind the last one
 };
 
 // No keyframe was uploaded yet.

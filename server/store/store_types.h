@@ -16,6 +16,7 @@
 #include "core/geometry/pose.h"
 #include "core/geometry/tile_id.h"
 #include "server/store/missing_uploads.h"
+#include "server/store/pose_types.h"
 #include "server/store/session_starts.h"
 #include "server/store/session_types.h"
 
@@ -86,26 +87,6 @@ struct PutKeyframeResult {
   std::optional<SessionJudgement> judgement = {};  // that put its session into another state
 };
 
-struct NewPose {
-  KeyframeKey key;
-  QuantizedPose pose;
-  std::vector<TileId> footprint;  // at `pose`
-};
-
-struct PoseBatch {
-  std::vector<NewPose> poses;
-  std::string author;
-  std::uint64_t if_revision = 0;  // reserved: stored, without behaviour
-};
-
-struct PoseBatchResult {
-  std::uint32_t updated = 0;
-  std::uint32_t compacted = 0;  // of keyframes that compactions dropped: nothing to move
-  std::uint32_t tiles_marked = 0;
-  std::uint64_t revision = 0;
-  std::uint64_t batch = 0;
-};
-
 // A stored keyframe without its blob: enough to place it on the map.
 struct KeyframeRecord {
   std::int64_t id = 0;
@@ -121,6 +102,16 @@ struct KeyframeRecord {
 struct KeyframePage {
   std::vector<KeyframeRecord> keyframes;
   bool has_more = false;  // behind the last one
+};
+
+// What a batch of corrections changed, and what undoes it.
+struct BatchToUndo {
+  struct Moved {
+    KeyframeRecord keyframe;
+    QuantizedPose before;  // the batch
+  };
+  std::uint64_t batch = 0;
+  std::vector<Moved> keyframes;  // by their keys
 };
 
 struct StoredKeyframe {

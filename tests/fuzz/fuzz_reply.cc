@@ -83,6 +83,16 @@ bool CallAll(AtlasClient& client) {
   static_cast<void>(client.ChangeSession(kKey.session, SessionAction::kRetract, "me"));
   const std::vector<PoseCorrection> corrections{{kKey, {}}};
   const bool is_corrected = client.UpdatePoses(corrections, "me").has_value();
+  std::uint64_t last = 0;
+  static_cast<void>(
+      client.ReadKeyframes(kKey.session, std::nullopt, [&last](const SessionKeyframe& keyframe) {
+        Require(last == 0 || keyframe.sequence >= last, "keyframes come in order");
+        Require(keyframe.damage.empty() || keyframe.blob.empty(),
+                "nothing is told of damaged ones");
+        last = keyframe.sequence + std::uint64_t{1};
+        return Status();
+      }));
+  static_cast<void>(client.UndoPoses(1, "me"));
   UploadOptions upload;
   upload.patience = milliseconds(2);
   KeyframeUploader uploader(client, upload);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "core/base/str_cat.h"
 
@@ -110,6 +111,15 @@ Status ParseValue(const std::string& text, Perturbation& value) {
     return Expected("metres,degrees, both 0 or more", text);
   }
   value = {numbers[0], numbers[1]};
+  return {};
+}
+
+Status ParseValue(const std::string& text, SessionKey& value) {
+  const std::size_t slash = text.find('/');
+  if (slash == std::string::npos) return Expected("VEHICLE/SESSION", text);
+  SessionKey key{text.substr(0, slash), text.substr(slash + 1)};
+  ATLAS_RETURN_IF_ERROR(key.Validate());
+  value = std::move(key);
   return {};
 }
 

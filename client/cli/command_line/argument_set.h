@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "core/base/status.h"
+#include "core/geometry/keyframe_key.h"
 
 namespace atlas {
 
@@ -43,6 +44,7 @@ Status ParseValue(const std::string& text, Eigen::Vector2d& value);            /
 Status ParseValue(const std::string& text, Eigen::Vector3d& value);            // X,Y,Z
 Status ParseValue(const std::string& text, NumberRange& value);
 Status ParseValue(const std::string& text, Perturbation& value);
+Status ParseValue(const std::string& text, SessionKey& value);  // VEHICLE/SESSION
 
 template <typename T>
 Status ParseValue(const std::string& text, std::optional<T>& value) {
@@ -58,6 +60,7 @@ struct Argument {
   std::string help;
   bool is_required = false;
   std::function<Status(const std::string&)> set;  // the text of a flag is empty
+  bool is_repeated = false;                       // `set` is called once each time
 };
 
 // The targets outlive the set.
@@ -72,6 +75,21 @@ class ArgumentSet {
   template <typename T>
   void Required(std::string name, std::string value_name, T& target, std::string help) {
     Add(std::move(name), std::move(value_name), target, std::move(help), true);
+  }
+  // May be given several times; `target` is what each time said, in order.
+  template <typename T>
+  void Repeated(std::string name,
+                std::string value_name,
+                std::vector<T>& target,
+                std::string help) {
+    const auto append = [&target](const std::string& text) {
+      T value{};
+      ATLAS_RETURN_IF_ERROR(ParseValue(text, value));
+      target.push_back(std::move(value));
+      return Status();
+    };
+    arguments_.push_back(
+        {std::move(name), std::move(value_name), std::move(help), false, append, true});
   }
   // One word of `choices`.
   void Choice(std::string name,

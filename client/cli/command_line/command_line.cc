@@ -104,6 +104,15 @@ void AddArgument(CLI::App& app, const Argument& argument) {
         ->disable_flag_override();
     return;
   }
+  if (argument.is_repeated) {
+    const auto set_each = [set](const std::vector<std::string>& texts) {
+      std::for_each(texts.begin(), texts.end(), set);
+    };
+    app.add_option_function<std::vector<std::string>>(argument.name, set_each, argument.help)
+        ->type_name(argument.value_name)
+        ->allow_extra_args(false);  // one behind each
+    return;
+  }
   CLI::Option* option = app.add_option_function<std::string>(argument.name, set, argument.help);
   option->required(argument.is_required)->type_name(argument.value_name);
 }

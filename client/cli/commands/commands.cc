@@ -15,6 +15,7 @@ std::vector<std::unique_ptr<Command>> MakeCommands() {
   commands.push_back(MakeQueryCommand());
   commands.push_back(MakeWatchCommand());
   commands.push_back(MakePosesApplyCommand());
+  commands.push_back(MakePosesUndoCommand());
   commands.push_back(MakeSessionsCommand());
   commands.push_back(MakeSessionRetractCommand());
   commands.push_back(MakeSessionRestoreCommand());

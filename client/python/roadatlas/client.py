@@ -20,10 +20,11 @@ from roadatlas.tls import Tls
 from roadatlas.watch import Watch
 
 PROTOCOL_MAJOR = 1
-PROTOCOL_MINOR = 10
+PROTOCOL_MINOR = 11
 _FIELD_OF = {field.message_type.full_name: field.name
              for field in atlas_pb2.Envelope.DESCRIPTOR.oneofs_by_name["body"].fields}
 _REPLY_TO = {"hello": "hello_reply", "upload_keyframe": "upload_reply", "update_poses": "update_poses_reply",
+             "undo_poses": "update_poses_reply",
              "change_session": "change_session_reply", "keyframes_request": "keyframes_reply",
              "status_request": "status_reply", "sessions_request": "sessions_reply", "wait_request": "wait_reply", "digest_request": "digest_reply",
              "compact_request": "compact_reply", "verify_request": "verify_reply",
@@ -36,6 +37,16 @@ class QueryReply:
 
     tiles: list[atlas_pb2.TileMessage]
     end: atlas_pb2.QueryEnd
+
+
+@dataclasses.dataclass
+class KeyframesRead:
+    """A session's keyframes with their blobs, by sequence number. `damaged` ones are not among them: how each of these is,
+    by its number. Where `end.has_more`, ask again behind the last one of both."""
+
+    keyframes: list[atlas_pb2.KeyframeMessage]
+    damaged: dict[int, str]
+    end: atlas_pb2.KeyframesEnd
 
 
 class AtlasClient:
@@ -100,9 +111,11 @@ class AtlasClient:
 
     def submit(self, request: Message) -> int:
         """Sends a request that is answered by one message, without waiting for it; the id for `result`. DaemonTooOld:
-        it would put a staged session into the map."""
+        it would put a staged session into the map, or correct poses without a look at the condition."""
         if isinstance(request, atlas_pb2.UploadKeyframe) and request.staged:
             self._needs_minor(10, "a staged session")
+        if isinstance(request, atlas_pb2.UpdatePoses) and (request.if_revision or request.publish):
+            self._needs_minor(11, "a batch with a condition, or one that publishes,")
         awaited = _REPLY_TO[_field_of(request)]
         request_id = self._send(request)
         self._awaited[request_id] = awaited
@@ -123,9 +136,17 @@ class AtlasClient:
         """Many at a time on their way; their replies in order."""
         return [self.result(request_id) for request_id in [self.submit(upload) for upload in uploads]]
 
-    def update_poses(self, updates: Iterable[atlas_pb2.PoseUpdate], author: str = "") -> atlas_pb2.UpdatePosesReply:
-        """All or nothing."""
-        return self._call(atlas_pb2.UpdatePoses(updates=updates, author=author))
+    def update_poses(self, updates: Iterable[atlas_pb2.PoseUpdate], author: str = "", *, if_revision: int = 0,
+                     publish: Iterable[tuple[str, str]] = ()) -> atlas_pb2.UpdatePosesReply:
+        """All or nothing. `if_revision`: only if nothing changed since about the sessions concerned, else RequestRefused
+        with `conflict`. `publish`: vehicle and session of staged ones that come into the map by the same step."""
+        names = [atlas_pb2.SessionName(vehicle=vehicle, session=session) for vehicle, session in publish]
+        return self._call(atlas_pb2.UpdatePoses(updates=updates, author=author, if_revision=if_revision, publish=names))
+
+    def undo_poses(self, batch: int, author: str = "") -> atlas_pb2.UpdatePosesReply:
+        """What the batch changed is as it was before it, by another batch."""
+        self._needs_minor(11, "to undo a batch")
+        return self._call(atlas_pb2.UndoPoses(batch=batch, author=author))
 
     def change_session(self, vehicle: str, session: str, action: int, author: str = "",
                        reason: str = "") -> atlas_pb2.ChangeSessionReply:
@@ -136,10 +157,13 @@ class AtlasClient:
     def status(self) -> atlas_pb2.StatusReply:
         return self._call(atlas_pb2.StatusRequest())
 
-    def sessions(self) -> list[atlas_pb2.SessionInfo]:
-        """All, by vehicle and session, however many pages they take. `damaged` ones say what is in `reason`."""
+    def sessions(self, *, changed: bool = False) -> list[atlas_pb2.SessionInfo]:
+        """All, by vehicle and session, however many pages they take. `damaged` ones say what is in `reason`. `changed`:
+        with their `changed_revision`, which takes the daemon longer."""
+        if changed:
+            self._needs_minor(11, "when sessions changed")
         sessions: list[atlas_pb2.SessionInfo] = []
-        request = atlas_pb2.SessionsRequest()
+        request = atlas_pb2.SessionsRequest(changed=changed)
         while True:
             reply = self._call(request)
             for session in reply.sessions:
@@ -168,6 +192,30 @@ class AtlasClient:
                 return keyframes
             if not reply.keyframes:
                 raise BrokenReply("there are more keyframes, and none of them came")
+
+    def read_keyframes(self, vehicle: str, session: str, *, after_sequence: int | None = None,
+                       budget_bytes: int = 64 << 20) -> KeyframesRead:
+        """One reply: a session's keyframes as they were uploaded, where they are now, behind `after_sequence`. It takes
+        no more than the budget, all frames counted (0: as many as there are)."""
+        self._needs_minor(11, "to read keyframes")
+        read = KeyframesRead([], {}, atlas_pb2.KeyframesEnd())
+        last = -1 if after_sequence is None else after_sequence
+        request = atlas_pb2.ReadKeyframes(vehicle=vehicle, session=session, after_sequence=after_sequence,
+                                          budget_bytes=budget_bytes)
+        with self._frames_of_reply(request, 0) as receive:
+            while (envelope := receive()).WhichOneof("body") == "keyframe":
+                keyframe = envelope.keyframe
+                if keyframe.sequence <= last:
+                    raise BrokenReply(f"keyframe {keyframe.sequence} comes twice, or out of order")
+                last = keyframe.sequence
+                if keyframe.damage:
+                    read.damaged[last] = keyframe.damage
+                else:
+                    read.keyframes.append(keyframe)
+            read.end = _body_of(envelope, "keyframes_end")
+        if read.end.keyframes != len(read.keyframes) + len(read.damaged):
+            raise BrokenReply(f"{read.end.keyframes} keyframes were to come, others did")
+        return read
 
     def wait(self, timeout_ms: int) -> atlas_pb2.WaitReply:
         """Until no tile is dirty; `timed_out` tells."""

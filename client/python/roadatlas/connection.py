@@ -18,7 +18,7 @@ from roadatlas.transport import Transport
 
 MAX_IN_FLIGHT = 64  # requests that the daemon reads before the first of them is answered
 MAX_WAITING_EVENTS = 16  # of one watch; what comes beyond them is told in the last one
-_MORE_FOLLOW = ("tile", "sync_manifest", "watch_event")  # bodies that do not end a reply
+_MORE_FOLLOW = ("tile", "sync_manifest", "watch_event", "keyframe")  # bodies that do not end a reply
 _LAST_STAGES = (atlas_pb2.BackupReply.UNKNOWN, atlas_pb2.BackupReply.DONE)  # the first one's is a list
 
 

@@ -29,12 +29,19 @@ Status CheckUpload(const Identity& identity, const wire::UploadKeyframe& upload)
 }
 
 // Where a vehicle drove is its own, and of those who correct it.
-Status CheckKeyframes(const Identity& identity, const wire::KeyframesRequest& request) {
-  const bool is_own = identity.role == Role::kVehicle &&
-                      (identity.name.empty() || request.vehicle() == identity.name);
+Status CheckKeyframes(const Identity& identity, const std::string& vehicle) {
+  const bool is_own =
+      identity.role == Role::kVehicle && (identity.name.empty() || vehicle == identity.name);
   return is_own || identity.role == Role::kMerge
              ? Status()
-             : Deny(identity, StrCat("read keyframes of ", NameFrom(request.vehicle())));
+             : Deny(identity, StrCat("read keyframes of ", NameFrom(vehicle)));
+}
+
+// It takes a look at every keyframe, for those who correct them.
+Status CheckSessions(const Identity& identity, const wire::SessionsRequest& request) {
+  return request.changed() && identity.role != Role::kMerge
+             ? Deny(identity, "ask when sessions changed")
+             : Status();
 }
 
 // Who aligns sessions says when they are.
@@ -46,6 +53,9 @@ Status CheckChange(const Identity& identity, const wire::ChangeSession& change) 
 Status CheckPoses(const Identity& identity, const wire::UpdatePoses& poses) {
   if (identity.role == Role::kMerge) {
     return {};
+  }
+  if (poses.publish_size() > 0) {
+    return Deny(identity, "publish sessions");
   }
   const bool is_own =
       identity.role == Role::kVehicle &&
@@ -66,7 +76,13 @@ Status CheckMayAsk(const Identity& identity, const wire::Envelope& request) {
     case wire::Envelope::kUpdatePoses:
       return CheckPoses(identity, request.update_poses());
     case wire::Envelope::kKeyframesRequest:
-      return CheckKeyframes(identity, request.keyframes_request());
+      return CheckKeyframes(identity, request.keyframes_request().vehicle());
+    case wire::Envelope::kReadKeyframes:
+      return CheckKeyframes(identity, request.read_keyframes().vehicle());
+    case wire::Envelope::kSessionsRequest:
+      return CheckSessions(identity, request.sessions_request());
+    case wire::Envelope::kUndoPoses:
+      return identity.role == Role::kMerge ? Status() : Deny(identity, "undo corrections");
     case wire::Envelope::kChangeSession:
       return CheckChange(identity, request.change_session());
     case wire::Envelope::kCompactRequest:

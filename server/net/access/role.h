@@ -12,7 +12,7 @@ enum class Role : std::uint8_t {
   kNone,     // nothing: it is refused
   kReader,   // reads the map and the atlas's numbers
   kVehicle,  // uploads, under its own name, and corrects the poses of its own keyframes
-  kMerge,    // corrects all poses
+  kMerge,    // reads all keyframes, corrects all poses, publishes staged sessions
   kAdmin,    // everything
 };
 

@@ -31,6 +31,9 @@ std::size_t BytesOf(const Result<PoseBatchRequest>& poses) {
       const SessionKey& session = update.key.session;
       bytes += sizeof(update) + session.vehicle.size() + session.session.size();
     }
+    for (const SessionKey& session : poses->published) {
+      bytes += sizeof(session) + session.vehicle.size() + session.session.size();
+    }
   }
   return bytes;
 }

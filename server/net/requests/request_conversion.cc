@@ -19,21 +19,7 @@ std::optional<PositionPrior> PriorFromWire(const wire::UploadKeyframe& upload) {
 }
 
 std::string StateName(SessionState state) {
-  switch (state) {
-    case SessionState::kStaged:
-      return "staged";
-    case SessionState::kLive:
-      return "live";
-    case SessionState::kQuarantined:
-      return "quarantined";
-    case SessionState::kRetracted:
-      return "retracted";
-    case SessionState::kReleased:
-      return "released";
-    case SessionState::kPurged:
-      return "purged";
-  }
-  return "unknown";
+  return std::string(SessionStateName(state));
 }
 
 }  // namespace
@@ -100,6 +86,10 @@ Result<PoseBatchRequest> PosesFromWire(const wire::UpdatePoses& message) {
     }
     request.updates.push_back({std::move(*key), *pose});
   }
+  request.published.reserve(static_cast<std::size_t>(message.publish_size()));
+  for (const wire::SessionName& name : message.publish()) {
+    request.published.push_back({name.vehicle(), name.session()});
+  }
   return request;
 }
 
@@ -147,6 +137,15 @@ void PosesToWire(const PoseBatchResult& result, wire::UpdatePosesReply& out) {
   out.set_revision(result.revision);
   out.set_batch(result.batch);
   out.set_compacted(result.compacted);
+  for (const auto& [key, entered] : result.sessions) {
+    wire::UpdatePosesReply::SessionChange& change = *out.add_sessions();
+    change.set_vehicle(key.vehicle);
+    change.set_session(key.session);
+    change.set_state(StateName(entered.state));
+    if (entered.state == SessionState::kQuarantined) {
+      change.set_reason(entered.reason);
+    }
+  }
 }
 
 void SessionChangeToWire(const SessionChangeResult& result, wire::ChangeSessionReply& out) {
@@ -202,6 +201,7 @@ void SessionToWire(const SessionRecord& record, wire::SessionInfo& out) {
   out.set_last_sequence(record.last_sequence);
   out.set_compacted(record.compacted);
   out.set_reason(record.reason);
+  out.set_changed_revision(record.changed_revision);
 }
 
 void DigestToWire(const AtlasDigest& digest, wire::DigestReply& out) {

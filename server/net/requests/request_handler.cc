@@ -11,6 +11,7 @@
 #include "server/net/requests/backup_requests.h"
 #include "server/net/requests/keyframes_reply.h"
 #include "server/net/requests/on_pool.h"
+#include "server/net/requests/read_keyframes_reply.h"
 #include "server/net/requests/read_requests.h"
 #include "server/net/requests/request_conversion.h"
 #include "server/net/requests/sessions_reply.h"
@@ -137,6 +138,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole,
       return AnswerUpload(context_, request, peer);
     case Envelope::kUpdatePoses:
       return AnswerUpdatePoses(context_, whole, peer.out);
+    case Envelope::kUndoPoses:
+      return AnswerUndoPoses(context_, request, peer.out);
     case Envelope::kChangeSession:
       return AnswerChangeSession(context_, request, peer.out);
     case Envelope::kQueryRegion:
@@ -147,6 +150,8 @@ asio::awaitable<Status> RequestHandler::Dispatch(const Request& whole,
       return AnswerSessions(context_, request, peer);
     case Envelope::kKeyframesRequest:
       return AnswerKeyframes(context_, request, peer);
+    case Envelope::kReadKeyframes:
+      return AnswerReadKeyframes(context_, request, peer);
     case Envelope::kWaitRequest:
       return AnswerWait(context_, whole, record, peer.out);
     case Envelope::kDigestRequest:

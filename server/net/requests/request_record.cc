@@ -50,6 +50,10 @@ RequestKind KindOf(const Envelope& request) {
       return RequestKind::kBackup;
     case Envelope::kKeyframesRequest:
       return RequestKind::kKeyframes;
+    case Envelope::kUndoPoses:
+      return RequestKind::kUndoPoses;
+    case Envelope::kReadKeyframes:
+      return RequestKind::kReadKeyframes;
     default:
       return RequestKind::kUnknown;
   }

@@ -13,9 +13,9 @@ namespace {
 
 namespace asio = boost::asio;
 
-// More than one takes in a reply: two names of 64 bytes, a state of 11, six numbers, whether it is
-// damaged, their tags.
-constexpr std::size_t kSessionBytes = 218;
+// More than one takes in a reply: two names of 64 bytes, a state of 11, seven numbers, whether it
+// is damaged, their tags.
+constexpr std::size_t kSessionBytes = 229;
 // That some have besides: pages with many are shorter. An operator's reason is 256 bytes at most,
 // and two numbers of keyframes and what is between them some 120.
 constexpr std::size_t kReasonBytes = 520;
@@ -34,19 +34,33 @@ Result<SessionKey> StartFromWire(const wire::SessionsRequest& message) {
   return after;
 }
 
-void PageToWire(const std::vector<SessionRecord>& found,
-                std::size_t limit,
-                std::size_t room_bytes,
-                wire::SessionsReply& out) {
+Result<SessionPage> ReadPage(AtlasService& service,
+                             const SessionKey& after,
+                             std::uint32_t limit,
+                             bool is_with_changes) {
+  if (is_with_changes) {
+    return service.ListChangedSessions(after, limit);
+  }
+  auto sessions = service.ListSessions(after, limit + 1);  // whether there are more
+  if (!sessions) {
+    return Error(sessions.error());
+  }
+  SessionPage page{*std::move(sessions), false};
+  page.has_more = page.sessions.size() > limit;
+  page.sessions.resize(std::min<std::size_t>(page.sessions.size(), limit));
+  return page;
+}
+
+void PageToWire(const SessionPage& page, std::size_t room_bytes, wire::SessionsReply& out) {
   std::size_t count = 0;
-  for (std::size_t bytes = 0; count < std::min(found.size(), limit); ++count) {
-    bytes += kSessionBytes + found[count].reason.size();
+  for (std::size_t bytes = 0; count < page.sessions.size(); ++count) {
+    bytes += kSessionBytes + page.sessions[count].reason.size();
     if (count > 0 && bytes > room_bytes) {
       break;
     }
-    SessionToWire(found[count], *out.add_sessions());
+    SessionToWire(page.sessions[count], *out.add_sessions());
   }
-  out.set_has_more(found.size() > count);
+  out.set_has_more(page.has_more || page.sessions.size() > count);
 }
 
 }  // namespace
@@ -69,15 +83,15 @@ asio::awaitable<Status> AnswerSessions(RequestContext& context,
   }
   const auto limit =
       static_cast<std::uint32_t>(std::clamp<std::size_t>(room.bytes() / kSessionBytes, 1, wanted));
-  const Blocking<std::vector<SessionRecord>> list = [&context, &after = *after, limit] {
-    return context.service.ListSessions(after, limit + 1);  // whether there are more
+  const Blocking<SessionPage> list = [&context, &message, &after = *after, limit] {
+    return ReadPage(context.service, after, limit, message.changed());
   };
-  const Result<std::vector<SessionRecord>> sessions = co_await OnPool(context.pool, list);
-  if (!sessions) {
-    co_return sessions.error();
+  const Result<SessionPage> page = co_await OnPool(context.pool, list);
+  if (!page) {
+    co_return page.error();
   }
   wire::Envelope reply = ReplyTo(request);
-  PageToWire(*sessions, limit, room.bytes(), *reply.mutable_sessions_reply());
+  PageToWire(*page, room.bytes(), *reply.mutable_sessions_reply());
   peer.out.Push(reply);
   peer.out.Flush();
   co_return Status();

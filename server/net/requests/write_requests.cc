@@ -102,6 +102,18 @@ asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
                             PosesToWire, out);
 }
 
+asio::awaitable<Status> AnswerUndoPoses(RequestContext& context,
+                                        const wire::Envelope& request,
+                                        ReplyWriter& out) {
+  const Reading<PoseUndoRequest> read = [&request, &known = out.peer().name] {
+    const wire::UndoPoses& message = request.undo_poses();
+    return Result<PoseUndoRequest>({message.batch(), AuthorOf(known, message.author())});
+  };
+  const auto result = co_await Write(context, read, &AtlasService::UndoPoses);
+  co_return co_await Answer(request, result, &wire::Envelope::mutable_update_poses_reply,
+                            PosesToWire, out);
+}
+
 asio::awaitable<Status> AnswerChangeSession(RequestContext& context,
                                             const wire::Envelope& request,
                                             ReplyWriter& out) {

@@ -22,6 +22,9 @@ void NoteRefusedUpload(const wire::UploadKeyframe& message, const Status& why, P
 boost::asio::awaitable<Status> AnswerUpdatePoses(RequestContext& context,
                                                  const Request& request,
                                                  ReplyWriter& out);
+boost::asio::awaitable<Status> AnswerUndoPoses(RequestContext& context,
+                                               const wire::Envelope& request,
+                                               ReplyWriter& out);
 boost::asio::awaitable<Status> AnswerChangeSession(RequestContext& context,
                                                    const wire::Envelope& request,
                                                    ReplyWriter& out);

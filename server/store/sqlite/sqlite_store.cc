@@ -29,6 +29,9 @@
 #include "server/store/sqlite/transactions/current_reads.h"
 #include "server/store/sqlite/transactions/damage_transactions.h"
 #include "server/store/sqlite/transactions/history_reads.h"
+#include "server/store/sqlite/transactions/keyframe_contents.h"
+#include "server/store/sqlite/transactions/pose_transactions.h"
+#include "server/store/sqlite/transactions/session_changes.h"
 #include "server/store/sqlite/transactions/session_transactions.h"
 #include "server/store/sqlite/transactions/transactions.h"
 #include "server/store/sqlite/transactions/upload_turn.h"
@@ -89,8 +92,13 @@ class SqliteStore final : public AtlasStore {
         });
   }
   void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) override {
-    Write<PoseBatchResult>(std::move(done), [b = std::move(batch)](Connection& connection) {
-      return UpdatePosesInStore(connection, b);
+    Write<PoseBatchResult>(std::move(done), [this, b = std::move(batch)](Connection& connection) {
+      return UpdatePosesInStore(connection, identity_, b);
+    });
+  }
+  void UndoPoses(PoseUndo undo, Done<PoseBatchResult> done) override {
+    Write<PoseBatchResult>(std::move(done), [u = std::move(undo)](Connection& connection) {
+      return UndoPosesInStore(connection, u);
     });
   }
   void ChangeSession(SessionChange change, Done<SessionChangeResult> done) override {
@@ -201,37 +209,38 @@ class SqliteStore final : public AtlasStore {
   RoomFigures ReadRoom() override { return room_.ReadFigures(UploadRoom::Clock::now()); }
   void Flush() override { writes_.Flush(); }
 
+  Status CheckUnchanged(const std::set<SessionKey>& sessions, std::uint64_t revision) override {
+    return Check(&atlas::CheckUnchanged, identity_, sessions, revision);
+  }
+  Result<BatchToUndo> ReadBatchToUndo(std::uint64_t batch) override {
+    return Read(&atlas::ReadBatchToUndo, batch);
+  }
   Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override {
-    return readers_.Run<FoundKeyframes>(
-        [keys](Connection& connection) { return FindKeyframeRecords(connection, keys); });
+    return Read(&FindKeyframeRecords, keys);
   }
   Result<KeyframePage> ListKeyframes(const SessionKey& session,
                                      std::optional<std::uint32_t> after_sequence,
                                      std::uint32_t limit) override {
-    return readers_.Run<KeyframePage>([&](Connection& connection) {
-      return ReadKeyframePage(connection, session, after_sequence, limit);
-    });
+    return Read(&ReadKeyframePage, session, after_sequence, limit);
+  }
+  Result<KeyframeContents> ReadKeyframes(const SessionKey& session,
+                                         std::optional<std::uint32_t> after_sequence,
+                                         std::size_t max_bytes) override {
+    return Read(&ReadKeyframeContents, session, after_sequence, max_bytes);
   }
   Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override {
-    return readers_.Run<TileSources>(
-        [&id, since](Connection& connection) { return GatherTileSources(connection, id, since); });
+    return Read(&GatherTileSources, id, since);
   }
   Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) override {
-    return readers_.Run<TileSources>([&id, revision](Connection& connection) {
-      return GatherTileSourcesAt(connection, id, revision);
-    });
+    return Read(&GatherTileSourcesAt, id, revision);
   }
   Status CheckRevision(std::uint64_t revision) override {
     ATLAS_RETURN_IF_ERROR(identity_.CheckNotLost(revision));
-    return ReadStatus(
-        [revision](Connection& connection) { return CheckRevisionKept(connection, revision); });
+    return Check(&CheckRevisionKept, revision);
   }
-  Result<Bytes> ReadKeyframeBlob(std::int64_t id) override {
-    return readers_.Run<Bytes>([id](Connection& connection) { return ReadBlob(connection, id); });
-  }
+  Result<Bytes> ReadKeyframeBlob(std::int64_t id) override { return Read(&ReadBlob, id); }
   Result<KeyframeRecord> ReadKeyframeRecord(std::int64_t id) override {
-    return readers_.Run<KeyframeRecord>(
-        [id](Connection& connection) { return atlas::ReadKeyframeRecord(connection, id); });
+    return Read(&atlas::ReadKeyframeRecord, id);
   }
   Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) override {
     return readers_.Run<std::vector<std::int64_t>>([&id](Connection& connection) {
@@ -239,8 +248,7 @@ class SqliteStore final : public AtlasStore {
     });
   }
   Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() override {
-    return readers_.Run<std::vector<DamagedKeyframe>>(
-        [](Connection& connection) { return ReadDamagedKeyframes(connection); });
+    return Read(&ReadDamagedKeyframes);
   }
   Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                     std::uint32_t limit) override {
@@ -249,18 +257,11 @@ class SqliteStore final : public AtlasStore {
     });
   }
   Result<StoredKeyframe> ReadKeyframe(std::int64_t id) override {
-    return readers_.Run<StoredKeyframe>([id](Connection& connection) -> Result<StoredKeyframe> {
-      auto record = VerifyKeyframeRecord(connection, id);
-      if (!record) {
-        return Error(record.error());
-      }
-      return StoredKeyframe{*std::move(record), ReadFootprint(connection, id)};
-    });
+    return Read(&VerifyStoredKeyframe, id);
   }
 
   Result<std::optional<StoredTile>> ReadTile(const TileId& id) override {
-    return readers_.Run<std::optional<StoredTile>>(
-        [&id](Connection& connection) { return ReadTileRow(connection, id); });
+    return Read(&ReadTileRow, id);
   }
   Result<TileBlock> ReadTileBlock(std::uint64_t block) override;
   TileBlock FindTileBlock(std::uint64_t block) override { return tiles_.Find(block); }
@@ -274,14 +275,11 @@ class SqliteStore final : public AtlasStore {
   Result<std::vector<TileId>> ListFootprintTiles(std::uint8_t level,
                                                  std::int64_t after_key,
                                                  std::uint32_t limit) override {
-    return readers_.Run<std::vector<TileId>>([=](Connection& connection) {
-      return ListFootprintRows(connection, level, after_key, limit);
-    });
+    return Read(&ListFootprintRows, level, after_key, limit);
   }
   Status ScanFootprintTiles(const TileRect& rect,
                             const std::function<void(const TileId&)>& visit) override {
-    return ReadStatus(
-        [&](Connection& connection) { return ScanFootprintRows(connection, rect, visit); });
+    return Check(&ScanFootprintRows, rect, visit);
   }
 
   Result<DirtyState> ReadDirtyState() override {
@@ -297,27 +295,20 @@ class SqliteStore final : public AtlasStore {
   }
   Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
                                                   std::uint32_t limit) override {
-    return readers_.Run<std::vector<SessionRecord>>(
-        [&](Connection& connection) { return ReadSessions(connection, after, limit); });
+    return Read(&ReadSessions, after, limit);
+  }
+  Result<SessionPage> ListChangedSessions(const SessionKey& after, std::uint32_t limit) override {
+    return Read(&ReadChangedSessions, after, limit);
   }
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) override {
-    return readers_.Run<std::optional<SessionRecord>>(
-        [&key](Connection& connection) { return FindSessionRecord(connection, key); });
+    return Read(&FindSessionRecord, key);
   }
-  Status CheckSession(const SessionKey& key) override {
-    return ReadStatus(
-        [&key](Connection& connection) { return CheckSessionHistory(connection, key); });
-  }
-  Status CheckCompactions() override {
-    return ReadStatus([](Connection& connection) { return CheckCompactionRows(connection); });
-  }
+  Status CheckSession(const SessionKey& key) override { return Check(&CheckSessionHistory, key); }
+  Status CheckCompactions() override { return Check(&CheckCompactionRows); }
   Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) override {
-    return readers_.Run<std::vector<Event>>(
-        [=](Connection& connection) { return ReadEvents(connection, after_id, limit); });
+    return Read(&ReadEvents, after_id, limit);
   }
-  Status CheckCounters() override {
-    return ReadStatus([](Connection& connection) { return atlas::CheckCounters(connection); });
-  }
+  Status CheckCounters() override { return Check(&atlas::CheckCounters); }
 
   Status CheckIndexes(const std::function<Status()>& check_stop) override {
     return CheckStructure([this](const StructureCheck& check) { return ReadStatus(check); },
@@ -325,9 +316,18 @@ class SqliteStore final : public AtlasStore {
   }
 
  private:
-  // Runs `read`, which returns a Status, in one snapshot.
-  template <typename Read>
-  Status ReadStatus(Read&& read) {
+  // Runs `read` with these arguments in one snapshot.
+  template <typename T, typename... Parameters, typename... Arguments>
+  Result<T> Read(Result<T> (*read)(Connection&, Parameters...), const Arguments&... arguments) {
+    return readers_.Run<T>([&](Connection& connection) { return read(connection, arguments...); });
+  }
+  template <typename... Parameters, typename... Arguments>
+  Status Check(Status (*check)(Connection&, Parameters...), const Arguments&... arguments) {
+    return ReadStatus([&](Connection& connection) { return check(connection, arguments...); });
+  }
+  // The same of whatever returns a Status.
+  template <typename Reading>
+  Status ReadStatus(Reading&& read) {
     const auto result = readers_.Run<bool>([&](Connection& connection) -> Result<bool> {
       Status status = read(connection);
       return status.ok() ? Result<bool>(true) : Error(std::move(status));

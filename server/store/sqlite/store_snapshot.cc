@@ -8,6 +8,8 @@
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
+#include "server/store/sqlite/transactions/keyframe_contents.h"
+#include "server/store/sqlite/transactions/session_changes.h"
 
 namespace atlas {
 namespace {
@@ -106,17 +108,36 @@ Status StoreSnapshot::Explained(const Status& status) const {
       .WithContext(StrCat("atlas file ", files_.database.string()));
 }
 
-Result<std::optional<StoredTile>> StoreSnapshot::ReadTile(const TileId& id) {
-  Result<std::optional<StoredTile>> tile = std::nullopt;
+template <typename T, typename Reading>
+Result<T> StoreSnapshot::Read(const Reading& read) {
+  Result<T> found = T();
   try {
-    tile = ReadTileRow(*connection_, id);
+    found = read(*connection_);
   } catch (const std::exception& error) {
-    tile = Error(ReadFailure(error));
+    found = Error(ReadFailure(error));
   }
   if (Status untouched = CheckUntouched(); !untouched.ok()) {
     return Error(std::move(untouched));
   }
-  return tile ? std::move(tile) : Error(Explained(tile.error()));
+  return found ? std::move(found) : Error(Explained(found.error()));
+}
+
+Result<std::optional<StoredTile>> StoreSnapshot::ReadTile(const TileId& id) {
+  return Read<std::optional<StoredTile>>(
+      [&id](Connection& connection) { return ReadTileRow(connection, id); });
+}
+
+Result<SessionPage> StoreSnapshot::ListSessions(const SessionKey& after, std::uint32_t limit) {
+  return Read<SessionPage>(
+      [&](Connection& connection) { return ReadChangedSessions(connection, after, limit); });
+}
+
+Result<KeyframeContents> StoreSnapshot::ReadKeyframes(const SessionKey& session,
+                                                      std::optional<std::uint32_t> after_sequence,
+                                                      std::size_t max_bytes) {
+  return Read<KeyframeContents>([&](Connection& connection) {
+    return ReadKeyframeContents(connection, session, after_sequence, max_bytes);
+  });
 }
 
 Status StoreSnapshot::ScanTiles(const TileRect& rect,

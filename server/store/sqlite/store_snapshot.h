@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "core/base/status.h"
+#include "server/store/keyframe_content.h"
 #include "server/store/sqlite/database_files.h"
 #include "server/store/store_types.h"
 
@@ -45,7 +46,18 @@ class StoreSnapshot {
   // A failing visit ends it with its status; else errors as of ReadTile.
   Status ScanTiles(const TileRect& rect, const std::function<Status(const TileSummary&)>& visit);
 
+  // Behind `after`, up to `limit`, with the revisions at which they changed last; damaged ones say
+  // so. Errors as of ReadTile.
+  Result<SessionPage> ListSessions(const SessionKey& after, std::uint32_t limit);
+  // AtlasStore::ReadKeyframes. Errors as there, and kUnavailable as in Open.
+  Result<KeyframeContents> ReadKeyframes(const SessionKey& session,
+                                         std::optional<std::uint32_t> after_sequence,
+                                         std::size_t max_bytes);
+
  private:
+  // What `read` finds, unless somebody wrote meanwhile.
+  template <typename T, typename Reading>
+  Result<T> Read(const Reading& read);
   explicit StoreSnapshot(DatabaseFiles files);
 
   Status Begin();

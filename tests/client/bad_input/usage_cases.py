@@ -44,7 +44,10 @@ USAGE = {
         ["--center", "0,0", "--radius", "5", "--interval", "-1"],
         ["--center", "0,0", "--radius", "5", "--for", "soon"],
     ],
-    "poses": [[], ["apply"], ["revert"], ["apply", "a", "b"]],
+    "poses": [[], ["apply"], ["revert"], ["apply", "a", "b"], ["undo"], ["undo", "first"], ["undo", "-1"],
+              ["undo", "1", "2"], ["apply", "a", "--if-revision", "x"], ["apply", "a", "--if-revision", "0"],
+              ["apply", "a", "--publish", "vehicle"], ["apply", "a", "--publish"],
+              ["apply", "a", "--publish", "v/s", "v/t"], ["apply", "a", "--publish", "v/a b"]],
     "sessions": [["more"], ["--atlas", "WORK/x.db"]],
     "session": [[], ["retract"], ["restore"], ["purge", "vehicle/good"], ["retract", "vehicle/good", "more"],
                 ["restore", "vehicle"], ["retract", "vehicle/good/1"], ["retract", "--at", "1", "vehicle/good"]],
@@ -147,7 +150,7 @@ def odd_but_right_cases(cases, drives):
 
 
 def help_cases(cases):
-    for line in ([], *([command] for command in USAGE), ["poses", "apply"], ["session", "retract"]):
+    for line in ([], *([command] for command in USAGE), ["poses", "apply"], ["poses", "undo"], ["session", "retract"]):
         done = cases.call(*line, "--help")
         cases.report.equal(f"{line} --help: exit code", done.returncode, 0)
         cases.report.check(f"{line} --help: on stdout", "Usage: atlas" in done.stdout and not done.stderr,

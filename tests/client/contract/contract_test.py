@@ -25,7 +25,7 @@ KEYS = {
               "disk_floor_bytes refusing",
     "point": "layers",
     "query": "type tiles bytes revision truncated",
-    "poses": "updated tiles_marked revision batch",
+    "poses": "updated tiles_marked revision batch compacted sessions",
     "sessions": "sessions",
     "session": "vehicle session state changed tiles_marked revision keyframes_deleted",
     "vehicle": "vehicle sessions changed tiles_marked revision",

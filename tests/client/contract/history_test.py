@@ -116,6 +116,38 @@ def live_cases(cases, drives, work):
     return moments
 
 
+def correction_cases(cases, work):
+    """A batch on a condition, refused because something changed since, and undone."""
+    def file_of(y_m):
+        path = pathlib.Path(work) / "moved.txt"
+        path.write_text(f"vehicle good 1 1 0 0 0.5 0 1 0 {y_m} 0 0 1 1.8\n", encoding="ascii")
+        return path
+
+    def digest():
+        return cases.run("digest")["digest"]
+
+    before, computed_at = digest(), cases.run("status")["revision"]
+    done = cases.run("poses", "apply", file_of(-1.2), "--if-revision", computed_at, "--publish", "vehicle/good")
+    cases.report.equal("a batch on a condition", (done["updated"], done["sessions"]), (1, []))
+    cases.report.check("a batch on a condition: another map", digest() != before)
+    cases.refused("a batch on a condition that does not hold",
+                  ["poses", "apply", file_of(-0.8), "--if-revision", computed_at], "conflict",
+                  f"session vehicle/good changed since revision {computed_at}")
+    cases.refused("a batch of a revision to come", ["poses", "apply", file_of(-0.8), "--if-revision", "99999999"],
+                  "invalid_argument", "there is no revision 99999999 yet")
+    cases.refused("a session to be published that is none",
+                  ["poses", "apply", file_of(-0.8), "--publish", "vehicle/nobody"], "not_found", "vehicle/nobody")
+    text = cases.call("poses", "undo", str(done["batch"]), "--author", "surveyor")
+    cases.report.equal("undo: exit code and stderr", (text.returncode, text.stderr), (0, ""))
+    cases.report.check("undo: text", f"batch {done['batch'] + 1}\n" in text.stdout, text.stdout)
+    cases.report.equal("undone", digest(), before)
+    cases.refused("undo again", ["poses", "undo", str(done["batch"])], "conflict", "keyframe vehicle/good/1 was corrected")
+    cases.refused("undo what never was", ["poses", "undo", "4711"], "not_found", "there is no batch 4711")
+    event = cases.run("log")["events"][-1]
+    cases.report.equal("undo in the log", (event["kind"], event["author"], event["subject"]),
+                       ("poses_undone", "surveyor", f"batch {done['batch'] + 1}"))
+
+
 def wild_cases(cases, drives):
     """A drive that is faster than the daemon believes: out of the map, released, and purged."""
     before = cases.run("digest")["digest"]
@@ -237,6 +269,7 @@ def main():
         with Daemon(bin_dir, data) as daemon:
             forgotten_cases(Cases(report, bin_dir, daemon.server), horizon)
             account_cases(Cases(report, bin_dir, daemon.server))
+            correction_cases(Cases(report, bin_dir, daemon.server), work)
             impossible_cases(Cases(report, bin_dir, daemon.server), drives)
         with Daemon(bin_dir, data, "--quarantine-max-speed-mps", "1", "--quarantine-max-jump-m", "0") as daemon:
             wild_cases(Cases(report, bin_dir, daemon.server), drives)

@@ -36,7 +36,7 @@ class DocumentedTest(AtlasCase):
         return "--backup-folder", str(self.work / "backups")
 
     def test_each_is_run_here(self):
-        self.assertEqual(set(examples()), {"Use", "Over TLS", "Watch", "Upload", "Look after it"})
+        self.assertEqual(set(examples()), {"Use", "Over TLS", "Watch", "Upload", "Correct", "Look after it"})
 
     def test_use(self):
         self.drive()
@@ -66,6 +66,12 @@ class DocumentedTest(AtlasCase):
         keyframes = [self.upload(i, i, "monday", radius_cells=8) for i in range(3)]
         self.assertEqual(run("Upload", self.port, keyframes=keyframes)[0], "[0, 1, 2] [] {}\n")
         self.assertEqual(run("Upload", self.port, keyframes=keyframes)[0], "[] [0, 1, 2] {}\n")
+
+    def test_correct(self):
+        self.drive()
+        before = self.client.digest(60_000).sha256
+        self.assertEqual(run("Correct", self.port)[0], "1 1 {}\n1\n")
+        self.assertEqual(self.client.digest(60_000).sha256, before)
 
     def test_look_after_it(self):
         self.drive()

@@ -21,7 +21,7 @@ SYNC = atlas_pb2.Envelope(request_id=2, sync_request=atlas_pb2.SyncRequest(
 WATCH = atlas_pb2.Envelope(request_id=3, watch_request=atlas_pb2.WatchRequest(
     area=geometry.disc(1.5, -2, 100), interval_ms=1000))
 HELLO_REPLY = atlas_pb2.Envelope(request_id=1, hello_reply=atlas_pb2.HelloReply(
-    protocol_major=1, protocol_minor=10, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
+    protocol_major=1, protocol_minor=11, profile=b"\1\2\3", atlas_id=bytes(range(16)), epoch=1, revision=41,
     max_frame_bytes=MAX_PAYLOAD_BYTES, name="car.7", role="vehicle", last_sequence=11))
 UPLOAD = atlas_pb2.Envelope(request_id=4, upload_keyframe=atlas_pb2.UploadKeyframe(
     key=atlas_pb2.KeyframeKey(vehicle="car.7", session="monday", sequence=12), time_ms=1_790_000_000_000,
@@ -44,6 +44,19 @@ STAGED = atlas_pb2.Envelope(request_id=7, upload_keyframe=atlas_pb2.UploadKeyfra
     pose=UPLOAD.upload_keyframe.pose, blob=b"\xaa\xbb\xcc", staged=True))
 PUBLICATION = atlas_pb2.Envelope(request_id=8, change_session=atlas_pb2.ChangeSession(
     vehicle="car.7", session="tuesday", action=atlas_pb2.ChangeSession.PUBLISH))
+READ = atlas_pb2.Envelope(request_id=9, read_keyframes=atlas_pb2.ReadKeyframes(
+    vehicle="car.7", session="monday", after_sequence=11, budget_bytes=65536))
+KEYFRAME = atlas_pb2.Envelope(request_id=9, keyframe=atlas_pb2.KeyframeMessage(
+    sequence=12, time_ms=1_790_000_000_000, pose=UPLOAD.upload_keyframe.pose,
+    prior=atlas_pb2.PositionPrior(x_um=1_400_000, y_um=-2_100_000, z_um=1_900_000, radius_mm=2500), blob=b"\xaa\xbb\xcc"))
+KEYFRAMES_END = atlas_pb2.Envelope(request_id=9, keyframes_end=atlas_pb2.KeyframesEnd(keyframes=1, bytes=96, revision=42))
+CORRECTION = atlas_pb2.Envelope(request_id=10, update_poses=atlas_pb2.UpdatePoses(
+    updates=[atlas_pb2.PoseUpdate(key=STAGED.upload_keyframe.key, pose=UPLOAD.upload_keyframe.pose)], if_revision=42,
+    publish=[atlas_pb2.SessionName(vehicle="car.7", session="tuesday")]))
+CORRECTED = atlas_pb2.Envelope(request_id=10, update_poses_reply=atlas_pb2.UpdatePosesReply(
+    updated=1, tiles_marked=9, revision=43, batch=1,
+    sessions=[atlas_pb2.UpdatePosesReply.SessionChange(vehicle="car.7", session="tuesday", state="live")]))
+UNDOING = atlas_pb2.Envelope(request_id=11, undo_poses=atlas_pb2.UndoPoses(batch=1))
 MANIFEST = atlas_pb2.Envelope(request_id=2, sync_manifest=atlas_pb2.SyncManifest(
     keys=[geometry.tile_key(1, 1, 1)], revisions=[42], payload_hashes=[0x0807060504030201], bytes=[3], errors_mm=[200],
     current_tiles=b"\1", not_modified=1))
@@ -51,7 +64,8 @@ TILE = atlas_pb2.Envelope(request_id=2, tile=atlas_pb2.TileMessage(
     key=geometry.tile_key(1, 1, 1), revision=42, payload_hash=0x0807060504030201, blob=b"\xaa\xbb\xcc"))
 END = atlas_pb2.Envelope(request_id=2, sync_end=atlas_pb2.SyncEnd(tiles=1, bytes=116, revision=42))
 ENVELOPES = [HELLO, BACKUP, SYNC, WATCH, HELLO_REPLY, UPLOAD, UPLOADED, BUSY, SESSIONS, PAGE, KEYFRAMES,
-             KEYFRAMES_REPLY, STAGED, PUBLICATION, MANIFEST, TILE, END]
+             KEYFRAMES_REPLY, STAGED, PUBLICATION, READ, KEYFRAME, KEYFRAMES_END, CORRECTION, CORRECTED, UNDOING, MANIFEST,
+             TILE, END]
 
 
 def leading_bytes(line):

@@ -79,6 +79,15 @@ class RolesTest(FleetCase):
         self.refused(self.car, self.car.keyframes, "car.8", "s")
         for client, vehicle in ((self.car, "car.7"), (self.merge, "car.8"), (self.admin, "car.7")):
             self.assertEqual([frame.sequence for frame in client.keyframes(vehicle, "s")], [0])
+            self.assertEqual([frame.sequence for frame in client.read_keyframes(vehicle, "s").keyframes], [0])
+        self.refused(self.reader, self.reader.read_keyframes, "car.7", "s")
+        self.refused(self.car, self.car.read_keyframes, "car.8", "s")
+        for client in (self.car, self.reader):
+            self.refused(client, functools.partial(client.update_poses, [], publish=[("car.7", "s")]))
+            self.refused(client, functools.partial(client.sessions, changed=True))
+            self.refused(client, client.undo_poses, 1)
+        self.assertEqual(self.merge.update_poses([], publish=[("car.7", "s")]).batch, 0)
+        self.assertEqual(len(self.merge.sessions(changed=True)), 2)
         for client in (self.car, self.reader):
             self.refused(client, client.verify, 60_000)
             self.refused(client, client.log)

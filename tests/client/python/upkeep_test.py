@@ -99,6 +99,16 @@ class EarlierDaemonTest(unittest.TestCase):
             with AtlasClient(port=peer.port) as client, self.assertRaisesRegex(DaemonTooOld, "1[.]8.*1[.]7"):
                 client.verify(LONG_MS, repair=True)
 
+    def test_is_not_asked_for_corrections_on_a_condition(self):
+        with Peer(frame_of(1, hello_reply={"protocol_major": 1, "protocol_minor": 10})) as peer:
+            with AtlasClient(port=peer.port) as client:
+                for call in (lambda: client.update_poses([], if_revision=7),
+                             lambda: client.update_poses([], publish=[("car", "s")]),
+                             lambda: client.undo_poses(1), lambda: client.read_keyframes("car", "s"),
+                             lambda: client.sessions(changed=True)):
+                    with self.assertRaisesRegex(DaemonTooOld, "1[.]11.*1[.]10"):
+                        call()
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -177,6 +177,59 @@ class CorrectionTest(AtlasCase):
         self.refused(Code.NOT_FOUND, self.client.keyframes, "car", "nobody")
 
 
+    def test_keyframes_read_back(self):
+        uploads = [self.upload(i, 60 + i, "back", radius_cells=8 + i) for i in (0, 3, 4, 9)]
+        uploads[1].prior.CopyFrom(atlas_pb2.PositionPrior(x_um=-7, y_um=1 << 40, z_um=5, radius_mm=2_500))
+        self.client.upload_keyframes(uploads)
+        self.client.update_poses([atlas_pb2.PoseUpdate(key=key(4, "back"), pose=pose_at(47))])
+        for budget in (0, max(len(upload.blob) for upload in uploads) + 500, 1 << 20):
+            read, last = [], None
+            while True:
+                part = self.client.read_keyframes("car", "back", after_sequence=last, budget_bytes=budget)
+                self.assertTrue(part.end.bytes <= budget or budget == 0)
+                read += part.keyframes
+                if not part.end.has_more:
+                    break
+                last = part.keyframes[-1].sequence
+            self.assertEqual([(frame.sequence, frame.time_ms, frame.blob) for frame in read],
+                             [(upload.key.sequence, upload.time_ms, upload.blob) for upload in uploads])
+            self.assertEqual([frame.pose for frame in read], [uploads[0].pose, uploads[1].pose, pose_at(47),
+                                                              uploads[3].pose])
+            self.assertEqual([frame.HasField("prior") for frame in read], [False, True, False, False])
+            self.assertEqual(read[1].prior, uploads[1].prior)
+        self.assertEqual(part.end.revision, self.client.status().revision)
+        self.assertEqual(part.damaged, {})
+        self.refused(Code.NOT_FOUND, self.client.read_keyframes, "car", "nobody")
+        self.refused(Code.INVALID_ARGUMENT, self.client.read_keyframes, "car", "back", budget_bytes=63)
+
+    def test_a_batch_on_a_condition_that_publishes_and_is_undone(self):
+        before = self.client.digest(60_000)
+        for i in range(2):
+            upload = self.upload(i, 40 + 8 * i, "night", radius_cells=20)
+            upload.staged = True
+            self.client.upload_keyframe(upload)
+        computed_at = self.client.read_keyframes("car", "night").end.revision
+        changed = {info.session: info.changed_revision for info in self.client.sessions(changed=True)}
+        self.assertEqual(changed["night"], computed_at)
+        self.assertLess(changed["near"], computed_at)
+        self.client.upload_keyframe(self.upload(9, 0, "elsewhere", radius_cells=8))
+        with_another = self.client.digest(60_000)
+        move = [atlas_pb2.PoseUpdate(key=key(1, "night"), pose=pose_at(47))]
+        done = self.client.update_poses(move, "merge", if_revision=computed_at, publish=[("car", "night")])
+        self.assertEqual([(change.session, change.state) for change in done.sessions], [("night", "live")])
+        self.assertNotEqual(self.client.digest(60_000).sha256, with_another.sha256)
+        self.refused(Code.CONFLICT, self.client.update_poses, move, "merge", if_revision=computed_at,
+                     says="car/night changed since")
+        undone = self.client.undo_poses(done.batch, "surveyor")
+        self.assertEqual([(change.session, change.state) for change in undone.sessions], [("night", "staged")])
+        self.assertEqual(self.client.digest(60_000).sha256, with_another.sha256)
+        self.assertNotEqual(with_another.sha256, before.sha256)
+        self.assertEqual([event.kind for event in self.client.log()],
+                         ["poses", "session_published", "poses_undone", "session_staged"])
+        self.refused(Code.CONFLICT, self.client.undo_poses, done.batch)
+        self.refused(Code.NOT_FOUND, self.client.undo_poses, 99)
+
+
 class SessionsTest(AtlasCase):
 
     def test_sessions_of_several_pages(self):

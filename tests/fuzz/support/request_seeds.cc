@@ -75,6 +75,12 @@ std::vector<wire::Envelope> RequestSeeds(const MapProfile& profile) {
   *update.mutable_key() = KeyToWire({{"bus", "day"}, 1});
   *update.mutable_pose() = PoseToWire({2'000'000, -1'000'000, 1'800'000, {1 << 30, 0, 0, 0}});
   all.back().mutable_update_poses()->set_author("merge");
+  all.back().mutable_update_poses()->set_if_revision(3);
+  wire::SessionName& published = *all.back().mutable_update_poses()->add_publish();
+  published.set_vehicle("bus");
+  published.set_session("day");
+  all.emplace_back().mutable_undo_poses()->set_batch(1);
+  all.back().mutable_undo_poses()->set_author("merge");
   wire::ChangeSession& change = *all.emplace_back().mutable_change_session();
   change.set_vehicle("bus");
   change.set_session("day");
@@ -95,8 +101,14 @@ std::vector<wire::Envelope> RequestSeeds(const MapProfile& profile) {
   }
   all.emplace_back().mutable_status_request();
   all.emplace_back().mutable_sessions_request();
+  all.emplace_back().mutable_sessions_request()->set_changed(true);
   all.emplace_back().mutable_keyframes_request()->set_vehicle("bus");
   all.back().mutable_keyframes_request()->set_session("day");
+  wire::ReadKeyframes& read = *all.emplace_back().mutable_read_keyframes();
+  read.set_vehicle("bus");
+  read.set_session("day");
+  read.set_after_sequence(0);
+  read.set_budget_bytes(100'000);
   all.emplace_back().mutable_wait_request()->set_timeout_ms(20);
   all.emplace_back().mutable_digest_request()->set_timeout_ms(20);
   all.emplace_back().mutable_verify_request()->set_timeout_ms(20);

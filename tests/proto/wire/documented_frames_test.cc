@@ -205,6 +205,71 @@ wire::Envelope Publication() {
   return envelope;
 }
 
+wire::Envelope ReadKeyframes() {
+  wire::Envelope envelope = Of(9);
+  wire::ReadKeyframes& read = *envelope.mutable_read_keyframes();
+  read.set_vehicle("car.7");
+  read.set_session("monday");
+  read.set_after_sequence(11);
+  read.set_budget_bytes(65'536);
+  return envelope;
+}
+
+wire::Envelope Keyframe() {
+  wire::Envelope envelope = Of(9);
+  const wire::Envelope uploaded = Upload();
+  wire::KeyframeMessage& keyframe = *envelope.mutable_keyframe();
+  keyframe.set_sequence(12);
+  keyframe.set_time_ms(uploaded.upload_keyframe().time_ms());
+  *keyframe.mutable_pose() = uploaded.upload_keyframe().pose();
+  keyframe.mutable_prior()->set_x_um(1'400'000);
+  keyframe.mutable_prior()->set_y_um(-2'100'000);
+  keyframe.mutable_prior()->set_z_um(1'900'000);
+  keyframe.mutable_prior()->set_radius_mm(2'500);
+  keyframe.set_blob(BytesToWire(kBlob));
+  return envelope;
+}
+
+wire::Envelope KeyframesEnd() {
+  wire::Envelope envelope = Of(9);
+  envelope.mutable_keyframes_end()->set_keyframes(1);
+  envelope.mutable_keyframes_end()->set_bytes(96);
+  envelope.mutable_keyframes_end()->set_revision(42);
+  return envelope;
+}
+
+wire::Envelope Correction() {
+  wire::Envelope envelope = Of(10);
+  wire::UpdatePoses& poses = *envelope.mutable_update_poses();
+  wire::PoseUpdate& update = *poses.add_updates();
+  *update.mutable_key() = StagedUpload().upload_keyframe().key();
+  *update.mutable_pose() = Upload().upload_keyframe().pose();
+  poses.set_if_revision(42);
+  poses.add_publish()->set_vehicle("car.7");
+  poses.mutable_publish(0)->set_session("tuesday");
+  return envelope;
+}
+
+wire::Envelope CorrectionReply() {
+  wire::Envelope envelope = Of(10);
+  wire::UpdatePosesReply& reply = *envelope.mutable_update_poses_reply();
+  reply.set_updated(1);
+  reply.set_tiles_marked(9);
+  reply.set_revision(43);
+  reply.set_batch(1);
+  wire::UpdatePosesReply::SessionChange& session = *reply.add_sessions();
+  session.set_vehicle("car.7");
+  session.set_session("tuesday");
+  session.set_state("live");
+  return envelope;
+}
+
+wire::Envelope Undoing() {
+  wire::Envelope envelope = Of(11);
+  envelope.mutable_undo_poses()->set_batch(1);
+  return envelope;
+}
+
 wire::Envelope Manifest() {
   wire::Envelope envelope = Of(2);
   wire::SyncManifest& manifest = *envelope.mutable_sync_manifest();
@@ -240,12 +305,29 @@ TEST(DocumentedFramesTest, AreWhatThisBuildWrites) {
   const auto frame = [](const wire::Envelope& envelope) {
     return EncodeEnvelopeFrame(envelope).value();
   };
-  const std::vector<Bytes> written = {
-      frame(Hello()),        frame(Backup()),        frame(Sync()),        frame(Watch()),
-      frame(HelloReply()),   frame(Upload()),        frame(UploadReply()), frame(Busy()),
-      frame(Sessions()),     frame(SessionsReply()), frame(Keyframes()),   frame(KeyframesReply()),
-      frame(StagedUpload()), frame(Publication()),   frame(Manifest()),    TileFrame(),
-      frame(SyncEnd())};
+  const std::vector<Bytes> written = {frame(Hello()),
+                                      frame(Backup()),
+                                      frame(Sync()),
+                                      frame(Watch()),
+                                      frame(HelloReply()),
+                                      frame(Upload()),
+                                      frame(UploadReply()),
+                                      frame(Busy()),
+                                      frame(Sessions()),
+                                      frame(SessionsReply()),
+                                      frame(Keyframes()),
+                                      frame(KeyframesReply()),
+                                      frame(StagedUpload()),
+                                      frame(Publication()),
+                                      frame(ReadKeyframes()),
+                                      frame(Keyframe()),
+                                      frame(KeyframesEnd()),
+                                      frame(Correction()),
+                                      frame(CorrectionReply()),
+                                      frame(Undoing()),
+                                      frame(Manifest()),
+                                      TileFrame(),
+                                      frame(SyncEnd())};
   EXPECT_EQ(DocumentedFrames(), written);
 }
 

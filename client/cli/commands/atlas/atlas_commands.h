@@ -14,6 +14,7 @@ std::unique_ptr<Command> MakeCompactCommand();
 std::unique_ptr<Command> MakeDigestCommand();
 std::unique_ptr<Command> MakeLogCommand();
 std::unique_ptr<Command> MakePosesApplyCommand();
+std::unique_ptr<Command> MakePosesUndoCommand();
 std::unique_ptr<Command> MakeRestoreCommand();
 std::unique_ptr<Command> MakeSessionRestoreCommand();
 std::unique_ptr<Command> MakeSessionReleaseCommand();

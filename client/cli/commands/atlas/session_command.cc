@@ -9,17 +9,6 @@
 namespace atlas {
 namespace {
 
-Result<SessionKey> ParseSession(const std::string& text) {
-  const std::size_t slash = text.find('/');
-  if (slash == std::string::npos) {
-    return Error(StatusCode::kInvalidArgument,
-                 StrCat("'", text.substr(0, 80), "': expected VEHICLE/SESSION"));
-  }
-  SessionKey key{text.substr(0, slash), text.substr(slash + 1)};
-  if (Status status = key.Validate(); !status.ok()) return Error(std::move(status));
-  return key;
-}
-
 // Who does it, and why.
 struct Account {
   AuthorFlag author;
@@ -49,19 +38,17 @@ class SessionCommand : public Command {
   }
 
   Status Run(CommandContext& context) override {
-    const Result<SessionKey> key = ParseSession(session_);
-    if (!key) return key.error();
     if (is_purge() && !is_sure_) {
       return {StatusCode::kInvalidArgument,
-              StrCat("session ", *key, ": a purge deletes it for good; say --yes")};
+              StrCat("session ", session_, ": a purge deletes it for good; say --yes")};
     }
     const Result<std::string> author = account_.author.Author("atlas-session-" + word_);
     if (!author) return author.error();
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
-    const auto done = client->ChangeSession(*key, action_, *author, account_.reason);
+    const auto done = client->ChangeSession(session_, action_, *author, account_.reason);
     if (!done) return done.error();
-    Print(*key, *done, context);
+    Print(session_, *done, context);
     return {};
   }
 
@@ -92,7 +79,7 @@ class SessionCommand : public Command {
   std::string word_;
   std::string summary_;
   SessionAction action_;
-  std::string session_;
+  SessionKey session_;
   Account account_;
   bool is_sure_ = false;
 };

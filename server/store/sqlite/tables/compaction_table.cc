@@ -160,6 +160,14 @@ Result<std::optional<TombstoneRow>> FindTombstone(Connection& connection,
   return *tombstone;
 }
 
+std::uint64_t LastCompactionOf(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT coalesce(max(c.revision), 0) FROM compactions c WHERE EXISTS "
+      "(SELECT 1 FROM tombstones t WHERE t.compaction_id = c.id AND t.session_id = ?)");
+  row.Bind(session_id);
+  return row.Step() ? row.Unsigned() : 0;
+}
+
 bool HasTombstoneBetween(Connection& connection,
                          std::int64_t session_id,
                          std::uint32_t after,

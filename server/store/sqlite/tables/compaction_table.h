@@ -57,6 +57,9 @@ bool HasTombstoneBetween(Connection& connection,
                          std::int64_t session_id,
                          std::uint32_t after,
                          std::uint32_t before);
+// The revision of the last compaction that dropped keyframes of a session, as its row says it; 0:
+// none did.
+std::uint64_t LastCompactionOf(Connection& connection, std::int64_t session_id);
 // As the columns of one have it that is damaged: a number may be none that a keyframe has.
 struct TombstoneKey {
   std::int64_t session_id = 0;

@@ -24,16 +24,6 @@ std::int64_t FormerHashOf(const FullKeyframeRow& row) {
   return hash.value();
 }
 
-Result<FullKeyframeRow> ReadRowOf(Connection& connection, std::int64_t id) {
-  Query row = connection.Prepare("SELECT " KEYFRAME_COLUMNS " FROM keyframes WHERE id = ?");
-  row.Bind(id);
-  if (!row.Step()) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("store: the row of keyframe ", id, " is missing"));
-  }
-  return ReadFullKeyframeRow(row);
-}
-
 }  // namespace
 
 std::int64_t HashOf(const FullKeyframeRow& row) {
@@ -71,6 +61,16 @@ Result<FullKeyframeRow> ReadFullKeyframeRow(Query& query) {
   return row;
 }
 
+Result<FullKeyframeRow> ReadFullKeyframeRow(Connection& connection, std::int64_t id) {
+  Query row = connection.Prepare("SELECT " KEYFRAME_COLUMNS " FROM keyframes WHERE id = ?");
+  row.Bind(id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of keyframe ", id, " is missing"));
+  }
+  return ReadFullKeyframeRow(row);
+}
+
 std::vector<std::int64_t> ListDamagedKeyframeRows(Connection& connection) {
   Query row = connection.Prepare("SELECT " KEYFRAME_COLUMNS " FROM keyframes NOT INDEXED");
   std::vector<std::int64_t> ids;
@@ -102,7 +102,7 @@ bool IsKeyframeRowOf(Connection& connection, std::int64_t id, std::int64_t other
 }
 
 Result<NewKeyframe> ReadUploadedKeyframe(Connection& connection, std::int64_t id) {
-  const auto row = ReadRowOf(connection, id);
+  const auto row = ReadFullKeyframeRow(connection, id);
   if (!row) {
     return Error(row.error());
   }
@@ -122,7 +122,7 @@ Result<NewKeyframe> ReadUploadedKeyframe(Connection& connection, std::int64_t id
 }
 
 Status MoveKeyframeRow(Connection& connection, std::int64_t id, std::int64_t session_id) {
-  auto row = ReadRowOf(connection, id);
+  auto row = ReadFullKeyframeRow(connection, id);
   if (!row) {
     return row.error();
   }

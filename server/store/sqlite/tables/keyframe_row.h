@@ -31,6 +31,9 @@ std::int64_t HashOf(const FullKeyframeRow& row);
 // Columns: KEYFRAME_COLUMNS. kInvalidData: its checksum is wrong.
 Result<FullKeyframeRow> ReadFullKeyframeRow(Query& query);
 
+// kInvalidData, too: there is none of that id.
+Result<FullKeyframeRow> ReadFullKeyframeRow(Connection& connection, std::int64_t id);
+
 // Of rows whose checksum is wrong: their ids.
 std::vector<std::int64_t> ListDamagedKeyframeRows(Connection& connection);
 // Whether the row would be intact under another key.

@@ -230,6 +230,29 @@ std::vector<std::int64_t> ListKeyframesBehind(Connection& connection,
   return ReadIds(row);
 }
 
+Result<std::vector<IndexedKeyframe>> ListIndexedBehind(Connection& connection,
+                                                       std::int64_t session_id,
+                                                       std::int64_t sequence,
+                                                       std::size_t count) {
+  Query row = connection.Prepare(
+      "SELECT id, sequence FROM keyframes INDEXED BY sqlite_autoindex_keyframes_1 "
+      "WHERE session_id = ? AND sequence > ? ORDER BY sequence LIMIT ?");
+  row.Bind(session_id).Bind(sequence).Bind(count);
+  std::vector<IndexedKeyframe> keyframes;
+  for (std::int64_t last = sequence; row.Step(); last = keyframes.back().sequence) {
+    row.Rewind();
+    IndexedKeyframe entry;
+    entry.id = row.Int();
+    entry.sequence = row.Unsigned32();
+    if (!row.fits() || entry.sequence <= last) {
+      return Error(StatusCode::kInvalidData,
+                   StrCat("store: the index of keyframes is damaged at keyframe ", entry.id));
+    }
+    keyframes.push_back(entry);
+  }
+  return keyframes;
+}
+
 Status CheckKeyframe(Connection& connection, std::int64_t id) {
   const auto record = ReadKeyframeRecord(connection, id);
   if (!record) {

@@ -51,6 +51,16 @@ std::vector<std::int64_t> ListKeyframesBehind(Connection& connection,
                                               std::int64_t session_id,
                                               std::int64_t sequence,
                                               std::size_t count);
+// By the same index, with their sequence numbers: up to `count` behind one. kInvalidData: it does
+// not have them in order.
+struct IndexedKeyframe {
+  std::int64_t id = 0;
+  std::uint32_t sequence = 0;
+};
+Result<std::vector<IndexedKeyframe>> ListIndexedBehind(Connection& connection,
+                                                       std::int64_t session_id,
+                                                       std::int64_t sequence,
+                                                       std::size_t count);
 // kInvalidData when the row, its session, its pose, its tiles of now or its blob is damaged: fusion
 // cannot have it.
 Status CheckKeyframe(Connection& connection, std::int64_t id);

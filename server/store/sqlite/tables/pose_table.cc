@@ -1,16 +1,10 @@
 #include "server/store/sqlite/tables/pose_table.h"
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
-#include <limits>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/base/str_cat.h"
-#include "server/store/event_types.h"
-#include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/table_sums.h"
 
@@ -54,27 +48,6 @@ std::int64_t HistoryHash(const PoseChange& change) {
   return AddPose(hash.Text(change.author), change.pose).value();
 }
 
-Result<PoseChange> ReadCurrent(Connection& connection, std::int64_t keyframe_id) {
-  Query row = connection.Prepare(
-      "SELECT revision, batch, x_um, y_um, z_um, qw, qx, qy, qz, checksum FROM poses "
-      "WHERE keyframe_id = ?");
-  row.Bind(keyframe_id);
-  if (!row.Step()) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("store: the pose of keyframe ", keyframe_id, " is missing"));
-  }
-  PoseChange stored;
-  stored.keyframe_id = keyframe_id;
-  stored.revision = row.Unsigned();
-  stored.batch = row.Unsigned();
-  ReadPoseColumns(row, stored.pose);
-  if (!row.IsChecksum(CurrentHash(stored))) {
-    return Error(StatusCode::kInvalidData, StrCat("store: the pose of keyframe ", keyframe_id,
-                                                  " is damaged: wrong checksum"));
-  }
-  return stored;
-}
-
 void WriteCurrent(Connection& connection, const PoseChange& change) {
   Query current = connection.Prepare(
       "INSERT OR REPLACE INTO poses (keyframe_id, revision, batch, x_um, y_um, z_um, "
@@ -109,74 +82,37 @@ Result<PoseChange> ReadHistoryRow(Query& row) {
   return stored;
 }
 
-std::int64_t HashOfBatch(std::uint64_t id,
-                         std::uint64_t revision,
-                         std::string_view author,
-                         std::uint64_t updated,
-                         std::uint64_t if_revision) {
-  return RowHash(RowKind::kPoseBatch)
-      .Unsigned(id)
-      .Unsigned(revision)
-      .Text(author)
-      .Unsigned(updated)
-      .Unsigned(if_revision)
-      .value();
-}
-
-struct PoseBatchRow {
-  std::uint64_t id = 0;
-  std::uint64_t revision = 0;
-  std::string author;
-  std::uint64_t updated = 0;
-  std::uint64_t if_revision = 0;
-  std::int64_t checksum = 0;  // as stored
-
-  std::int64_t Hash() const { return HashOfBatch(id, revision, author, updated, if_revision); }
-};
-
-// With which the row is whole.
-std::optional<std::uint64_t> IdOneBitAway(PoseBatchRow batch) {
-  const std::uint64_t stored = batch.id;
-  for (int bit = 0; bit < 63; ++bit) {
-    batch.id = stored ^ (std::uint64_t{1} << bit);
-    if (batch.Hash() == batch.checksum) {
-      return batch.id;
-    }
-  }
-  return std::nullopt;
-}
-
-// The first `most`.
-std::vector<PoseBatchRow> ListDamagedBatches(Connection& connection, std::size_t most) {
-  Query row = connection.Prepare(
-      "SELECT id, revision, author, updated, coalesce(if_revision, 0), checksum FROM pose_batches");
-  std::vector<PoseBatchRow> damaged;
-  while (damaged.size() < most && row.Step()) {
-    row.Rewind();
-    PoseBatchRow batch;
-    batch.id = row.Unsigned();
-    batch.revision = row.Unsigned();
-    batch.author = row.Text();
-    batch.updated = row.Unsigned();
-    batch.if_revision = row.Unsigned();
-    batch.checksum = row.Int();
-    if (!row.fits() || batch.checksum != batch.Hash()) {
-      damaged.push_back(std::move(batch));
-    }
-  }
-  return damaged;
-}
-
 }  // namespace
 
+Result<PoseChange> ReadPoseChange(Connection& connection, std::int64_t keyframe_id) {
+  Query row = connection.Prepare(
+      "SELECT revision, batch, x_um, y_um, z_um, qw, qx, qy, qz, checksum FROM poses "
+      "WHERE keyframe_id = ?");
+  row.Bind(keyframe_id);
+  if (!row.Step()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the pose of keyframe ", keyframe_id, " is missing"));
+  }
+  PoseChange stored;
+  stored.keyframe_id = keyframe_id;
+  stored.revision = row.Unsigned();
+  stored.batch = row.Unsigned();
+  ReadPoseColumns(row, stored.pose);
+  if (!row.IsChecksum(CurrentHash(stored))) {
+    return Error(StatusCode::kInvalidData, StrCat("store: the pose of keyframe ", keyframe_id,
+                                                  " is damaged: wrong checksum"));
+  }
+  return stored;
+}
+
 Result<QuantizedPose> ReadPose(Connection& connection, std::int64_t keyframe_id) {
-  const auto stored = ReadCurrent(connection, keyframe_id);
+  const auto stored = ReadPoseChange(connection, keyframe_id);
   return stored ? Result<QuantizedPose>(stored->pose) : Error(stored.error());
 }
 
-Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
-                                                std::int64_t keyframe_id,
-                                                std::uint64_t revision) {
+Result<std::optional<PoseChange>> ReadPoseChangeAt(Connection& connection,
+                                                   std::int64_t keyframe_id,
+                                                   std::uint64_t revision) {
   Query row = connection.Prepare(
       "SELECT keyframe_id, revision, batch, author, x_um, y_um, z_um, qw, qx, qy, qz, checksum "
       "FROM pose_history WHERE keyframe_id = ? AND revision <= ? ORDER BY revision DESC LIMIT 1");
@@ -184,11 +120,21 @@ Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
   if (!row.Step()) {
     return std::nullopt;
   }
-  const auto stored = ReadHistoryRow(row);
+  auto stored = ReadHistoryRow(row);
   if (!stored) {
     return Error(stored.error());
   }
-  return stored->pose;
+  return *std::move(stored);
+}
+
+Result<std::optional<QuantizedPose>> ReadPoseAt(Connection& connection,
+                                                std::int64_t keyframe_id,
+                                                std::uint64_t revision) {
+  const auto stored = ReadPoseChangeAt(connection, keyframe_id, revision);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  return *stored ? std::optional((*stored)->pose) : std::nullopt;
 }
 
 Result<std::optional<QuantizedPose>> ReadUploadedPose(Connection& connection,
@@ -241,7 +187,7 @@ void WritePose(Connection& connection, const PoseChange& change) {
 }
 
 bool RestorePose(Connection& connection, std::int64_t keyframe_id, const std::string& author) {
-  const auto current = ReadCurrent(connection, keyframe_id);
+  const auto current = ReadPoseChange(connection, keyframe_id);
   const PoseChange* last = nullptr;  // that is intact
   std::size_t damaged = 0;
   const auto history = ReadPoseHistory(connection, keyframe_id);
@@ -314,56 +260,43 @@ void DeletePoses(Connection& connection, std::int64_t keyframe_id) {
   connection.Prepare("DELETE FROM pose_history WHERE keyframe_id = ?").Bind(keyframe_id).Run();
 }
 
-void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result) {
-  connection
-      .Prepare(
-          "INSERT INTO pose_batches (id, revision, author, updated, if_revision, checksum) "
-          "VALUES (?,?,?,?,?,?)")
-      .Bind(result.batch)
-      .Bind(result.revision)
-      .Bind(std::string_view(batch.author))
-      .Bind(result.updated)
-      .Bind(batch.if_revision)
-      .Bind(HashOfBatch(result.batch, result.revision, batch.author, result.updated,
-                        batch.if_revision))
-      .Run();
-}
-
-Status CheckPoseBatches(Connection& connection) {
-  const std::vector<PoseBatchRow> damaged = ListDamagedBatches(connection, 1);
-  return damaged.empty()
-             ? Status()
-             : Status(StatusCode::kInvalidData, StrCat("store: pose batch ", damaged.front().id,
-                                                       " is damaged: wrong checksum"));
-}
-
-int RepairPoseBatches(Connection& connection) {
-  const std::uint64_t most = ReadCounter(connection, Counter::kBatch);
-  const std::vector<PoseBatchRow> damaged =
-      ListDamagedBatches(connection, std::numeric_limits<std::size_t>::max());
-  for (PoseBatchRow batch : damaged) {
-    const std::uint64_t stored = batch.id;
-    if (const auto id = IdOneBitAway(batch)) {
-      batch.id = *id;
-    } else if (stored == 0 || stored > most) {
-      connection.Prepare("DELETE FROM pose_batches WHERE id = ?").Bind(stored).Run();
-      continue;
-    } else {
-      batch.author = kAtlasItself;
-      batch.revision = std::min(batch.revision, ReadCounter(connection, Counter::kRevision));
-    }
-    connection
-        .Prepare(
-            "UPDATE OR REPLACE pose_batches SET id = ?, revision = ?, author = ?, checksum = ? "
-            "WHERE id = ?")
-        .Bind(batch.id)
-        .Bind(batch.revision)
-        .Bind(std::string_view(batch.author))
-        .Bind(batch.Hash())
-        .Bind(stored)
-        .Run();
+std::optional<KeyframePlacing> FindPlacedAfter(Connection& connection,
+                                               std::int64_t session_id,
+                                               std::uint64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT k.sequence, p.revision, p.batch FROM keyframes k CROSS JOIN poses p "
+      "ON p.keyframe_id = k.id WHERE k.session_id = ? AND p.revision > ? "
+      "ORDER BY p.revision, k.sequence LIMIT 1");
+  row.Bind(session_id).Bind(revision);
+  if (!row.Step()) {
+    return std::nullopt;
   }
-  return static_cast<int>(damaged.size());
+  KeyframePlacing placed;
+  placed.sequence = row.Unsigned32();
+  placed.revision = row.Unsigned();
+  placed.batch = row.Unsigned();
+  return placed;
+}
+
+std::uint64_t LastPlacing(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT coalesce(max(p.revision), 0) FROM keyframes k CROSS JOIN poses p "
+      "ON p.keyframe_id = k.id WHERE k.session_id = ?");
+  row.Bind(session_id);
+  return row.Step() ? row.Unsigned() : 0;
+}
+
+std::vector<std::int64_t> ListKeyframesOfBatch(Connection& connection, std::uint64_t batch) {
+  Query row = connection.Prepare(
+      "SELECT DISTINCT keyframe_id FROM pose_history NOT INDEXED WHERE batch = ? "
+      "ORDER BY keyframe_id");
+  row.Bind(batch);
+  std::vector<std::int64_t> ids;
+  while (row.Step()) {
+    row.Rewind();
+    ids.push_back(row.Int());
+  }
+  return ids;
 }
 
 }  // namespace atlas

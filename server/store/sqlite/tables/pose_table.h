@@ -1,4 +1,4 @@
-// Tables poses, pose_history and pose_batches: where each keyframe stands now, and ever stood.
+// Tables poses and pose_history: where each keyframe stands now, and ever stood.
 #pragma once
 
 #include <optional>
@@ -30,6 +30,12 @@ struct PoseChange {
   std::uint64_t batch = 0;  // 0: the pose it was uploaded with
   std::string author;
 };
+// The current pose, and what made it so; its author is left empty. kInvalidData as ReadPose.
+Result<PoseChange> ReadPoseChange(Connection& connection, std::int64_t keyframe_id);
+// The same of a revision, with its author; nullopt and kInvalidData as ReadPoseAt.
+Result<std::optional<PoseChange>> ReadPoseChangeAt(Connection& connection,
+                                                   std::int64_t keyframe_id,
+                                                   std::uint64_t revision);
 // Every line of a keyframe's history, oldest first; an error for each that is damaged.
 std::vector<Result<PoseChange>> ReadPoseHistory(Connection& connection, std::int64_t keyframe_id);
 // kInvalidData when a line of the history is damaged, or the last is not the current pose.
@@ -57,11 +63,20 @@ bool IsPoseLineUnder(Connection& connection,
 // The current pose and the whole history.
 void DeletePoses(Connection& connection, std::int64_t keyframe_id);
 
-void WritePoseBatch(Connection& connection, const PoseBatch& batch, const PoseBatchResult& result);
-// kInvalidData names the first batch whose row is damaged.
-Status CheckPoseBatches(Connection& connection);
-// One whose number alone has a turned bit gets it back; of others nobody knows whose they were, and
-// one with a number that was never given goes. How many.
-int RepairPoseBatches(Connection& connection);
+// Of a session's keyframes, as their rows say it, damaged or not: one look at the pose of each.
+struct KeyframePlacing {
+  std::uint32_t sequence = 0;
+  std::uint64_t revision = 0;  // at which it was placed last
+  std::uint64_t batch = 0;     // 0: by its upload
+};
+// The first one that was placed after a revision; nullopt: all stand where they stood then.
+std::optional<KeyframePlacing> FindPlacedAfter(Connection& connection,
+                                               std::int64_t session_id,
+                                               std::uint64_t revision);
+// The revision at which one was placed last; 0: there are none.
+std::uint64_t LastPlacing(Connection& connection, std::int64_t session_id);
+// The keyframes that a batch moved and that are still there, by their ids: reads all of the
+// history. A damaged line is believed: whoever reads it finds out.
+std::vector<std::int64_t> ListKeyframesOfBatch(Connection& connection, std::uint64_t batch);
 
 }  // namespace atlas

@@ -90,6 +90,42 @@ Result<SessionState> ReadSessionStateAt(Connection& connection,
   return ReadState(row, session_id);
 }
 
+Result<std::optional<SessionStateRow>> FindStateAfter(Connection& connection,
+                                                      std::int64_t session_id,
+                                                      std::uint64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT session_id, revision, state, author, reason, checksum FROM session_states "
+      "WHERE session_id = ? AND revision > ? ORDER BY revision LIMIT 1");
+  row.Bind(session_id).Bind(revision);
+  if (!row.Step()) {
+    return std::nullopt;
+  }
+  auto stored = ReadRow(row);
+  if (!stored) {
+    return Error(stored.error());
+  }
+  return *std::move(stored);
+}
+
+std::uint64_t LastStateChange(Connection& connection, std::int64_t session_id) {
+  Query row = connection.Prepare(
+      "SELECT coalesce(max(revision), 0) FROM session_states WHERE session_id = ?");
+  row.Bind(session_id);
+  return row.Step() ? row.Unsigned() : 0;
+}
+
+std::vector<std::int64_t> ListSessionsChangedAt(Connection& connection, std::uint64_t revision) {
+  Query row = connection.Prepare(
+      "SELECT session_id FROM session_states NOT INDEXED WHERE revision = ? ORDER BY session_id");
+  row.Bind(revision);
+  std::vector<std::int64_t> ids;
+  while (row.Step()) {
+    row.Rewind();
+    ids.push_back(row.Int());
+  }
+  return ids;
+}
+
 Result<std::string> ReadStateReason(Connection& connection, std::int64_t session_id) {
   Query row = connection.Prepare(
       "SELECT session_id, revision, state, author, reason, checksum FROM session_states "

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,16 @@ void WriteSessionState(Connection& connection, const SessionStateRow& row);
 Result<SessionState> ReadSessionStateAt(Connection& connection,
                                         std::int64_t session_id,
                                         std::uint64_t revision);
+// The first line behind a revision; nullopt: it is in the state that it was in then. kInvalidData:
+// it is damaged.
+Result<std::optional<SessionStateRow>> FindStateAfter(Connection& connection,
+                                                      std::int64_t session_id,
+                                                      std::uint64_t revision);
+// The revision of the last line, as it says it, damaged or not.
+std::uint64_t LastStateChange(Connection& connection, std::int64_t session_id);
+// The sessions that entered a state at a revision, by their ids: reads all lines, and believes
+// them.
+std::vector<std::int64_t> ListSessionsChangedAt(Connection& connection, std::uint64_t revision);
 // Why it is in the state it is in, if somebody said; of one that was retracted from quarantine, why
 // it had been there, too.
 Result<std::string> ReadStateReason(Connection& connection, std::int64_t session_id);

@@ -8,6 +8,7 @@
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/event_table.h"
+#include "server/store/sqlite/tables/pose_batch_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/start_table.h"
 

@@ -78,6 +78,14 @@ Result<KeyframePage> ReadKeyframePage(Connection& connection,
   return page;
 }
 
+Result<StoredKeyframe> VerifyStoredKeyframe(Connection& connection, std::int64_t id) {
+  auto record = VerifyKeyframeRecord(connection, id);
+  if (!record) {
+    return Error(record.error());
+  }
+  return StoredKeyframe{*std::move(record), ReadFootprint(connection, id)};
+}
+
 Result<TileSources> GatherTileSources(Connection& connection,
                                       const TileId& id,
                                       std::uint64_t since) {

@@ -27,6 +27,8 @@ Result<KeyframePage> ReadKeyframePage(Connection& connection,
 std::vector<std::int64_t> ListKeyframeRows(Connection& connection,
                                            std::int64_t after_id,
                                            std::uint32_t limit);
+// As AtlasStore::ReadKeyframe.
+Result<StoredKeyframe> VerifyStoredKeyframe(Connection& connection, std::int64_t id);
 // What changed in the tile after the revision `since`; all of it if history does not reach as far.
 Result<TileSources> GatherTileSources(Connection& connection,
                                       const TileId& id,

@@ -18,6 +18,7 @@
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
+#include "server/store/sqlite/tables/pose_batch_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/start_table.h"

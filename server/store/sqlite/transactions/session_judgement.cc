@@ -80,6 +80,21 @@ SessionJudgement JudgeSession(Connection& connection,
   return {SessionState::kLive, ""};
 }
 
+SessionJudgement JudgeEntering(Connection& connection,
+                               const SessionRow& session,
+                               SessionState unjudged,
+                               const std::optional<PlausibilityLimits>& limits,
+                               const std::string& reason) {
+  SessionJudgement judgement{unjudged, ""};
+  if (limits) {
+    judgement = JudgeSession(connection, session, *limits);
+  }
+  if (judgement.state != SessionState::kQuarantined) {
+    judgement.reason = reason;
+  }
+  return judgement;
+}
+
 std::optional<SessionJudgement> JudgeArrival(Connection& connection,
                                              const SessionRow& session,
                                              const NewKeyframe& keyframe) {

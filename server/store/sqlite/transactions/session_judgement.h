@@ -6,6 +6,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/tables/session_table.h"
@@ -17,6 +18,14 @@ namespace atlas {
 SessionJudgement JudgeSession(Connection& connection,
                               const SessionRow& session,
                               const PlausibilityLimits& limits);
+
+// What a session is that comes into the map: judged, where there is something to judge it by, else
+// `unjudged`. `reason`: why it comes, unless it is quarantined.
+SessionJudgement JudgeEntering(Connection& connection,
+                               const SessionRow& session,
+                               SessionState unjudged,
+                               const std::optional<PlausibilityLimits>& limits,
+                               const std::string& reason);
 
 // What a keyframe that was just added makes of its session; nullopt: it stays what it is. Looks at
 // kMostJudgedSteps neighbours on each side alone, as a rule. Only live and quarantined sessions are

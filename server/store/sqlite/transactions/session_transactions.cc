@@ -17,21 +17,6 @@ namespace {
 
 constexpr std::uint32_t kPage = 256;  // sessions read at a time
 
-// What a session is that comes into the map: judged, where there is something to judge it by.
-SessionJudgement JudgeEntering(Connection& connection,
-                               const SessionRow& session,
-                               SessionState unjudged,
-                               const SessionChange& change) {
-  SessionJudgement judgement{unjudged, ""};
-  if (change.limits) {
-    judgement = JudgeSession(connection, session, *change.limits);
-  }
-  if (judgement.state != SessionState::kQuarantined) {
-    judgement.reason = change.reason;
-  }
-  return judgement;
-}
-
 // What a retracted session is when it is back. One that nobody released is judged by what came
 // meanwhile, too; a staged one when it is published.
 Result<SessionJudgement> JudgeRestored(Connection& connection,
@@ -42,7 +27,7 @@ Result<SessionJudgement> JudgeRestored(Connection& connection,
     return Error(before.error());
   }
   const bool is_judged = *before != SessionState::kReleased && *before != SessionState::kStaged;
-  return is_judged ? JudgeEntering(connection, session, *before, change)
+  return is_judged ? JudgeEntering(connection, session, *before, change.limits, change.reason)
                    : SessionJudgement{*before, change.reason};
 }
 
@@ -70,7 +55,8 @@ Result<SessionJudgement> StateAfter(Connection& connection,
       return SessionJudgement{SessionState::kReleased, change.reason};
     case SessionAction::kPublish:
       return state == SessionState::kStaged
-                 ? JudgeEntering(connection, session, SessionState::kLive, change)
+                 ? JudgeEntering(connection, session, SessionState::kLive, change.limits,
+                                 change.reason)
                  : SessionJudgement{state, ""};
     case SessionAction::kPurge:
       break;

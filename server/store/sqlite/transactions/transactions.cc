@@ -94,38 +94,6 @@ PutKeyframeResult AddKeyframe(Connection& connection,
   return result;
 }
 
-// What one pose of a batch comes to.
-struct PoseMove {
-  bool is_changed = false;
-  bool is_compacted = false;
-  std::vector<TileId> tiles = {};  // to be marked
-};
-
-Result<PoseMove> MovePose(Connection& connection, const NewPose& update, const PoseChange& change) {
-  const auto stored = FindKeyframeRecord(connection, update.key);
-  if (!stored) {
-    return Error(stored.error());
-  }
-  if (!*stored) {
-    return PoseMove{.is_compacted = true};
-  }
-  if ((*stored)->pose == update.pose) {
-    return PoseMove{};
-  }
-  const KeyframeRecord& keyframe = **stored;
-  PoseChange numbered = change;
-  numbered.keyframe_id = keyframe.id;
-  numbered.pose = update.pose;
-  WritePose(connection, numbered);
-  PoseMove move{.is_changed = true};
-  if (IsInMap(keyframe.session_state)) {
-    move.tiles = ReadFootprint(connection, keyframe.id);
-    move.tiles.insert(move.tiles.end(), update.footprint.begin(), update.footprint.end());
-  }
-  WriteFootprint(connection, keyframe.id, update.footprint, change.revision);
-  return move;
-}
-
 // What is stored, and what lies over keyframes: other rules may have found nothing there. Rows with
 // keys that no tile has are left out, as everywhere.
 std::set<TileId> AllTiles(Connection& connection, std::uint8_t levels) {
@@ -173,17 +141,6 @@ Status CheckRoom(Connection& connection, const NewKeyframe& keyframe, UploadRoom
   return room.Check(size, UploadRoom::Clock::now());
 }
 
-Status CheckKeysDiffer(const PoseBatch& batch) {
-  std::set<KeyframeKey> seen;
-  for (const NewPose& update : batch.poses) {
-    if (!seen.insert(update.key).second) {
-      return Status(StatusCode::kInvalidData,
-                    StrCat("pose batch: keyframe ", update.key, " is in it twice"));
-    }
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
@@ -227,39 +184,6 @@ Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
             "it; --session gives it a name of its own"));
   }
   return PutKeyframeResult{true, ReadCounter(connection, Counter::kRevision), 0};
-}
-
-Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBatch& batch) {
-  if (Status status = CheckKeysDiffer(batch); !status.ok()) {
-    return Error(std::move(status));
-  }
-  PoseBatchResult result;
-  PoseChange change;
-  change.revision = ReadCounter(connection, Counter::kRevision) + 1;
-  change.batch = ReadCounter(connection, Counter::kBatch) + 1;
-  change.author = batch.author;
-  std::set<TileId> marked;
-  for (const NewPose& update : batch.poses) {
-    const auto move = MovePose(connection, update, change);
-    if (!move) {
-      return Error(move.error());
-    }
-    result.updated += move->is_changed ? 1u : 0u;
-    result.compacted += move->is_compacted ? 1u : 0u;
-    marked.insert(move->tiles.begin(), move->tiles.end());
-  }
-  if (result.updated == 0) {
-    result.revision = change.revision - 1;
-    return result;
-  }
-  result.revision = NextRevision(connection);
-  result.batch = AddToCounter(connection, Counter::kBatch, 1);
-  result.tiles_marked = static_cast<std::uint32_t>(marked.size());
-  MarkTiles(connection, marked, result.revision);
-  WritePoseBatch(connection, batch, result);
-  AddEvent(connection, {EventKind::kPoses, batch.author, StrCat("batch ", result.batch),
-                        StrCat(result.updated, " poses, ", result.tiles_marked, " tiles")});
-  return result;
 }
 
 Result<FinishResult> FinishTileInStore(Connection& connection,

@@ -13,7 +13,6 @@ namespace atlas {
 Result<PutKeyframeResult> PutKeyframeInStore(Connection& connection,
                                              const NewKeyframe& keyframe,
                                              UploadRoom& room);
-Result<PoseBatchResult> UpdatePosesInStore(Connection& connection, const PoseBatch& batch);
 // `levels` of the pyramid: the parent of a changed tile is marked if it is one of them.
 Result<FinishResult> FinishTileInStore(Connection& connection,
                                        const FinishedTile& tile,
