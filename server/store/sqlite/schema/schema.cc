@@ -262,6 +262,10 @@ Result<StoreIdentity> ReadIdentity(Connection& connection) {
   return ReadMeta(connection);
 }
 
+void WriteUnchanged(Connection& connection) {
+  connection.Execute(StrCat("PRAGMA user_version = ", kStoreSchemaVersion).c_str());
+}
+
 Status CheckIndexes(Connection& connection) {
   if (connection.Ask("PRAGMA user_version") != kStoreSchemaVersion) {
     return {};  // a backup of an earlier one, which had others

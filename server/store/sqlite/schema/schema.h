@@ -25,6 +25,10 @@ void WriteEpoch(Connection& connection, const StoreIdentity& identity, std::uint
 // The same as ReadMeta, but kUnsupported on a version before kFirstReadableVersion, too.
 Result<StoreIdentity> ReadIdentity(Connection& connection);
 
+// Writes a page as it is, inside a transaction, which then has to reach the disk: SQLite writes none
+// of a row that stays what it was.
+void WriteUnchanged(Connection& connection);
+
 // kInvalidData naming an index that is gone from an atlas of today's version.
 Status CheckIndexes(Connection& connection);
 // Makes those that are gone anew, inside a transaction. How many.
