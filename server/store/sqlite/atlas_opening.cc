@@ -25,6 +25,7 @@
 #include "server/store/sqlite/transactions/atlas_past.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/new_line.h"
+#include "server/store/sqlite/transactions/page_owners.h"
 #include "server/store/sqlite/transactions/schema_repair.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
@@ -239,6 +240,9 @@ Result<std::string> MakeReadable(Connection& writer,
     return schema;
   }
   Status status = MigrateStore(writer, options.on_upgrade);
+  if (status.ok()) {
+    status = CheckPagesAreTheirs(writer);
+  }
   return status.ok() ? std::move(schema) : Error(std::move(status));
 }
 

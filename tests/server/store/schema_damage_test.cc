@@ -8,6 +8,7 @@
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/store_snapshot.h"
 #include "tests/server/store/schema_fixture.h"
+#include "tests/server/store/turned_bits.h"
 
 namespace atlas {
 namespace {
@@ -100,6 +101,7 @@ class SchemaDamageTest : public SchemaTest {
   }
 
   std::string told_;
+  int refused_ = 0;
 };
 
 TEST_F(SchemaDamageTest, NoFileIsReadByIt) {
@@ -254,6 +256,29 @@ TEST_F(SchemaDamageTest, TablesThatBeginOnOnePageAreRefused) {
   CopyToBackup();
   EXPECT_THAT(Refusal(), HasSubstr("table keyframes and table dirty_tiles begin on one page"));
   EXPECT_EQ(StoreSnapshot::Open(backup()).error().code(), StatusCode::kInvalidData);
+}
+
+// A page of another table, but none that it begins on: what a start finds there is no mark, no
+// counter and no session, and what it would write instead is not to be written there.
+TEST_F(SchemaDamageTest, WhatBeginsInTheMiddleOfAnotherTableIsNotPutRight) {
+  Fill(400, 100);
+  store_.reset();
+  const std::string intact = BytesOf(Database());
+  for (const char* const table : {"dirty_tiles", "counters", "sessions"}) {
+    for (const char* const other : {"keyframes", "poses", "pose_history", "starts", "events"}) {
+      SCOPED_TRACE(std::string(table) + " in " + other);
+      std::ofstream(Database(), std::ios::binary) << intact;
+      const std::string page = std::string("(SELECT max(pageno) FROM dbstat WHERE name = '") +
+                               other + "' AND pagetype = 'leaf' AND path <> '/')";
+      if (testing::AskDatabase(Database(), "SELECT coalesce(" + page + ", 0)") == 0) {
+        continue;  // all of it is on its first page
+      }
+      Spoil(Database(), "rootpage = " + page + " WHERE name = '" + table + "'");
+      EXPECT_THAT(Refusal(), HasSubstr("restore a backup"));
+      ++refused_;
+    }
+  }
+  EXPECT_GE(refused_, 9);
 }
 
 TEST_F(SchemaDamageTest, WhatMeddlesWithTablesOfAnAtlasIsRefusedUntilItIsDropped) {
