@@ -228,6 +228,15 @@ std::vector<std::string> Mend(Connection& writer, std::uint8_t levels, const std
   return ListMended(writer, last_event);
 }
 
+// Why there is no atlas to be served.
+Status Refusal(const DataDirectory& directory, const Status& status) {
+  const bool is_full = status.code() == StatusCode::kResourceExhausted;
+  const std::string advice =
+      is_full ? "; this is written before the atlas is served: make room on its disk" : "";
+  return Status(status.code(), status.message() + advice)
+      .WithContext(directory.database_file().string());
+}
+
 // Nothing is read by a schema that is damaged. What was put right of it, for people.
 Result<std::string> MakeReadable(Connection& writer,
                                  const DamagedLog& log,
@@ -269,7 +278,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     AddRowHash(*writer);
     const Result<std::string> schema = MakeReadable(*writer, *log, options);
     if (!schema) {
-      return Error(schema.error().WithContext(directory.database_file().string()));
+      return Error(Refusal(directory, schema.error()));
     }
     auto identity = ReadMeta(*writer);
     if (!identity) {
@@ -303,7 +312,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     identity->lost = std::move(past.lost);
     return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged};
   } catch (const std::exception& error) {
-    return Error(StatusFromException(error).WithContext(directory.database_file().string()));
+    return Error(Refusal(directory, StatusFromException(error)));
   }
 }
 

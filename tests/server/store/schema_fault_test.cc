@@ -85,5 +85,26 @@ TEST_F(SchemaFaultTest, ThePowerIsCutAtAnyCall) {
   }
 }
 
+// What is to be put right is written before the atlas is served, whatever it is.
+TEST_F(SchemaFaultTest, AStartOnAFullDiskSaysWhatToDo) {
+  for (const char* const damage :
+       {"PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'INTEGER', "
+        "'INUEGER')",
+        "UPDATE counters SET value = 7 WHERE id = 4"}) {
+    SCOPED_TRACE(damage);
+    fs::remove_all(options_.directory);
+    Fill(4);
+    Tamper(damage);
+    vfs_.FailAt(1, Calls::kWrite, Until::kHealed, true);
+    const auto store = OpenSqliteStore(options_);
+    EXPECT_TRUE(vfs_.Heal());
+    ASSERT_FALSE(store);
+    EXPECT_EQ(store.error().code(), StatusCode::kResourceExhausted);
+    EXPECT_NE(store.error().message().find("make room on its disk"), std::string::npos)
+        << store.error().message();
+    EXPECT_EQ(OpenCode(), StatusCode::kOk);
+  }
+}
+
 }  // namespace
 }  // namespace atlas
