@@ -25,13 +25,16 @@
 #include "server/store/sqlite/transactions/atlas_past.h"
 #include "server/store/sqlite/transactions/counter_check.h"
 #include "server/store/sqlite/transactions/new_line.h"
+#include "server/store/sqlite/transactions/page_owners.h"
+#include "server/store/sqlite/transactions/schema_repair.h"
 #include "server/store/sqlite/transactions/transactions.h"
 
 namespace atlas {
 namespace {
 
 DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
-  return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000};
+  return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000,
+          true};
 }
 
 // SQLite would take it for the new atlas's own.
@@ -196,10 +199,14 @@ std::vector<std::string> ListMended(Connection& writer, std::int64_t last_event)
 }
 
 // What every write counts on. A lost mark is a tile that is wrong for ever: what is not sure is
-// marked again. What there was, for people.
-std::vector<std::string> Mend(Connection& writer, std::uint8_t levels) {
+// marked again. What there was, with what was put right of the schema, for people.
+std::vector<std::string> Mend(Connection& writer, std::uint8_t levels, const std::string& schema) {
   writer.Begin();
   const std::int64_t last_event = writer.Ask("SELECT coalesce(max(id), 0) FROM events");
+  if (!schema.empty()) {
+    AddEvent(writer, {EventKind::kTablesRepaired, kAtlasItself, "schema",
+                      StrCat(schema, ": it was put back")});
+  }
   RestoreCounters(writer);
   FinishMigration(writer);
   std::vector<SessionRow> sessions;
@@ -219,6 +226,33 @@ std::vector<std::string> Mend(Connection& writer, std::uint8_t levels) {
   }
   writer.Commit();
   return ListMended(writer, last_event);
+}
+
+// Why there is no atlas to be served.
+Status Refusal(const DataDirectory& directory, const Status& status) {
+  const bool is_full = status.code() == StatusCode::kResourceExhausted;
+  const std::string advice =
+      is_full ? "; this is written before the atlas is served: make room on its disk" : "";
+  return Status(status.code(), status.message() + advice)
+      .WithContext(directory.database_file().string());
+}
+
+// Nothing is read by a schema that is damaged. What was put right of it, for people.
+Result<std::string> MakeReadable(Connection& writer,
+                                 const DamagedLog& log,
+                                 const SqliteStoreOptions& options) {
+  if (Status status = log.is_lossy() ? CheckWhatIsLeft(writer, log) : Status(); !status.ok()) {
+    return Error(std::move(status));
+  }
+  Result<std::string> schema = RepairSchema(writer);
+  if (!schema) {
+    return schema;
+  }
+  Status status = MigrateStore(writer, options.on_upgrade);
+  if (status.ok()) {
+    status = CheckPagesAreTheirs(writer);
+  }
+  return status.ok() ? std::move(schema) : Error(std::move(status));
 }
 
 }  // namespace
@@ -242,13 +276,9 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
   try {
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     AddRowHash(*writer);
-    if (log->is_lossy()) {
-      if (Status status = CheckWhatIsLeft(*writer, *log); !status.ok()) {
-        return Error(status.WithContext(directory.database_file().string()));
-      }
-    }
-    if (Status status = MigrateStore(*writer, options.on_upgrade); !status.ok()) {
-      return Error(status.WithContext(directory.database_file().string()));
+    const Result<std::string> schema = MakeReadable(*writer, *log, options);
+    if (!schema) {
+      return Error(Refusal(directory, schema.error()));
     }
     auto identity = ReadMeta(*writer);
     if (!identity) {
@@ -261,7 +291,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
     }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
-    for (const std::string& what : Mend(*writer, identity->profile.levels)) {
+    for (const std::string& what : Mend(*writer, identity->profile.levels, *schema)) {
       if (options.on_repair) {
         options.on_repair(what);
       }
@@ -282,7 +312,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     identity->lost = std::move(past.lost);
     return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged};
   } catch (const std::exception& error) {
-    return Error(StatusFromException(error).WithContext(directory.database_file().string()));
+    return Error(Refusal(directory, StatusFromException(error)));
   }
 }
 

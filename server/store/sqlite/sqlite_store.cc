@@ -14,6 +14,7 @@
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/index_check.h"
+#include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/stored_bytes.h"
 #include "server/store/sqlite/tables/compaction_table.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
@@ -191,7 +192,8 @@ class SqliteStore final : public AtlasStore {
   void Probe(ProbeDepth depth, Done<bool> done) override {
     writes_.SubmitProbe(MakeWrite<bool>(std::move(done), [depth](Connection& connection) {
       if (depth == ProbeDepth::kDisk) {
-        AddToCounter(connection, Counter::kRevision, 0);
+        AddToCounter(connection, Counter::kRevision, 0);  // a change, as who counts commits has it
+        WriteUnchanged(connection);
       }
       return Result<bool>(true);
     }));

@@ -75,7 +75,7 @@ Result<StoreSnapshot> StoreSnapshot::Open(const std::filesystem::path& file) {
 Status StoreSnapshot::Begin() {
   try {
     connection_ = std::make_unique<Connection>(
-        DatabaseOptions{files_.database, ModeFor(files_), kCache_kib, kBusyTimeout_ms});
+        DatabaseOptions{files_.database, ModeFor(files_), kCache_kib, kBusyTimeout_ms, true});
     snapshot_ = std::make_unique<Snapshot>(*connection_);
     const Result<StoreIdentity> identity = ReadIdentity(*connection_);
     if (!identity) {

@@ -163,11 +163,11 @@ TEST_F(FusionRulesTest, ADamagedRowOfAFootprintStopsNothing) {
 TEST_F(FusionRulesTest, UntilTheStoreTakesTheRulesNothingCountsAsFused) {
   const AtlasDigest expected = Reference();
   OpenOther(1, [](const TileId&) { return std::nullopt; });
-  Close();
+  OpenStore();
   Execute("data",
           "CREATE TRIGGER full BEFORE UPDATE ON counters WHEN new.id = 14 "
           "BEGIN SELECT raise(ABORT, 'full'); END");
-  Open(1);
+  Serve(1);
   const Patience brief{std::chrono::milliseconds(50), {}};
   const auto wait = service_->WaitUntilClean(brief);
   ASSERT_FALSE(wait);

@@ -76,6 +76,12 @@ class ServiceTest : public ::testing::Test {
   }
 
   void Open(unsigned workers = 2, const std::string& name = "data") {
+    OpenStore(name);
+    if (store_) {
+      Serve(workers);
+    }
+  }
+  void OpenStore(const std::string& name = "data") {
     Close();
     SqliteStoreOptions options;
     options.directory = directory_ / name;
@@ -84,6 +90,9 @@ class ServiceTest : public ::testing::Test {
     auto store = OpenSqliteStore(options);
     ASSERT_TRUE(store.has_value()) << store.error().message();
     store_ = std::move(*store);
+  }
+  // The store that is open.
+  void Serve(unsigned workers) {
     ServiceOptions service;
     service.fusion.workers = workers;
     // Less than the drive, as a rule: caches must not matter.

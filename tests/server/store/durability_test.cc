@@ -130,8 +130,9 @@ TEST_F(DurabilityTest, WhatCameBeforeADamagedStartIsForgotten) {
 
 TEST_F(DurabilityTest, NothingChangesWhereTheStartCannotBeNoted) {
   OpenWithOneTile();
-  Tamper("CREATE TRIGGER no_start BEFORE INSERT ON starts BEGIN SELECT raise(ABORT, 'no'); END");
   Open();
+  TamperBeside(
+      "CREATE TRIGGER no_start BEFORE INSERT ON starts BEGIN SELECT raise(ABORT, 'no'); END");
   const auto line = store_->ReadLine();
   EXPECT_FALSE(Put(MakeKeyframe(2, {kA})).has_value());
   EXPECT_EQ(store_->ReadLine()->revision, line->revision);

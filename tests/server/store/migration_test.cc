@@ -201,6 +201,10 @@ TEST_P(MigrationTest, WhatCannotBeUpgradedStaysAsItWas) {
   if (GetParam().version < 5) {
     cases.emplace_back("CREATE TABLE table_sums (x)", StatusCode::kInvalidData);
     cases.emplace_back("DROP TABLE dirty_tiles", StatusCode::kInvalidData);
+    cases.emplace_back(
+        "PRAGMA writable_schema = ON; UPDATE sqlite_master SET "
+        "sql = replace(sql, 'z_um INTEGER', 'z_um INTEGES') WHERE name = 'poses'",
+        StatusCode::kInvalidData);
   }
   for (const auto& [damage, code] : cases) {
     SCOPED_TRACE(damage);

@@ -1,6 +1,7 @@
 // What whoever watches a store learns of its writer.
 #include <future>
 
+#include "tests/server/store/faulty_vfs.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace atlas {
@@ -25,6 +26,26 @@ TEST_F(ProbeTest, AProbeChangesNothing) {
   EXPECT_EQ(after.keyframes, before.keyframes);
   EXPECT_EQ(after.dirty_tiles, before.dirty_tiles);
   EXPECT_EQ(store_->revision(), before.revision);
+}
+
+// A row that stays what it was is no page for SQLite to write.
+TEST_F(ProbeTest, ADiskIsWrittenToAndAQueueIsNot) {
+  FaultyVfs vfs;
+  Open();
+  ASSERT_TRUE(Put(MakeKeyframe(0, {{0, 1, 2}})).has_value());
+  vfs.FailAt(1, FaultyVfs::Calls::kWrite, FaultyVfs::Until::kHealed, true);
+  EXPECT_TRUE(Probe(AtlasStore::ProbeDepth::kQueue).has_value());
+  EXPECT_EQ(vfs.first(), "");
+  const auto full = Probe(AtlasStore::ProbeDepth::kDisk);
+  ASSERT_FALSE(full.has_value());
+  EXPECT_EQ(full.error().code(), StatusCode::kResourceExhausted) << full.error().message();
+  EXPECT_EQ(vfs.first(), "write atlas.db-wal");
+  vfs.Heal();
+  EXPECT_TRUE(Probe(AtlasStore::ProbeDepth::kDisk).has_value());
+  vfs.FailAt(1, FaultyVfs::Calls::kSync, FaultyVfs::Until::kOnce);
+  EXPECT_FALSE(Probe(AtlasStore::ProbeDepth::kDisk).has_value()) << "and to the disk it goes";
+  vfs.Heal();
+  store_.reset();
 }
 
 TEST_F(ProbeTest, WhatIsWrittenIsCountedAndWhatIsNotIsNot) {

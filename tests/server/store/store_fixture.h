@@ -87,6 +87,10 @@ class StoreTest : public ::testing::Test {
   // Closes the store and runs SQL on its database.
   void Tamper(const std::string& sql) {
     store_.reset();
+    TamperBeside(sql);
+  }
+  // The same beside the store, which meets it with its next statement.
+  void TamperBeside(const std::string& sql) const {
     sqlite3* db = nullptr;
     ASSERT_EQ(sqlite3_open(Database().c_str(), &db), SQLITE_OK);
     char* message = nullptr;

@@ -109,10 +109,10 @@ TEST_F(UploadRoomTest, WhatFailsCountsNothing) {
     std::filesystem::remove_all(options_.directory);
     Open();
     ASSERT_TRUE(Put(Sized(0, 4)).has_value());
-    Tamper(std::string("CREATE TRIGGER no_13 BEFORE UPDATE ON counters WHEN new.id = 5 AND "
-                       "new.value - old.value = 13 BEGIN SELECT raise(") +
-           how + ", 'no'); END");
     Open();
+    TamperBeside(std::string("CREATE TRIGGER no_13 BEFORE UPDATE ON counters WHEN new.id = 5 AND "
+                             "new.value - old.value = 13 BEGIN SELECT raise(") +
+                 how + ", 'no'); END");
     store_->SetUploadLimits({.vehicle_bytes = 30});
     for (int i = 0; i < 3; ++i) {
       EXPECT_FALSE(Put(Sized(1, 13)).has_value());

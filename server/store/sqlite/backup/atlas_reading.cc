@@ -180,7 +180,7 @@ Status Failure(const std::exception& error) {
 
 Result<AtlasFacts> ReadAtlasBack(const std::filesystem::path& file, const BackupWork& work) {
   try {
-    Connection connection({file, DatabaseOptions::Mode::kUntouched, kCache_kib, 0});
+    Connection connection({file, DatabaseOptions::Mode::kUntouched, kCache_kib, 0, true});
     AddRowHash(connection);
     connection.InterruptWhen([&work] { return !work.check_stop().ok(); });
     return ReadBack(connection, work);

@@ -127,6 +127,9 @@ Connection::Connection(const DatabaseOptions& options)
     : database_(NameToOpen(options), OpenFlags(options.mode), options.busy_timeout_ms) {
   std::random_device random;
   std::generate(id_.begin(), id_.end(), [&random] { return static_cast<std::uint8_t>(random()); });
+  if (options.takes_any_schema) {
+    Execute("PRAGMA writable_schema = ON");  // before what reads it
+  }
   // Pages that are written have nothing in them of what moved or went: a purge finds all of it.
   // mmap stays off: a failing disk would be a signal, and mapped pages count as memory.
   Execute(

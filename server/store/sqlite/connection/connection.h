@@ -98,6 +98,8 @@ struct DatabaseOptions {
   Mode mode = Mode::kReadOnly;
   int cache_kib = 8 * 1024;  // page cache of this connection
   int busy_timeout_ms = 5'000;
+  // One that SQLite cannot read, too, for who mends it: until TakeWholeSchemasOnly().
+  bool takes_any_schema = false;
 };
 
 class Connection {
@@ -158,6 +160,8 @@ class Connection {
   // Copies all of the log and leaves its file empty: nothing stays there of what was overwritten in
   // the database. False: readers or a writer are in the way.
   bool EmptyLog();
+  // The schema is read again, as it is now.
+  void TakeWholeSchemasOnly() { Execute("PRAGMA writable_schema = RESET"); }
   // Asked now and then while a statement runs: true ends it with SQLITE_INTERRUPT. It must not
   // throw.
   void InterruptWhen(std::function<bool()> is_over);

@@ -49,10 +49,16 @@ bool IsWithoutTable(const SQLite::Exception& error) {
           what.find("ON CONFLICT clause does not match") != std::string_view::npos);
 }
 
-// Where SQLite says itself that the file is damaged: an index that lacks a row can be made anew, a
-// page that cannot be read is gone.
+// Where SQLite says itself that the file is damaged: an index that lacks a row can be made anew,
+// the text of the schema is known, a page that cannot be read is gone.
 const char* AdviceOf(const SQLite::Exception& error) {
-  if (std::string_view(error.what()) != sqlite3_errstr(SQLITE_CORRUPT)) {
+  const std::string_view what = error.what();
+  if (what.starts_with("malformed database schema")) {
+    const bool is_text = what.find("invalid rootpage") == std::string_view::npos;
+    return is_text ? "; a start of atlasd may put that right, else restore a backup"
+                   : "; restore a backup";
+  }
+  if (what != sqlite3_errstr(SQLITE_CORRUPT)) {
     return "";
   }
   return error.getExtendedErrorCode() == SQLITE_CORRUPT_INDEX ? "; atlas verify --repair"

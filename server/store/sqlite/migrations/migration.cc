@@ -11,6 +11,7 @@
 #include "server/store/sqlite/migrations/from_version_4.h"
 #include "server/store/sqlite/migrations/from_version_5.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/schema_check.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
 
@@ -46,12 +47,18 @@ void WriteVersion(Connection& connection) {
   connection.Execute(StrCat("PRAGMA user_version = ", kStoreSchemaVersion).c_str());
 }
 
-void RunInOneTransaction(Connection& connection, std::int64_t from, const MapProfile& profile) {
+Status RunInOneTransaction(Connection& connection, std::int64_t from, const MapProfile& profile) {
   connection.Execute("BEGIN IMMEDIATE");
   AddUpgradeEvent(connection, from, RunSteps(connection, from, profile));
   WriteTableSums(connection);
   WriteVersion(connection);
+  if (const SchemaDamage damage = FindSchemaDamage(connection); !damage.is_none()) {
+    return {StatusCode::kInvalidData,
+            StrCat("upgrading it from schema version ", from, ": ", damage.what,
+                   "; nothing was changed; put a copy of the data directory back")};
+  }
   connection.Execute("COMMIT");
+  return {};
 }
 
 // Nothing of this program's making is wrong with a file that lacks a table, or has one too many.
@@ -85,7 +92,7 @@ Status MigrateStore(Connection& connection, const std::function<void(std::int64_
   }
   try {
     connection.Execute(kSortOnDisk);
-    RunInOneTransaction(connection, *from, identity->profile);
+    ATLAS_RETURN_IF_ERROR(RunInOneTransaction(connection, *from, identity->profile));
     connection.Execute(kSortInMemory);
     return {};
   } catch (const std::exception& error) {

@@ -7,6 +7,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/schema_check.h"
 #include "server/store/sqlite/schema/table_order.h"
 
 namespace atlas {
@@ -124,7 +125,7 @@ Status CheckIndex(Connection& connection,
 }
 
 std::vector<StructureCheck> ListChecks(const std::function<Status()>& check_stop) {
-  std::vector<StructureCheck> checks{&CheckIndexes};
+  std::vector<StructureCheck> checks{&CheckSchema, &CheckIndexes};
   AddOrderChecks(check_stop, checks);
   for (const CheckedIndex& index : kIndexes) {
     checks.emplace_back([&index, check_stop](Connection& connection) {

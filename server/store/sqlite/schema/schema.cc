@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/schema/schema_check.h"
 #include "server/store/sqlite/schema/table_sums.h"
 
 namespace atlas {
@@ -184,10 +186,14 @@ std::int64_t MetaHash(ByteSpan profile, ByteSpan atlas_id, std::uint64_t epoch) 
 
 }  // namespace
 
-void CreateSchema(Connection& connection, const StoreIdentity& identity) {
-  connection.Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = DELETE; BEGIN IMMEDIATE;");
+void CreateTables(Connection& connection) {
   AddRowHash(connection);
   connection.Execute(kTables);
+}
+
+void CreateSchema(Connection& connection, const StoreIdentity& identity) {
+  connection.Execute("PRAGMA page_size = 8192; PRAGMA journal_mode = DELETE; BEGIN IMMEDIATE;");
+  CreateTables(connection);
   WriteTableSums(connection);
   const Bytes profile = identity.profile.Encode();
   connection.Prepare("INSERT INTO meta (id, profile, atlas_id, epoch, checksum) VALUES (1,?,?,?,?)")
@@ -259,7 +265,15 @@ Result<StoreIdentity> ReadIdentity(Connection& connection) {
         StrCat("store: schema version ", *version, ", this build reads ", kFirstReadableVersion,
                " to ", kStoreSchemaVersion, "; open it once with atlasd, which upgrades it"));
   }
+  if (Status schema = CheckSchema(connection); !schema.ok()) {
+    return Error(std::move(schema));
+  }
+  connection.TakeWholeSchemasOnly();
   return ReadMeta(connection);
+}
+
+void WriteUnchanged(Connection& connection) {
+  connection.Execute(StrCat("PRAGMA user_version = ", kStoreSchemaVersion).c_str());
 }
 
 Status CheckIndexes(Connection& connection) {

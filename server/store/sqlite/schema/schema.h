@@ -12,7 +12,9 @@ inline constexpr std::int64_t kStoreSchemaVersion = 6;
 // From this one on all rows are today's, and can be read as they are.
 inline constexpr std::int64_t kFirstReadableVersion = 5;
 
-// Makes the tables of an empty database and writes who it is, in one transaction.
+// Makes the tables of an empty database, with nothing in them but counters of nothing.
+void CreateTables(Connection& connection);
+// The same, and writes who it is, in one transaction.
 void CreateSchema(Connection& connection, const StoreIdentity& identity);
 
 // From 1 to kStoreSchemaVersion. kInvalidData on a database of another program, kUnsupported on
@@ -22,8 +24,14 @@ Result<std::int64_t> ReadSchemaVersion(Connection& connection);
 Result<StoreIdentity> ReadMeta(Connection& connection);
 // Of an atlas of today's version, inside a transaction.
 void WriteEpoch(Connection& connection, const StoreIdentity& identity, std::uint64_t epoch);
-// The same as ReadMeta, but kUnsupported on a version before kFirstReadableVersion, too.
+// The same as ReadMeta, but kUnsupported on a version before kFirstReadableVersion, too, and
+// kInvalidData on another schema than an atlas has. Of a connection that may take any, and takes
+// whole ones only from then on.
 Result<StoreIdentity> ReadIdentity(Connection& connection);
+
+// Writes a page as it is, inside a transaction, which then has to reach the disk: SQLite writes
+// none of a row that stays what it was.
+void WriteUnchanged(Connection& connection);
 
 // kInvalidData naming an index that is gone from an atlas of today's version.
 Status CheckIndexes(Connection& connection);

@@ -5,6 +5,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/schema_check.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/event_table.h"
@@ -83,6 +84,7 @@ Status CheckStructure(Connection& connection) {
 }  // namespace
 
 Status CheckCounters(Connection& connection) {
+  ATLAS_RETURN_IF_ERROR(CheckSchema(connection));  // else what is counted is something else
   std::string findings;
   const auto add = [&findings](const std::string& finding) {
     findings += StrCat(findings.empty() ? "" : "; ", finding);

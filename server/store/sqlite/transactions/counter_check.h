@@ -6,8 +6,9 @@
 
 namespace atlas {
 
-// kInvalidData names the first counter that is damaged or not what the rows say, the table that
-// lost rows, or what of an index or of the file's pages is not as it should be.
+// kInvalidData names a table that is another one than an atlas has, or the first counter that is
+// damaged or not what the rows say, the table that lost rows, or what of an index or of the file's
+// pages is not as it should be.
 Status CheckCounters(Connection& connection);
 
 // Writes counters that are damaged or missing anew, inside of a transaction: from the rows where

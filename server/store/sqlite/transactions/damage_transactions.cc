@@ -11,6 +11,7 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
+#include "server/store/sqlite/schema/schema_check.h"
 #include "server/store/sqlite/schema/table_order.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
@@ -282,6 +283,10 @@ Result<std::uint32_t> RepairTablesInStore(Connection& connection,
                                           TableRepair what,
                                           std::uint8_t levels,
                                           const std::string& author) {
+  // What is written by another schema is no row of an atlas.
+  if (Status schema = CheckSchema(connection); !schema.ok()) {
+    return Error(std::move(schema));
+  }
   switch (what) {
     case TableRepair::kIndexes:
       return RepairIndexes(connection, levels, author);

@@ -1,0 +1,21 @@
+// A schema whose text is damaged, put right before anything is read by it: which it was is known of
+// every atlas.
+#pragma once
+
+#include <string>
+
+#include "core/base/status.h"
+#include "server/store/sqlite/connection/connection.h"
+
+namespace atlas {
+
+// What was put right, for people; empty: there was nothing, or the file is of a version that an
+// upgrade reads first. In one transaction, which is kept where all that is stored is whole by the
+// schema that was put back. Takes a connection that takes any schema and knows row_hash
+// (row_hash.h); behind it, without an error, it takes whole ones only.
+//
+// kInvalidData says what differs and why it stays: a table is gone, say, or there is other damage.
+// Nothing was changed then. Throws as the connection does.
+Result<std::string> RepairSchema(Connection& connection);
+
+}  // namespace atlas
