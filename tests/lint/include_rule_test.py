@@ -92,7 +92,11 @@ ALLOWED = {
                                       "client/drive/tiles_around.h", "client/map"],
     "client/export": FLOOR_1 + ["core/tile"],
     "client/merge/graph": FLOOR_1,
-    "client/merge/plan": FLOOR_1 + ["core/keyframe", "core/localization", "core/alignment", "client/merge/graph"],
+    "client/merge/plan": FLOOR_1 + ["core/keyframe", "core/localization", "core/alignment",
+                                    "core/fusion/observation/keyframe_placement.h", "client/merge/graph"],
+    "client/merge/report": FLOOR_1 + ["client/render", "client/render/plot"],
+    "client/merge/source": FLOOR_1 + ["client/atlas_file", "client/connection", "client/merge/plan"],
+    "client/merge": FLOOR_1 + ["client/connection", "client/merge/plan", "client/merge/report", "client/merge/source"],
     "client/render": FLOOR_1 + ["core/tile"],
     "client/render/plot": FLOOR_1 + ["client/render"],
     "server/service": FUSED + ["server/service/backup", "server/service/compaction", "server/service/fusion", "server/service/history",
@@ -134,9 +138,11 @@ ALLOWED = {
                                                             "client/drive", "client/drive/anchor", "client/map", "client/render",
                                                             "client/render/plot", "client/score",
                                                             "client/vehicle/atlas_link.h"],
+    "client/cli/commands/merge": FLOOR_1 + COMMAND_ROOMS + ["client/atlas_file", "client/cli/commands/atlas/author_flag.h",
+                                                            "client/merge"],
     "client/cli/commands": ["client/cli/command_line", "client/cli/commands/atlas", "client/cli/commands/drive",
                             "client/cli/commands/map"],
-    "client/cli": FLOOR_1 + ["client/cli/command_line", "client/cli/commands"],
+    "client/cli": FLOOR_1 + ["client/cli/command_line", "client/cli/commands", "client/cli/commands/merge"],
 }
 NET_ROOMS = ["server/net", "server/net/connection", "server/net/requests", "server/net/stream"]
 # Libraries that stay behind a few doors: pattern -> folders that may include it.

@@ -14,8 +14,6 @@
 namespace atlas {
 namespace {
 
-constexpr const char* kDescription =
-    "The command line of Road Atlas: data on stdout, everything else on stderr.";
 constexpr const char* kFooter =
     "Exit codes: 0 ok, 1 failure, 2 usage, 3 not found, 4 conflict, 5 unavailable or timeout, 6 "
     "invalid data.";
@@ -175,7 +173,7 @@ Result<ConnectionOptions> ConnectionFrom(const CommonFlags& common, const Comman
   if (!server) return Error(server.error());
   ConnectionOptions options;
   options.endpoint = *server;
-  options.client_name = "atlas";
+  options.client_name = io.program.name;
   if (!common.tls.ca.empty()) {
     options.tls = common.tls;
   } else if (!common.tls.certificate.empty() || !common.tls.key.empty() ||
@@ -229,9 +227,11 @@ Status CheckAtlasAlone(const std::vector<std::string>& arguments, const CommonFl
 
 class Parser {
  public:
-  Parser(std::span<const std::unique_ptr<Command>> commands, CommonFlags& common)
-      : root_(kDescription, "atlas") {
-    root_.set_version_flag("--version", "atlas " ATLAS_VERSION);
+  Parser(std::span<const std::unique_ptr<Command>> commands,
+         const ProgramName& program,
+         CommonFlags& common)
+      : root_(program.description, program.name) {
+    root_.set_version_flag("--version", program.name + " " ATLAS_VERSION);
     root_.footer(kFooter);
     root_.require_subcommand(1);
     AddCommonFlags(root_, common);
@@ -279,7 +279,10 @@ bool IsJsonAskedFor(const std::vector<std::string>& arguments) {
   return std::find(arguments.begin(), arguments.end(), "--json") != arguments.end();
 }
 
-void PrintFailure(const Status& status, bool is_json, std::ostream& err) {
+void PrintFailure(const Status& status,
+                  const std::string& program,
+                  bool is_json,
+                  std::ostream& err) {
   if (is_json) {
     boost::json::object error = {
         {"code", StatusCodeName(status.code())},
@@ -290,7 +293,7 @@ void PrintFailure(const Status& status, bool is_json, std::ostream& err) {
     }
     err << JsonText(boost::json::object{{"error", error}}) << '\n';
   } else {
-    err << "atlas: " << status.message() << '\n';
+    err << program << ": " << status.message() << '\n';
   }
 }
 
@@ -298,18 +301,18 @@ ExitCode RunCommandLine(const std::vector<std::string>& arguments,
                         std::span<const std::unique_ptr<Command>> commands,
                         const CommandLineIo& io) {
   CommonFlags common;
-  Parser parser(commands, common);
+  Parser parser(commands, io.program, common);
   Result<Command*> command = parser.Parse(arguments, io.out);
   if (const Status alone = CheckAtlasAlone(arguments, common); !alone.ok()) command = Error(alone);
   if (!command) {
     const bool is_json = IsJsonAskedFor(arguments);
-    PrintFailure(command.error(), is_json, io.err);
+    PrintFailure(command.error(), io.program.name, is_json, io.err);
     if (!is_json) io.err << "Run with --help for more information.\n";
     return ExitCode::kUsage;
   }
   if (*command == nullptr) return ExitCode::kSuccess;
   const Status status = RunCommand(**command, common, io);
-  if (!status.ok()) PrintFailure(status, common.is_json, io.err);
+  if (!status.ok()) PrintFailure(status, io.program.name, common.is_json, io.err);
   return ExitCodeFor(status.code());
 }
 

@@ -93,4 +93,19 @@ Result<std::vector<PoseCorrection>> ParsePoseFile(std::string_view text) {
   return corrections;
 }
 
+std::string PoseFileText(std::span<const PoseCorrection> corrections) {
+  std::string text = "# vehicle session sequence and 12 numbers: 3x4 row-major, sensor to world\n";
+  for (const PoseCorrection& correction : corrections) {
+    text += StrCat(correction.key.session.vehicle, " ", correction.key.session.session, " ",
+                   correction.key.sequence);
+    for (const double number : PoseToRowMajor(correction.T_world_sensor.ToPose())) {
+      std::array<char, 32> digits{};
+      const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number);
+      text.append(" ").append(digits.data(), end.ptr);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
 }  // namespace atlas

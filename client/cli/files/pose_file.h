@@ -2,6 +2,8 @@
 // sensor to world. Blank lines and lines that start with # are skipped.
 #pragma once
 
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,5 +15,8 @@ namespace atlas {
 // kInvalidData with the line's number: a line of another form, a name that is none, a pose that is
 // none, a keyframe named twice, no pose at all.
 Result<std::vector<PoseCorrection>> ParsePoseFile(std::string_view text);
+
+// A file that reads back as these, to the micrometre.
+std::string PoseFileText(std::span<const PoseCorrection> corrections);
 
 }  // namespace atlas

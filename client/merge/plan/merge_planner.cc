@@ -34,7 +34,8 @@ class Planner {
   Result<MergePlan> Plan() {
     Status status = Run();
     if (!status.ok()) return Error(std::move(status));
-    Conclude();
+    status = Conclude();
+    if (!status.ok()) return Error(std::move(status));
     return std::move(plan_);
   }
 
@@ -153,7 +154,7 @@ class Planner {
     return {largest->first};
   }
 
-  void Conclude() {
+  Status Conclude() {
     const std::set<std::size_t> joined = JoinedParts();
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
       SessionOutcome& outcome = plan_.sessions.emplace_back();
@@ -161,11 +162,14 @@ class Planner {
       outcome.is_held = is_held_[i];
       outcome.submaps = sessions_[i].submaps.size();
       if (outcome.is_joined && !outcome.is_held) Move(i, outcome);
+      if (!outcome.is_joined) outcome.why_not = "meets no session of the map often enough";
+      ATLAS_RETURN_IF_ERROR(LookAtEffect(i, outcome));
     }
     CountClosures();
     plan_.closures = choice_.believed;
     plan_.meetings = choice_.meetings;
     plan_.links = links_;
+    return {};
   }
 
   void Move(std::size_t session, SessionOutcome& outcome) const {
@@ -185,6 +189,18 @@ class Planner {
       outcome.moved.push_back({i, QuantizedPose::FromPose(corrected[i])});
     }
     outcome.rms_move_m = std::sqrt(squares_m2 / static_cast<double>(corrected.size()));
+  }
+
+  // One that would have to be tilted too far is left where it is.
+  Status LookAtEffect(std::size_t session, SessionOutcome& outcome) {
+    const bool is_published = outcome.is_joined && sessions_[session].is_staged;
+    const Status status = AddTouchedTiles(sessions_[session], outcome.moved, is_published,
+                                          readers_[session], profile_, plan_.tiles);
+    if (status.code() != StatusCode::kInvalidData) return status;
+    outcome.is_joined = false;
+    outcome.moved.clear();
+    outcome.why_not = status.message();
+    return {};
   }
 
   void CountClosures() {

@@ -4,11 +4,13 @@
 
 #include <cstddef>
 #include <functional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "client/merge/plan/closure_choice.h"
+#include "client/merge/plan/merge_effect.h"
 #include "client/merge/plan/merge_options.h"
 #include "client/merge/plan/merge_session.h"
 #include "client/merge/plan/session_links.h"
@@ -22,18 +24,12 @@ namespace atlas {
 using MergeProgress =
     std::function<Status(std::string_view step, std::size_t done, std::size_t all)>;
 
-struct MovedKeyframe {
-  std::size_t keyframe = 0;  // of the session
-  QuantizedPose T_world_sensor;
-};
-
 struct SessionOutcome {
   // It is in the map, or belongs into it now: it meets sessions that are, or where none is, most of
   // the others.
   bool is_joined = false;
   bool is_held = false;
-  // It would have to be tilted against how its grids were levelled by more than 2 degrees.
-  bool is_too_tilted = false;
+  std::string why_not;  // it is not joined; for people
   std::size_t closures = 0;
   std::size_t submaps_met = 0;  // that have one, of so many:
   std::size_t submaps = 0;
@@ -51,6 +47,7 @@ struct MergePlan {
   std::size_t rejected = 0;  // closures
   int rounds = 0;
   std::vector<std::vector<SessionLink>> links;  // by session
+  std::set<TileId> tiles;                       // of level 0, that would be fused again
 };
 
 // Fills the sessions' submaps. `readers`: of each session's blobs, which are read twice: submaps

@@ -1,0 +1,11 @@
+#include "client/cli/commands/merge/merge_commands.h"
+
+namespace atlas {
+
+std::vector<std::unique_ptr<Command>> MakeMergeCommands() {
+  std::vector<std::unique_ptr<Command>> commands;
+  commands.push_back(MakeMergeRunCommand());
+  return commands;
+}
+
+}  // namespace atlas

@@ -1,0 +1,157 @@
+// `atlas-merge run`: finds where sessions belong and hands the daemon one batch of corrections.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/command_line/interruption.h"
+#include "client/cli/commands/atlas/author_flag.h"
+#include "client/cli/commands/merge/merge_commands.h"
+#include "client/cli/commands/merge/merge_text.h"
+#include "client/cli/files/pose_file.h"
+#include "client/cli/files/whole_file.h"
+#include "client/cli/output/progress_bar.h"
+#include "client/merge/merge_run.h"
+
+namespace atlas {
+namespace {
+
+// A bar a step, and an end when a signal comes.
+class Progress {
+ public:
+  explicit Progress(CommandContext& context) : context_(context) {}
+
+  Status operator()(std::string_view step, std::size_t done, std::size_t all) {
+    if (step != step_ || all != all_) {
+      bar_.reset();
+      step_ = step;
+      all_ = all;
+      bar_.emplace(context_.err, context_.is_err_terminal, step_, all);
+    }
+    bar_->Update(done);
+    return interruption_.Check();
+  }
+  void Wipe() { bar_.reset(); }
+
+ private:
+  CommandContext& context_;
+  Interruption interruption_;
+  std::string step_;
+  std::size_t all_ = 0;
+  std::optional<ProgressBar> bar_;
+};
+
+class MergeRunCommand : public Command {
+ public:
+  std::string Name() const override { return "run"; }
+  std::string Summary() const override {
+    return "Align sessions with each other, correct their poses and publish those that fit";
+  }
+  bool ReadsAtlasFiles() const override { return true; }
+
+  void Declare(ArgumentSet& arguments) override {
+    arguments.Repeated("--session", "VEHICLE/SESSION", wanted_,
+                       "A staged session to merge; may be repeated [all that are staged]");
+    arguments.Flag("--dry-run", is_dry_run_,
+                   "Print what would be done, and do nothing; so it is with --atlas, too");
+    arguments.Optional("--picture", "FILE.png", picture_, "Draw the ways before and after");
+    arguments.Optional("--corrections", "FILE", corrections_,
+                       "Write the corrected poses as `atlas poses apply` reads them");
+    author_.Declare(arguments);
+  }
+
+  Status Run(CommandContext& context) override {
+    const Result<std::string> author = author_.Author("atlas-merge");
+    if (!author) return author.error();
+    for (const auto& file : {picture_, corrections_}) {
+      if (file) ATLAS_RETURN_IF_ERROR(CheckPlace(*file));
+    }
+    if (context.atlas_file) {
+      Result<AtlasFile> file = AtlasFile::Open(*context.atlas_file);
+      if (!file) return file.error();
+      FileSessions source(*std::move(file), *context.atlas_file);
+      return Merge(source, nullptr, *author, context);
+    }
+    Result<AtlasClient> client = context.Connect();
+    if (!client) return client.error();
+    DaemonSessions source(*client);
+    return Merge(source, &*client, *author, context);
+  }
+
+ private:
+  // `client` is null where there is nobody to hand it to.
+  Status Merge(SessionSource& source,
+               AtlasClient* client,
+               const std::string& author,
+               CommandContext& context) {
+    constexpr int kAttempts = 3;
+    const bool is_applied = client != nullptr && !is_dry_run_;
+    Progress progress(context);
+    for (int attempt = 1;; ++attempt) {
+      const auto run = RunMerge(source, wanted_, options_, std::ref(progress));
+      progress.Wipe();
+      if (!run) return run.error();
+      ATLAS_RETURN_IF_ERROR(WriteFiles(*run));
+      std::optional<PoseBatchSummary> batch;
+      if (is_applied && !run->IsNothing()) {
+        auto applied = ApplyMerge(*run, *client, author);
+        if (!applied && applied.error().code() == StatusCode::kConflict && attempt < kAttempts) {
+          context.err << "note: " << applied.error().message() << ": merged again\n";
+          continue;
+        }
+        if (!applied) return applied.error();
+        batch = *std::move(applied);
+      }
+      Print(*run, batch, is_applied, context);
+      return {};
+    }
+  }
+
+  Status WriteFiles(const MergeRun& run) const {
+    if (picture_) ATLAS_RETURN_IF_ERROR(WritePng(DrawMerge(run.Picture()), *picture_));
+    if (corrections_) {
+      ATLAS_RETURN_IF_ERROR(WriteTextFile(*corrections_, PoseFileText(run.Corrections())));
+    }
+    return {};
+  }
+
+  static void Print(const MergeRun& run,
+                    const std::optional<PoseBatchSummary>& batch,
+                    bool is_applied,
+                    const CommandContext& context) {
+    if (context.is_json) {
+      boost::json::object json = MergeJson(run);
+      json["applied"] = batch.has_value();
+      if (batch) {
+        json["batch"] = batch->batch;
+        json["updated"] = batch->updated;
+        json["tiles_marked"] = batch->tiles_marked;
+        json["revision_after"] = batch->revision;
+      }
+      context.PrintJson(json);
+      return;
+    }
+    PrintMerge(run, context.out);
+    if (batch) {
+      context.out << "batch " << batch->batch << ": " << batch->updated << " poses corrected, "
+                  << batch->tiles_marked << " tiles marked; undone by: atlas poses undo "
+                  << batch->batch << '\n';
+    } else {
+      context.out << (is_applied ? "nothing to do\n" : "nothing was changed\n");
+    }
+  }
+
+  std::vector<SessionKey> wanted_;
+  bool is_dry_run_ = false;
+  std::optional<std::string> picture_;
+  std::optional<std::string> corrections_;
+  AuthorFlag author_;
+  MergeOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> MakeMergeRunCommand() {
+  return std::make_unique<MergeRunCommand>();
+}
+
+}  // namespace atlas

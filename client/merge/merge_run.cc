@@ -1,0 +1,92 @@
+#include "client/merge/merge_run.h"
+
+#include <sstream>
+#include <utility>
+
+namespace atlas {
+namespace {
+
+std::vector<Eigen::Vector2d> PlacesOf(const std::vector<Pose>& poses) {
+  std::vector<Eigen::Vector2d> places;
+  places.reserve(poses.size());
+  for (const Pose& pose : poses) {
+    places.emplace_back(pose.translation().head<2>());
+  }
+  return places;
+}
+
+std::vector<Pose> PosesAfter(const MergeSession& session, const SessionOutcome& outcome) {
+  std::vector<Pose> poses = StoredPoses(session);
+  for (const MovedKeyframe& moved : outcome.moved) {
+    poses[moved.keyframe] = moved.T_world_sensor.ToPose();
+  }
+  return poses;
+}
+
+}  // namespace
+
+std::vector<PoseCorrection> MergeRun::Corrections() const {
+  std::vector<PoseCorrection> corrections;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    for (const MovedKeyframe& moved : plan.sessions[i].moved) {
+      corrections.push_back({{sessions[i].key, sessions[i].keyframes[moved.keyframe].sequence},
+                             moved.T_world_sensor});
+    }
+  }
+  return corrections;
+}
+
+std::vector<SessionKey> MergeRun::Published() const {
+  std::vector<SessionKey> published;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    if (sessions[i].is_staged && plan.sessions[i].is_joined) published.push_back(sessions[i].key);
+  }
+  return published;
+}
+
+MergePicture MergeRun::Picture() const {
+  MergePicture picture;
+  std::vector<std::vector<Pose>> after;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    after.push_back(PosesAfter(sessions[i], plan.sessions[i]));
+    std::ostringstream name;
+    name << sessions[i].key << (plan.sessions[i].is_joined ? "" : ", stays as it is");
+    picture.sessions.push_back(
+        {name.str(), PlacesOf(StoredPoses(sessions[i])), PlacesOf(after.back())});
+  }
+  for (const FoundClosure& closure : plan.closures) {
+    const std::size_t a = At(sessions, closure.a).middle();
+    const std::size_t b = At(sessions, closure.b).middle();
+    const std::vector<Eigen::Vector2d>& a_before = picture.sessions[closure.a.session].before;
+    const std::vector<Eigen::Vector2d>& b_before = picture.sessions[closure.b.session].before;
+    picture.closures_before.emplace_back(a_before[a], b_before[b]);
+    const std::vector<Eigen::Vector2d>& a_after = picture.sessions[closure.a.session].after;
+    const std::vector<Eigen::Vector2d>& b_after = picture.sessions[closure.b.session].after;
+    picture.closures_after.emplace_back(a_after[a], b_after[b]);
+  }
+  return picture;
+}
+
+Result<MergeRun> RunMerge(SessionSource& source,
+                          const std::vector<SessionKey>& wanted,
+                          const MergeOptions& options,
+                          const MergeProgress& progress) {
+  Result<KeyframeSpool> spool = KeyframeSpool::Create();
+  if (!spool) return Error(spool.error());
+  auto read = ReadForMerge(source, wanted, *spool, [&](std::size_t done, std::size_t all) {
+    return progress ? progress("keyframes", done, all) : Status();
+  });
+  if (!read) return Error(read.error());
+  auto plan = PlanMerge(read->sessions, read->readers, source.profile(), options, progress);
+  if (!plan) return Error(plan.error());
+  return MergeRun{std::move(read->sessions), *std::move(plan), std::move(read->left_out),
+                  read->revision};
+}
+
+Result<PoseBatchSummary> ApplyMerge(const MergeRun& run,
+                                    AtlasClient& client,
+                                    const std::string& author) {
+  return client.UpdatePoses(run.Corrections(), author, {run.revision, run.Published()});
+}
+
+}  // namespace atlas

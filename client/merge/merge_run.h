@@ -1,0 +1,45 @@
+// A merge from a source to one batch of corrections, and that batch to a daemon.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/connection/atlas_client.h"
+#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_planner.h"
+#include "client/merge/report/merge_picture.h"
+#include "client/merge/source/session_selection.h"
+#include "client/merge/source/session_source.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+struct MergeRun {
+  std::vector<MergeSession> sessions;  // what was merged
+  MergePlan plan;                      // its sessions are these
+  std::vector<LeftOut> left_out;
+  // Of the source, when it was read: that of a daemon is the condition for what is applied.
+  std::uint64_t revision = 0;
+
+  // Where keyframes belong, and the staged sessions that come into the map with them.
+  std::vector<PoseCorrection> Corrections() const;
+  std::vector<SessionKey> Published() const;
+  bool IsNothing() const { return Corrections().empty() && Published().empty(); }
+
+  MergePicture Picture() const;
+};
+
+// `wanted` as for ReadForMerge. Errors are those of ReadForMerge and PlanMerge.
+Result<MergeRun> RunMerge(SessionSource& source,
+                          const std::vector<SessionKey>& wanted,
+                          const MergeOptions& options,
+                          const MergeProgress& progress);
+
+// One step of the daemon's, all or nothing. kConflict: a session of the merge is not what it was
+// when it was read; nothing was changed, and the merge is to be computed again. Else as
+// AtlasClient::UpdatePoses.
+Result<PoseBatchSummary> ApplyMerge(const MergeRun& run,
+                                    AtlasClient& client,
+                                    const std::string& author);
+
+}  // namespace atlas
