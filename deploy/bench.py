@@ -183,10 +183,11 @@ def draw_curbs(rows, path):
 
 
 PARTS = ("tracking",)  # of localization: by name alone
-WITH_CLIENT = ("soak", "restart", "purge")  # the one in Python, whose messages the build makes
+# With the client in Python, whose messages the build makes, or with numpy.
+LATE = ("soak", "restart", "purge", "merge")
 
 
-def bench_with_client(name, bin_dir):
+def bench_late(name, bin_dir):
     importlib.import_module(f"bench_{name}").BENCHMARKS[name](bin_dir, emit, drive)
 
 
@@ -200,7 +201,7 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
                                    **bench_crowd.BENCHMARKS, **bench_localization.BENCHMARKS,
                                    **bench_monitoring.BENCHMARKS, **bench_places.BENCHMARKS,
                                    **bench_tracking.BENCHMARKS}.items()},
-              **{name: lambda bin_dir, name=name: bench_with_client(name, bin_dir) for name in WITH_CLIENT}}
+              **{name: lambda bin_dir, name=name: bench_late(name, bin_dir) for name in LATE}}
 
 
 def main():
