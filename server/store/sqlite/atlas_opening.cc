@@ -159,7 +159,7 @@ Status CheckWhatIsLeft(Connection& writer, const DamagedLog& log) {
 
 // Of bits that were turned back.
 std::string NoteMended(Connection& writer, const DamagedLog& log) {
-  const std::string what =
+  std::string what =
       StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.turned.size(),
              " bits were turned back, nothing is lost by them; a copy of the "
              "log as it was is ",
@@ -176,7 +176,7 @@ std::string NoteLoss(Connection& writer, StoreIdentity& identity, const DamagedL
   const std::uint64_t before = ReadCounter(writer, Counter::kRevision);
   const NewLine line = BeginLine(writer, identity);
   identity.epoch = line.epoch;
-  const std::string what =
+  std::string what =
       StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.lost_commits,
              " commits are lost, the atlas goes on from revision ", before, " in epoch ",
              line.epoch, "; a copy of the log is ", log.kept.filename().string());
