@@ -17,9 +17,9 @@ from bench_daemon import Atlas
 IMAGES = pathlib.Path(__file__).parent.parent / "docs/images"
 EVERY_M = 1.0
 CITY = [(0, 760), (660, 1420), (1320, 2080), (1980, 2712)]  # scans of the trajectory, overlapping
-# A garage of eight decks, some 27 scans each: one session through all, two on a deck or two each.
+# A garage: one session from deck to deck, two on a deck or two each.
 GARAGE = [("0", 0, 216), ("2", 24, 66), ("4", 120, 162)]
-NEAR_M, WRONG_M, WRONG_DEG, ALONG = 5.0, 0.5, 3.0, 8
+NEAR_M, DECK_M, WRONG_M, WRONG_DEG, ALONG = 5.0, 1.0, 0.5, 3.0, 8
 
 
 def matrices(lines):
@@ -54,14 +54,19 @@ class Visit:
         self.poses[int(words[2])] = matrices([" ".join(words[3:])])[0]
 
 
+def distances(pose, others):
+    """To places on the same deck; others are far away."""
+    away = others[:, :3, 3] - pose[:3, 3]
+    return numpy.where(numpy.abs(away[:, 2]) > DECK_M, numpy.inf, numpy.linalg.norm(away, axis=1))
+
+
 def relative(visits):
     """How far keyframes of two sessions that were within 5 m are from where they should be to each other."""
     metres, turns = [], []
     for i, one in enumerate(visits):
         for other in visits[i + 1:]:
-            places = other.truth[other.stored, :3, 3]
-            for k in one.stored:
-                away = numpy.linalg.norm(places - one.truth[k, :3, 3], axis=1)
+            for k in one.stored if other.stored else []:
+                away = distances(one.truth[k], other.truth[other.stored])
                 nearest = int(away.argmin())
                 if away[nearest] > NEAR_M:
                     continue
@@ -112,9 +117,8 @@ def overlaps(visits, closures):
         for j, other in enumerate(visits):
             if i == j:
                 continue
-            places = other.truth[other.stored, :3, 3]
-            for k in one.stored:
-                if numpy.linalg.norm(places - one.truth[k, :3, 3], axis=1).min() > NEAR_M:
+            for k in range(len(one.truth)):
+                if distances(one.truth[k], other.truth).min() > NEAR_M:
                     continue
                 near += 1
                 seen += any(abs(k - other_k) <= ALONG for other_k in found.get((i, j), []))

@@ -2,22 +2,34 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numbers>
 
 namespace atlas {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-RegistrationResult RegisterIn(const SubmapWindow& map,
-                              const SubmapWindow& seen,
-                              const Pose& start,
-                              const MatchOptions& options) {
-  return Register(map.window(), seen.submap().features(), start, options.registration);
-}
+struct OneWay {
+  RegistrationResult result;
+  double explained = 0.0;
+};
 
-double Explained(const RegistrationResult& result, const Submap& seen) {
-  const auto columns = static_cast<double>(seen.features().columns.size());
-  return columns == 0.0 ? 0.0 : result.evidence / columns;
+// `seen` in `map`, as far as it could be seen by who made the map.
+OneWay RegisterIn(const SubmapWindow& map,
+                  const SubmapWindow& seen,
+                  const Pose& T_map_seen,
+                  const MatchOptions& options) {
+  std::vector<Eigen::Vector3d> places;
+  for (const SubmapPlace& place : map.submap().places()) {
+    places.emplace_back(T_map_seen.inverse() * place.ground);
+  }
+  const ScanFeatures features = seen.SeenFrom(places, options);
+  OneWay way;
+  way.result = Register(map.window(), features, T_map_seen, options.registration);
+  const auto columns = static_cast<double>(features.columns.size());
+  way.explained = columns == 0.0 ? 0.0 : way.result.evidence / columns;
+  return way;
 }
 
 // What is known of (t, w) of T_b_a, axes of b, as of (t', w') of its inverse, axes of a: with
@@ -59,19 +71,61 @@ const CoarseOccupancy& SubmapWindow::coarse() {
   return *coarse_;
 }
 
+ScanFeatures SubmapWindow::SeenFrom(const std::vector<Eigen::Vector3d>& places,
+                                    const MatchOptions& options) const {
+  std::vector<Eigen::Vector2f> viewers;
+  for (const Eigen::Vector3d& place : places) {
+    viewers.emplace_back(place.head<2>().cast<float>());
+  }
+  const auto is_of_use = [&](const Eigen::Vector3f& p) {
+    return !IsFlat(p, options) && !IsTurnedAway(p, viewers, options);
+  };
+  const ScanFeatures& all = submap_->features();
+  ScanFeatures seen;
+  std::copy_if(all.columns.begin(), all.columns.end(), std::back_inserter(seen.columns), is_of_use);
+  std::copy_if(all.returns.begin(), all.returns.end(), std::back_inserter(seen.returns), is_of_use);
+  seen.ground = all.ground;
+  return seen;
+}
+
+bool SubmapWindow::IsFlat(const Eigen::Vector3f& p, const MatchOptions& options) const {
+  constexpr int kAround = 8;
+  const Eigen::Vector3f middle = p - window_.origin().cast<float>();
+  int occupied = 0;
+  for (int k = 0; k < kAround; ++k) {
+    const float angle = 2.0F * std::numbers::pi_v<float> * static_cast<float>(k) / kAround;
+    const Eigen::Vector3f direction(std::cos(angle), std::sin(angle), 0.0F);
+    occupied += window_.IsOccupied(middle + options.flat_reach_m * direction) ? 1 : 0;
+  }
+  return occupied >= options.flat_directions;
+}
+
+bool SubmapWindow::IsTurnedAway(const Eigen::Vector3f& p,
+                                const std::vector<Eigen::Vector2f>& viewers,
+                                const MatchOptions& options) const {
+  const Eigen::Vector3f middle = p - window_.origin().cast<float>();
+  return std::all_of(viewers.begin(), viewers.end(), [&](const Eigen::Vector2f& viewer) {
+    Eigen::Vector3f towards = Eigen::Vector3f::Zero();
+    towards.head<2>() = options.before_m * (viewer - p.head<2>()).normalized();
+    return !window_.IsFree(middle + towards) && window_.IsFree(middle - towards);
+  });
+}
+
 SubmapMatch MatchSubmaps(const SubmapWindow& a,
                          const SubmapWindow& b,
                          const Pose& T_a_b_start,
                          const MatchOptions& options) {
-  const RegistrationResult there = RegisterIn(a, b, T_a_b_start, options);
-  const RegistrationResult back = RegisterIn(b, a, T_a_b_start.inverse(), options);
+  const OneWay a_way = RegisterIn(a, b, T_a_b_start, options);
+  const OneWay b_way = RegisterIn(b, a, T_a_b_start.inverse(), options);
+  const RegistrationResult& there = a_way.result;
+  const RegistrationResult& back = b_way.result;
   const Pose T_a_b_back = back.T_world_level.inverse();
   SubmapMatch match;
   match.T_a_b = Midway(there.T_world_level, T_a_b_back);
   match.information = there.information + Inverted(back.information, match.T_a_b);
   match.fit = std::min(there.fit, back.fit);
   match.columns = std::min(there.column_inliers, back.column_inliers);
-  match.explained = std::min(Explained(there, b.submap()), Explained(back, a.submap()));
+  match.explained = std::min(a_way.explained, b_way.explained);
   match.sigma_m = std::max(WorstSigma(there), WorstSigma(back));
   match.apart_m = (there.T_world_level.translation() - T_a_b_back.translation()).norm();
   match.apart_rad = Eigen::Quaterniond(there.T_world_level.linear())

@@ -23,6 +23,16 @@ struct MatchOptions {
   PoseSearchOptions search = {.step_m = 0.4, .max_columns = 160, .candidates = 3};
   float coarse_block_m = 0.4F;
 
+  // A feature is not looked for in the other's map
+  // - if what it shows is turned away from all places where the other vehicle was: so far before it
+  //   nothing is free, and behind it something is. Who was there saw the other side, which lies as
+  //   far off as the object is thick;
+  float before_m = 0.25F;
+  // - if it is of something flat, around which, so far off, as much stands in so many of eight
+  //   directions: of a ceiling each vehicle sees what is around itself, and these are not the same.
+  float flat_reach_m = 0.4F;
+  int flat_directions = 4;
+
   // Both ways: how well mapped features fit, which share of the columns stands on structure, how
   // certain the place is in its worst horizontal direction, were features independent.
   double min_fit = 0.6;
@@ -44,12 +54,22 @@ class SubmapWindow {
   const Submap& submap() const { return *submap_; }
   const MapWindow& window() const { return window_; }
   const CoarseOccupancy& coarse();  // made when first asked for
+  // Of the submap's features those that are not flat, nor turned away from all of `places` (submap
+  // frame), and its ground.
+  ScanFeatures SeenFrom(const std::vector<Eigen::Vector3d>& places,
+                        const MatchOptions& options) const;
 
  private:
   SubmapWindow(const Submap& submap, const MapProfile& profile, const MatchOptions& options)
       : submap_(&submap),
         window_(profile, options.window),
         coarse_block_m_(options.coarse_block_m) {}
+
+  // Points in the submap's frame.
+  bool IsFlat(const Eigen::Vector3f& p, const MatchOptions& options) const;
+  bool IsTurnedAway(const Eigen::Vector3f& p,
+                    const std::vector<Eigen::Vector2f>& viewers,
+                    const MatchOptions& options) const;
 
   const Submap* submap_;
   MapWindow window_;
