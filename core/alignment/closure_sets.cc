@@ -83,7 +83,9 @@ Indices HeaviestSet(const Indices& indices,
   Indices heaviest;
   for (std::size_t k = 0; k < std::min(kStarts, starts.size()); ++k) {
     Indices set = Grown(starts[k].second, indices, agree, closures);
-    if (WeightOf(closures, set) > WeightOf(closures, heaviest)) heaviest = std::move(set);
+    const bool is_heavier =
+        heaviest.empty() || WeightOf(closures, set) > WeightOf(closures, heaviest);
+    if (is_heavier) heaviest = std::move(set);
   }
   std::sort(heaviest.begin(), heaviest.end());
   return heaviest;
