@@ -108,6 +108,12 @@ TEST(ClosureSetsTest, ATurnOnTheSpotDoesNotAgree) {
     EXPECT_EQ(AreConsistent(one, turned, drives.sessions(), {.distance_m = 10.0}), is_within)
         << yaw_deg;
   }
+  for (const double yaw_deg : {1.7, 1.9}) {
+    Closure turned = drives.Between(11, 11);  // 160 m on, in both
+    turned.T_a_b = turned.T_a_b * At(0.0, 0.0, 0.0, yaw_deg * kDegree);
+    EXPECT_EQ(AreConsistent(one, turned, drives.sessions(), {.distance_m = 10.0}), yaw_deg < 1.8)
+        << yaw_deg;
+  }
 }
 
 TEST(ClosureSetsTest, AnotherDeckDoesNotAgree) {

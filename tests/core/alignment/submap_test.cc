@@ -110,6 +110,7 @@ TEST_F(SubmapTest, IsMadeOfMeasuredGroundAndOfColumns) {
   testing::FillDisc(keyframe, road);
   KeyframeCell wall = road;
   wall.occupancy = Occupancy::kObstacle;
+  wall.altitude_mm = -1'300;
   for (std::int32_t iy = -20; iy < 20; ++iy) {
     const std::size_t index = keyframe.grid.Index(25, iy);
     keyframe.cells[index] = wall;
@@ -135,6 +136,28 @@ TEST_F(SubmapTest, IsMadeOfMeasuredGroundAndOfColumns) {
     EXPECT_GT(seen.z(), -1.1);
     EXPECT_LT(seen.z(), 2.1);
   }
+}
+
+// A square of ground alone: cells are where their middles are.
+TEST_F(SubmapTest, GroundLiesWhereItsCellsDo) {
+  Keyframe keyframe = testing::BlankKeyframe(profile_, 40);
+  for (std::int32_t iy = -25; iy < -15; ++iy) {
+    for (std::int32_t ix = 10; ix < 20; ++ix) {
+      keyframe.cells[keyframe.grid.Index(ix, iy)] = {-1'730, Occupancy::kFree,
+                                                     AltitudeSource::kMeasured};
+    }
+  }
+  const std::vector<SubmapMember> members{
+      {{{"car", "drive"}, 4}, 400, Pose::Identity(), std::make_shared<const Keyframe>(keyframe)}};
+  SubmapOptions options;
+  options.features.ground_voxel_m = 0.1F;  // each cell by itself
+  const Submap submap = Submap::Fuse(members, 3, profile_, options).value();
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (const Eigen::Vector3f& p : submap.features().ground) sum += p;
+  const Eigen::Vector3f middle = sum / static_cast<float>(submap.features().ground.size());
+  const Eigen::Vector3d seen = SubmapFrame(members, 3) * middle.cast<double>();
+  EXPECT_NEAR(static_cast<double>(submap.features().ground.size()), 100.0, 8.0);
+  EXPECT_LT((seen - Eigen::Vector3d(1.5, -2.0, -1.73)).norm(), 0.02);
 }
 
 TEST_F(SubmapTest, APoseTiltedAgainstItsGridIsInvalidAndNamed) {
