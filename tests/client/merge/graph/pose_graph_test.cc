@@ -236,9 +236,11 @@ TEST(PoseGraphTest, APriorFarFromTheOthersDoesNotPull) {
 
 // Half as the edge says and half upright, where both know as much; a heading is no tilt.
 TEST(PoseGraphTest, SubmapsStayUpright) {
-  for (const double edge_sigma_rad : {0.006, 0.06}) {
+  for (int i = 0; i < 4; ++i) {
+    const double edge_sigma_rad = i < 2 ? 0.006 : 0.06;
     Pose tilted = At(2.0, 0.0, 0.0, 1.0);
-    tilted.linear() = Eigen::AngleAxisd(2.0 * kDegree, Eigen::Vector3d::UnitX()) * tilted.linear();
+    tilted.linear() =
+        Eigen::AngleAxisd(2.0 * kDegree, Eigen::Vector3d::Unit(i % 2)) * tilted.linear();
     PoseGraph graph = Nodes({At(0.0), tilted}, 0);
     graph.edges.push_back({0, 1, tilted, Sigmas(0.01, edge_sigma_rad), false});
     const auto result = Optimize(graph, {.tilt_sigma_rad = 0.006});
@@ -354,10 +356,15 @@ TEST_F(PoseGraphRefusalTest, APriorThatKnowsItsPlaceExactlyOrNotAtAll) {
 }
 
 TEST_F(PoseGraphRefusalTest, InformationThatIsNone) {
-  PoseInformation6 information = kGood;
-  information(2, 2) = -1.0;
-  graph_.edges = {{0, 1, At(1.0), information, false}};
-  ExpectRefused();
+  for (const double value :
+       {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (const int i : {0, 2, 5}) {
+      PoseInformation6 information = kGood;
+      information(i, i) = value;
+      graph_.edges = {{0, 1, At(1.0), information, false}};
+      ExpectRefused();
+    }
+  }
 }
 
 TEST_F(PoseGraphRefusalTest, NoSolutionIsAnErrorOfItsOwn) {
