@@ -95,12 +95,11 @@ double YawOf(const Pose& pose) {
   return SplitYaw(Eigen::Quaterniond(pose.linear())).yaw_rad;
 }
 
-}  // namespace
-
-bool AreConsistent(const Closure& one,
-                   const Closure& other,
-                   const SessionPair& sessions,
-                   const ConsistencyOptions& options) {
+// Whether `one` puts the submap `b` of `other` where `other` does.
+bool Confirms(const Closure& one,
+              const Closure& other,
+              const SessionPair& sessions,
+              const ConsistencyOptions& options) {
   const auto& [a, b] = sessions;
   const Pose T_a_other = a.T_session_submap[one.a].inverse() * a.T_session_submap[other.a];
   const Pose T_b_other = b.T_session_submap[one.b].inverse() * b.T_session_submap[other.b];
@@ -112,6 +111,15 @@ bool AreConsistent(const Closure& one,
          std::abs(off.z()) <= options.height_m + options.height_drift * way_m &&
          std::abs(YawOf(expected.inverse() * other.T_a_b)) <=
              options.yaw_rad + options.yaw_drift_rad_a_m * way_m;
+}
+
+}  // namespace
+
+bool AreConsistent(const Closure& one,
+                   const Closure& other,
+                   const SessionPair& sessions,
+                   const ConsistencyOptions& options) {
+  return Confirms(one, other, sessions, options) && Confirms(other, one, sessions, options);
 }
 
 std::vector<Indices> ConsistentSets(std::span<const Closure> closures,

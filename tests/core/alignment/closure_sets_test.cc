@@ -116,6 +116,17 @@ TEST(ClosureSetsTest, ATurnOnTheSpotDoesNotAgree) {
   }
 }
 
+// A little turned, one puts the other far off where they are far apart; the other does not.
+TEST(ClosureSetsTest, EachPutsTheOthersSubmapWhereItWasFound) {
+  const TwoDrives drives;
+  const Closure one = drives.Between(0, 0);
+  Closure turned = drives.Between(11, 11);
+  turned.T_a_b = turned.T_a_b * At(0.0, 0.0, 0.0, 1.9 * kDegree);  // 2.1 may be
+  EXPECT_TRUE(drives.Agree(one, drives.Between(11, 11)));
+  EXPECT_FALSE(drives.Agree(one, turned));  // 3.3 m, of 2.5
+  EXPECT_FALSE(drives.Agree(turned, one));
+}
+
 TEST(ClosureSetsTest, AnotherDeckDoesNotAgree) {
   const TwoDrives drives;
   const Closure one = drives.Between(2, 2);
