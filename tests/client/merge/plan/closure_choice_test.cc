@@ -11,16 +11,18 @@ namespace {
 using testing::At;
 using testing::Found;
 
-// Ten submaps a session, 10 m apart along x, all sessions in one frame.
+// Ten submaps a session, along x, all sessions in one frame; those of each later one are a metre
+// farther apart.
 class ClosureChoiceTest : public ::testing::Test {
  protected:
   static constexpr std::size_t kSubmaps = 10;
 
   ClosureChoiceTest() : ways_(3) {
-    for (SessionWay& way : ways_) {
+    for (std::size_t session = 0; session < ways_.size(); ++session) {
       for (std::size_t i = 0; i < kSubmaps; ++i) {
-        way.T_session_submap.push_back(At(10.0 * static_cast<double>(i)));
-        way.way_m.push_back(10.0 * static_cast<double>(i));
+        const double along_m = (10.0 + static_cast<double>(session)) * static_cast<double>(i);
+        ways_[session].T_session_submap.push_back(At(along_m));
+        ways_[session].way_m.push_back(along_m);
       }
     }
   }
@@ -30,8 +32,9 @@ class ClosureChoiceTest : public ::testing::Test {
                        const SubmapRef& b,
                        double moved_m = 0.0,
                        double explained = 0.8) const {
-    const double away_m = 10.0 * (static_cast<double>(b.submap) - static_cast<double>(a.submap));
-    return Found(a, b, At(away_m + moved_m), explained);
+    const Pose T_a_b = ways_[a.session].T_session_submap[a.submap].inverse() *
+                       ways_[b.session].T_session_submap[b.submap];
+    return Found(a, b, At(moved_m) * T_a_b, explained);
   }
   ClosureChoice Choose(const std::vector<FoundClosure>& found) const {
     return ChooseClosures(found, ways_, options_);
@@ -131,7 +134,7 @@ TEST_F(ClosureChoiceTest, PairsOfSessionsAreJudgedEachAlone) {
 
 TEST_F(ClosureChoiceTest, ASessionMeetsItself) {
   for (std::size_t i = 5; i < kSubmaps; ++i) {
-    ways_[1].T_session_submap[i] = At(10.0 * static_cast<double>(i - 5), 0.2);  // a second time
+    ways_[1].T_session_submap[i] = At(11.0 * static_cast<double>(i - 5), 0.2);  // a second time
   }
   std::vector<FoundClosure> found;
   for (const std::size_t i : {0U, 2U, 4U}) found.push_back(Found({1, i}, {1, i + 5}, At(0.0)));

@@ -2,10 +2,15 @@
 // none is found.
 #include "client/merge/plan/closure_search.h"
 
+#include <memory>
+#include <set>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "client/merge/plan/session_links.h"
 #include "tests/client/merge/plan/blind_session.h"
+#include "tests/client/merge/plan/simulated_session.h"
 
 namespace atlas {
 namespace {
@@ -78,6 +83,13 @@ TEST_F(ClosureSearchTest, AnotherDeckIsNot) {
   EXPECT_GT(Near(), 0U);
 }
 
+TEST_F(ClosureSearchTest, HeightIsNoDistance) {
+  Add(Straight(At(0.0), 50));
+  Add(Straight(At(0.0, 2.95, 0.9), 50));
+  options_.guided_m = 3.0;
+  EXPECT_EQ(Near(), 5U);
+}
+
 TEST_F(ClosureSearchTest, AnotherPartIsNot) {
   Add(Straight(At(0.0), 50));
   Add(Straight(At(0.0, 3.0), 50));
@@ -122,6 +134,56 @@ TEST_F(ClosureSearchTest, ProgressThatFailsEndsIt) {
   const auto anywhere = search.SearchAnywhere(stop);
   ASSERT_FALSE(anywhere.has_value());
   EXPECT_EQ(anywhere.error().code(), StatusCode::kTimeout);
+}
+
+// A session that is one submap, and a later one that comes by there halfway.
+class StreetSearchTest : public ClosureSearchTest {
+ protected:
+  void Make(const Pose& T_frame_world) {
+    const testing::DrivePiece piece{.seed = 0, .first = 36, .count = 40};
+    other_ = std::make_unique<testing::SimulatedSession>("other", piece, T_frame_world);
+    for (const auto* drive : {&one_, other_.get()}) {
+      sessions_.push_back(drive->session());
+      MergeSession& session = sessions_.back();
+      ASSERT_TRUE(
+          BuildSubmaps(session, StoredPoses(session), drive->reader(), profile_, options_, nullptr)
+              .ok());
+    }
+    ASSERT_EQ(sessions_[0].submaps.size(), 1U);
+  }
+
+  // Each pair once, and where they truly lie to each other.
+  void ExpectFound() {
+    const auto found = ClosureSearchTest::Make().SearchAnywhere(nullptr);
+    ASSERT_TRUE(found.has_value());
+    ASSERT_FALSE(found->empty());
+    std::set<std::pair<SubmapRef, SubmapRef>> pairs;
+    for (const FoundClosure& closure : *found) {
+      EXPECT_TRUE(pairs.emplace(closure.a, closure.b).second);
+      EXPECT_EQ(closure.a, (SubmapRef{0, 0}));
+      ASSERT_EQ(closure.b.session, 1U);
+      const Pose should =
+          one_.TruthOf(sessions_[0], 0).inverse() * other_->TruthOf(sessions_[1], closure.b.submap);
+      EXPECT_LT(testing::DistanceBetween(closure.match.T_a_b, should), 0.05);
+      EXPECT_LT(testing::AngleBetween(closure.match.T_a_b, should), 0.005);
+    }
+  }
+
+  testing::SimulatedSession one_{"one", {.seed = 2, .first = 62, .count = 8}};
+  std::unique_ptr<testing::SimulatedSession> other_;
+};
+
+// The later one's first submap, the only other that is looked for, is not there.
+TEST_F(StreetSearchTest, AnEarlierSessionIsFoundInALaterOne) {
+  Make(At(900.0, 0.0, 0.0, 1.0));
+  options_.probe_stride = 100;
+  ExpectFound();
+}
+
+TEST_F(StreetSearchTest, WhatIsFoundByLooksAndByPosesIsOne) {
+  Make(Pose::Identity());
+  options_.probe_stride = 1;
+  ExpectFound();
 }
 
 }  // namespace

@@ -137,6 +137,21 @@ TEST_F(MergeGraphTest, PriorsMoveASessionAsOne) {
   EXPECT_NEAR(LeftOf(merged, 0, 0), 0.0, 1e-9);
 }
 
+// Ten keyframes of a submap that err together know no more than one of them: as much as the match.
+TEST_F(MergeGraphTest, APriorOfASubmapIsAsGoodAsItsKeyframesAre) {
+  sessions_[1] = BlindSession("two", Straight(At(0.0), 10));
+  links_[1].clear();
+  is_held_[0] = true;
+  closures_ = {testing::FoundAsStored(sessions_, {0, 0}, {1, 0})};
+  for (MergeKeyframe& keyframe : sessions_[1].keyframes) {
+    keyframe.prior = KeyframePrior{
+        keyframe.T_world_sensor.ToPose().translation() + Eigen::Vector3d(0.0, 0.1, 0.0),
+        options_.match_sigma_m};
+  }
+  options_.graph.robust_sigmas = 1e6;
+  EXPECT_NEAR(LeftOf(Solve(), 1, 0), 0.05, 0.005);
+}
+
 TEST_F(MergeGraphTest, PriorsOfAHeldSessionSayNothing) {
   for (MergeKeyframe& keyframe : sessions_[1].keyframes) {
     keyframe.prior = KeyframePrior{Eigen::Vector3d(0.0, 70.0, 0.0), 0.0};  // no sigma at all

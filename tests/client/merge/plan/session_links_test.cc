@@ -58,6 +58,22 @@ TEST(SessionLinksTest, NothingLinksOverAJump) {
   EXPECT_EQ(links[1].from, 2U);
 }
 
+// Though the submaps on both sides fit.
+TEST(SessionLinksTest, NothingIsMatchedOverAJump) {
+  const testing::SimulatedSession street("car", {.first = 40, .count = 4});
+  for (const double jump_m : {10.0, 1.0}) {
+    MergeOptions options;
+    options.cut.jump_m = jump_m;
+    options.cut.length_m = 1.5;
+    std::vector<MergeSession> sessions{street.session()};
+    ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(), MapProfile(),
+                             options, nullptr)
+                    .ok());
+    ASSERT_GT(sessions[0].submaps.size(), 2U);
+    EXPECT_EQ(Links(sessions, options).empty(), jump_m < 1.25);
+  }
+}
+
 TEST(SessionLinksTest, OneSubmapHasNone) {
   EXPECT_TRUE(Links({BlindSession("car", Straight(At(0.0), 5))}).empty());
 }
