@@ -1,6 +1,7 @@
 // How a session's submaps follow each other: by its poses, and better by what they show.
 #include "client/merge/plan/session_links.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -120,8 +121,8 @@ TEST(SessionLinksTest, OnAStreetMatchesAreBetterThanOdometry) {
   ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(), MapProfile(), {},
                            nullptr)
                   .ok());
-  double squares_m2[2] = {0.0, 0.0};  // of odometry, of matches
-  std::size_t links[2] = {0, 0};
+  std::array<double, 2> squares_m2{};  // of odometry, of matches
+  std::array<std::size_t, 2> links{};
   for (const SessionLink& link : Links(sessions)) {
     const Pose should =
         street.TruthOf(sessions[0], link.from).inverse() * street.TruthOf(sessions[0], link.to);
@@ -129,7 +130,7 @@ TEST(SessionLinksTest, OnAStreetMatchesAreBetterThanOdometry) {
     squares_m2[link.is_matched ? 1 : 0] += off_m * off_m;
     ++links[link.is_matched ? 1 : 0];
   }
-  const auto of = [&](int kind) {
+  const auto of = [&](std::size_t kind) {
     return std::sqrt(squares_m2[kind] / static_cast<double>(links[kind]));
   };
   EXPECT_EQ(links[0], sessions[0].submaps.size() - 1);
