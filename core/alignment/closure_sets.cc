@@ -83,7 +83,9 @@ Indices HeaviestSet(const Indices& indices,
   Indices heaviest;
   for (std::size_t k = 0; k < std::min(kStarts, starts.size()); ++k) {
     Indices set = Grown(starts[k].second, indices, agree, closures);
-    if (WeightOf(closures, set) > WeightOf(closures, heaviest)) heaviest = std::move(set);
+    const bool is_heavier =
+        heaviest.empty() || WeightOf(closures, set) > WeightOf(closures, heaviest);
+    if (is_heavier) heaviest = std::move(set);
   }
   std::sort(heaviest.begin(), heaviest.end());
   return heaviest;
@@ -93,12 +95,11 @@ double YawOf(const Pose& pose) {
   return SplitYaw(Eigen::Quaterniond(pose.linear())).yaw_rad;
 }
 
-}  // namespace
-
-bool AreConsistent(const Closure& one,
-                   const Closure& other,
-                   const SessionPair& sessions,
-                   const ConsistencyOptions& options) {
+// Whether `one` puts the submap `b` of `other` where `other` does.
+bool Confirms(const Closure& one,
+              const Closure& other,
+              const SessionPair& sessions,
+              const ConsistencyOptions& options) {
   const auto& [a, b] = sessions;
   const Pose T_a_other = a.T_session_submap[one.a].inverse() * a.T_session_submap[other.a];
   const Pose T_b_other = b.T_session_submap[one.b].inverse() * b.T_session_submap[other.b];
@@ -110,6 +111,15 @@ bool AreConsistent(const Closure& one,
          std::abs(off.z()) <= options.height_m + options.height_drift * way_m &&
          std::abs(YawOf(expected.inverse() * other.T_a_b)) <=
              options.yaw_rad + options.yaw_drift_rad_a_m * way_m;
+}
+
+}  // namespace
+
+bool AreConsistent(const Closure& one,
+                   const Closure& other,
+                   const SessionPair& sessions,
+                   const ConsistencyOptions& options) {
+  return Confirms(one, other, sessions, options) && Confirms(other, one, sessions, options);
 }
 
 std::vector<Indices> ConsistentSets(std::span<const Closure> closures,

@@ -20,17 +20,20 @@ void CutPart(std::span<const Pose> poses,
   for (std::size_t i = begin + 1; i < end; ++i) {
     way_m += StepTo(poses, i);
   }
-  const double length_m = way_m / std::max(1.0, std::round(way_m / options.length_m));
+  const double submaps = std::max(1.0, std::round(way_m / options.length_m));
+  double number = 1.0;  // of the submap, the first one's; the last one ends with the part
+  const auto is_past_end = [&](double at_m) {
+    return number < submaps && at_m > way_m * number / submaps;
+  };
   SubmapCut cut{begin, begin, begin > 0};
   double at_m = 0.0;
-  double cut_m = length_m;  // where the submap ends
   for (std::size_t i = begin; i < end; ++i) {
     if (i > begin) at_m += StepTo(poses, i);
     const bool is_full = cut.end - cut.begin == options.max_keyframes;
-    if (cut.end > cut.begin && (at_m > cut_m || is_full)) {
+    if (cut.end > cut.begin && (is_past_end(at_m) || is_full)) {
       cuts.push_back(cut);
       cut = {i, i, false};
-      while (at_m > cut_m) cut_m += length_m;
+      while (is_past_end(at_m)) ++number;
     }
     cut.end = i + 1;
   }

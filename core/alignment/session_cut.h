@@ -11,8 +11,8 @@
 namespace atlas {
 
 struct CutOptions {
-  double length_m = 10.0;          // of a submap's way
-  std::size_t max_keyframes = 24;  // of a vehicle that stands
+  double length_m = 10.0;          // of a submap's way, above 0
+  std::size_t max_keyframes = 24;  // of a submap: of a vehicle that stands
   double jump_m = 10.0;  // a longer step ends a submap: nothing is known of what was there
 };
 
@@ -25,7 +25,8 @@ struct SubmapCut {
   friend bool operator==(const SubmapCut&, const SubmapCut&) = default;
 };
 
-// All of them, in their order. What is left over at an end is shared out with the submap before.
+// All of them, in their order; `T_world_sensor` of each, as odometry has them. Between two jumps
+// submaps are equally long, as near to `length_m` as that allows: at an end nothing is left over.
 std::vector<SubmapCut> CutSession(std::span<const Pose> T_world_sensor, const CutOptions& options);
 
 }  // namespace atlas

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/base/str_cat.h"
 #include "core/fusion/tile_fusion.h"
 #include "core/keyframe/grid_attitude.h"
 #include "core/localization/places/block_map.h"
@@ -20,7 +21,9 @@ Result<std::vector<PlacedKeyframe>> Placed(std::span<const SubmapMember> members
   for (const SubmapMember& member : members) {
     auto placement = PlaceKeyframe(QuantizedPose::FromPose(T_submap_world * member.T_world_sensor),
                                    member.keyframe->level_quaternion);
-    if (!placement) return Error(placement.error());
+    if (!placement) {
+      return Error(placement.error().WithContext(StrCat("keyframe ", member.key)));
+    }
     placed.push_back({member.key, member.time_ms, *placement, member.keyframe});
   }
   return placed;

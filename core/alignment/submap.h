@@ -26,7 +26,7 @@ namespace atlas {
 struct SubmapOptions {
   std::uint8_t occupied_nibble = 10;  // p >= 0.61
   double place_spacing_m = 2.0;       // between the places that are described
-  double block_m = 0.4;               // of what they are described by
+  double block_m = 0.4;               // of the blocks that they are described by
   FeatureOptions features;
 };
 
@@ -39,11 +39,12 @@ struct SubmapMember {
 
 // Where the vehicle was, and what it looks like from there.
 struct SubmapPlace {
-  Eigen::Vector3d ground = Eigen::Vector3d::Zero();  // below the sensor, submap frame
+  Eigen::Vector3d ground = Eigen::Vector3d::Zero();  // below the sensor, submap frame, metres
   RangeProfile profile;
 };
 
-// From a submap's frame to the world's: upright at the sensor of the middle one of `members`.
+// T_world_submap: upright at the sensor of the middle one of `members`, which are not empty, of two
+// the later one; turned from its heading by GridYaw(number).
 Pose SubmapFrame(std::span<const SubmapMember> members, std::uint64_t number);
 
 // Its tiles are kept encoded: decoded, those of a submap are megabytes.
@@ -51,8 +52,9 @@ class Submap {
  public:
   using Tiles = std::vector<std::shared_ptr<const Tile>>;
 
-  // `members`, not empty, rising in sequence; `number` names the turn of its frame. kInvalidData
-  // when a member's pose is tilted against its grid by more than 2 degrees.
+  // `members`, not empty, rising in sequence, made for `profile`; `number` names the turn of its
+  // frame. kInvalidData, naming the keyframe, when a member's pose is tilted against its grid by
+  // more than 2 degrees.
   static Result<Submap> Fuse(std::span<const SubmapMember> members,
                              std::uint64_t number,
                              const MapProfile& profile,
@@ -62,7 +64,7 @@ class Submap {
   Result<Tiles> DecodeTiles(const MapProfile& profile) const;
   const ScanFeatures& features() const { return features_; }
   const std::vector<SubmapPlace>& places() const { return places_; }
-  // Of what was seen, from the frame's origin, in the plane.
+  // All that was seen lies within, from the frame's origin, in the plane.
   double radius_m() const { return radius_m_; }
 
  private:

@@ -79,8 +79,8 @@ class SubmapWindow {
 
 struct SubmapMatch {
   Pose T_a_b = Pose::Identity();  // midway between the two answers
-  // Of both ways together, as far as features are independent: (translation, rotation vector), axes
-  // of a, about b's origin.
+  // Of both ways together, as far as features are independent: (translation, rotation vector) in
+  // 1/m^2 and 1/rad^2, axes of a, about b's origin.
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
   // The worse of both ways.
   double fit = 0.0;
@@ -92,14 +92,16 @@ struct SubmapMatch {
   double apart_rad = 0.0;
 };
 
+// From nearby: as far as registrations reach, half a metre and some degrees. Always an answer;
+// IsBelieved tells whether it is one.
 SubmapMatch MatchSubmaps(const SubmapWindow& a,
                          const SubmapWindow& b,
                          const Pose& T_a_b_start,
                          const MatchOptions& options);
 bool IsBelieved(const SubmapMatch& match, const MatchOptions& options);
 
-// Where b may lie in a around a start, by how many of its columns fall on structure: the best
-// first.
+// T_a_b: where b may lie in a around a start, by how many of its columns fall on structure, the
+// best first; none where b has too few columns.
 std::vector<Pose> SearchSubmap(SubmapWindow& a,
                                const Submap& b,
                                const Pose& T_a_b_start,

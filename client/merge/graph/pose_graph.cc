@@ -29,6 +29,16 @@ struct Block {
 template <typename T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 
+// What is hardly known is known a little: factors there are, unless it is no information at all.
+Eigen::LLT<PoseInformation6> FactorsOf(const PoseInformation6& information) {
+  constexpr double kLittle = 1e-6;
+  return (information + kLittle * PoseInformation6::Identity()).llt();
+}
+
+bool IsInformation(const PoseInformation6& matrix) {
+  return matrix.allFinite() && FactorsOf(matrix).info() == Eigen::Success;
+}
+
 // How far b is from where the edge has it, seen from a, in sigmas.
 class EdgeResidual {
  public:
@@ -56,11 +66,9 @@ class EdgeResidual {
   }
 
  private:
-  // L' of I = L L': |L' r|^2 = r' I r. What is hardly known is known a little: a root there is.
+  // L' of I = L L': |L' r|^2 = r' I r.
   static PoseInformation6 RootOf(const PoseInformation6& information) {
-    constexpr double kLittle = 1e-6;
-    const PoseInformation6 whole = information + kLittle * PoseInformation6::Identity();
-    return whole.llt().matrixL().transpose();
+    return FactorsOf(information).matrixL().transpose();
   }
 
   Eigen::Vector3d p_;
@@ -103,11 +111,17 @@ Status Check(const PoseGraph& graph) {
       return {StatusCode::kInvalidArgument, StrCat("pose graph: an edge from ", edge.from, " to ",
                                                    edge.to, " of ", nodes, " nodes")};
     }
+    if (!IsInformation(edge.information)) {
+      return {StatusCode::kInvalidArgument,
+              StrCat("pose graph: what is known of the edge from ", edge.from, " to ", edge.to,
+                     " is not positive semidefinite")};
+    }
   }
   for (const GraphPrior& prior : graph.priors) {
-    if (prior.node >= nodes || !(prior.sigma_m.minCoeff() > 0.0)) {
+    if (prior.node >= nodes || !(prior.sigma_m.array() > 0.0).all()) {
       return {StatusCode::kInvalidArgument,
-              StrCat("pose graph: a prior of node ", prior.node, " of ", nodes, " nodes")};
+              StrCat("pose graph: a prior of node ", prior.node, " of ", nodes, ", sigmas ",
+                     prior.sigma_m.transpose(), " m, each to be above 0")};
     }
   }
   return {};

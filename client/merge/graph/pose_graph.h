@@ -21,8 +21,8 @@ struct GraphNode {
   bool is_fixed = false;
 };
 
-// Submap `to` lies at T_from_to in submap `from`; `information` of (translation, rotation vector),
-// axes of `from`, about the origin of `to`.
+// Submap `to` lies at T_from_to in submap `from`; `information` of (translation, rotation vector)
+// in 1/m^2 and 1/rad^2, axes of `from`, about the origin of `to`: symmetric, positive semidefinite.
 struct GraphEdge {
   std::size_t from = 0;
   std::size_t to = 0;
@@ -31,12 +31,13 @@ struct GraphEdge {
   bool may_be_wrong = false;
 };
 
-// A point of a submap is known to be somewhere, as a GNSS says.
+// A point of a submap is known to be somewhere, as a GNSS says; metres. It may be wrong, as an edge
+// may.
 struct GraphPrior {
   std::size_t node = 0;
   Eigen::Vector3d p_submap = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
-  Eigen::Vector3d sigma_m = Eigen::Vector3d::Ones();
+  Eigen::Vector3d sigma_m = Eigen::Vector3d::Ones();  // along the world's axes, above 0
 };
 
 struct PoseGraph {
@@ -46,9 +47,11 @@ struct PoseGraph {
 };
 
 struct PoseGraphOptions {
-  // An edge that may be wrong pulls less the more sigmas it is off: Cauchy, from here on.
+  // An edge that may be wrong, or a prior, pulls less the more sigmas it is off: Cauchy, from here
+  // on.
   double robust_sigmas = 3.0;
-  // A submap's grids were levelled by an IMU.
+  // A submap's grids were levelled by an IMU: how far its z axis may be from the vertical, about x
+  // and about y.
   double tilt_sigma_rad = 0.006;
   int max_iterations = 100;
   int threads = 2;
@@ -58,13 +61,14 @@ struct PoseGraphResult {
   std::vector<Pose> T_world_submap;     // of each node
   std::vector<double> edge_off_sigmas;  // of each edge, what is left: the root of r' I r
   int iterations = 0;
-  double cost_before = 0.0;
+  double cost_before = 0.0;  // half the sum of all squares, robust ones as they count
   double cost_after = 0.0;
 };
 
-// kInvalidArgument: an edge or prior of a node that is not there, or with itself; a part of the
-// graph in which nothing is fixed and no prior says where it is gets its first node fixed.
-// kInternal where no solution is found.
+// A part of the graph in which nothing is fixed and no prior says where it is stays at its first
+// node. The result does not depend on `threads` beyond rounding.
+// kInvalidArgument: an edge or prior of a node that is not there, an edge from a node to itself,
+// information or sigmas that are none. kInternal where no solution is found.
 Result<PoseGraphResult> Optimize(const PoseGraph& graph, const PoseGraphOptions& options);
 
 }  // namespace atlas

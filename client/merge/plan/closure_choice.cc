@@ -37,9 +37,10 @@ ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
     const auto sets =
         ConsistentSets(closures, {ways[pair.first], ways[pair.second]}, options.consistency, 2);
     SessionMeeting meeting{pair.first, pair.second, indices.size(), sets[0].size()};
+    const double next_weight = sets.size() > 1 ? WeightOf(closures, sets[1]) : 0.0;
     const bool has_rival =
-        sets.size() > 1 && CountPlaces(closures, sets[1]) >= options.min_closures;
-    if (sets.size() > 1) meeting.margin = WeightOf(closures, sets[0]) / WeightOf(closures, sets[1]);
+        next_weight > 0.0 && CountPlaces(closures, sets[1]) >= options.min_closures;
+    if (next_weight > 0.0) meeting.margin = WeightOf(closures, sets[0]) / next_weight;
     meeting.is_believed = CountPlaces(closures, sets[0]) >= options.min_closures &&
                           (!has_rival || meeting.margin >= options.min_margin);
     choice.meetings.push_back(meeting);

@@ -18,7 +18,7 @@ struct SessionMeeting {
   std::size_t b = 0;
   std::size_t found = 0;     // closures,
   std::size_t agreeing = 0;  // of which so many agree,
-  double margin = 0.0;       // with so many times the weight of the next such set; 0: there is none
+  double margin = 0.0;  // with so many times the weight of the next such set; 0: none of any weight
   bool is_believed = false;
 };
 
@@ -28,6 +28,8 @@ struct ClosureChoice {
   std::vector<SessionMeeting> meetings;  // rising, those of which anything was found
 };
 
+// `ways` of each session, as its own links have it. A set counts by the fewer of the two sessions'
+// submaps that have a part in it.
 ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
                              const std::vector<SessionWay>& ways,
                              const MergeOptions& options);

@@ -28,8 +28,11 @@ struct FoundClosure {
 using SubmapPoses = std::vector<std::vector<Pose>>;
 SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions);
 
+// Its calls return closures that are believed one by one, rising, each pair once. Errors are those
+// of the submaps' tiles and of `progress`, which may be empty.
 class ClosureSearch {
  public:
+  // Of pairs; one call at a time, from any of the worker threads.
   using Progress = std::function<Status(std::size_t done, std::size_t all)>;
 
   // `sessions` and `ways` (of each session) outlive it.
@@ -38,7 +41,8 @@ class ClosureSearch {
                 const MapProfile& profile,
                 const MergeOptions& options);
 
-  // By what places look like, and by where the stored poses have them.
+  // By what places look like, and by where the stored poses have them, in frames that may have
+  // nothing to do with each other.
   Result<std::vector<FoundClosure>> SearchAnywhere(const Progress& progress);
   // By poses that are nearly right, one a submap of each session; between sessions of one part
   // (`part_of` each). Pairs that are `known` are left out, and those that it looked at before.
@@ -47,7 +51,7 @@ class ClosureSearch {
                                                const std::vector<FoundClosure>& known,
                                                const Progress& progress);
 
-  // What is known, from where it is thought to be.
+  // What is known, from where it is thought to be; what is not found there is left out.
   Result<std::vector<FoundClosure>> MatchAgain(const std::vector<FoundClosure>& known,
                                                const SubmapPoses& T_world_submap,
                                                const Progress& progress);

@@ -12,7 +12,10 @@
 
 namespace atlas {
 
-// By session.
+// By session. None that is staged, none whose matched links are off, root mean square, by more than
+// `held_m` or `held_rad`; of those that are left the worst is let go until closures between them,
+// too, are off by no more: of two that do not fit each other the first one stays.
+// `links` by session; `closures` that are believed.
 std::vector<bool> HeldSessions(const std::vector<MergeSession>& sessions,
                                const std::vector<std::vector<SessionLink>>& links,
                                const std::vector<FoundClosure>& closures,

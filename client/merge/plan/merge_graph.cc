@@ -1,17 +1,27 @@
 #include "client/merge/plan/merge_graph.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace atlas {
 namespace {
 
-// The node of a session's first submap; the others follow.
+// Those in the map come first: whatever nothing holds is held by its first node.
+std::vector<std::size_t> InOrder(const std::vector<MergeSession>& sessions) {
+  std::vector<std::size_t> order(sessions.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_partition(order.begin(), order.end(),
+                        [&](std::size_t session) { return !sessions[session].is_staged; });
+  return order;
+}
+
+// The node of each session's first submap; the others follow.
 std::vector<std::size_t> FirstNodes(const std::vector<MergeSession>& sessions) {
-  std::vector<std::size_t> first;
+  std::vector<std::size_t> first(sessions.size());
   std::size_t nodes = 0;
-  for (const MergeSession& session : sessions) {
-    first.push_back(nodes);
-    nodes += session.submaps.size();
+  for (const std::size_t session : InOrder(sessions)) {
+    first[session] = nodes;
+    nodes += sessions[session].submaps.size();
   }
   return first;
 }
@@ -45,7 +55,7 @@ PoseGraph MakeGraph(const MergeEvidence& evidence,
                     const SubmapPoses& start,
                     const std::vector<std::size_t>& first) {
   PoseGraph graph;
-  for (std::size_t session = 0; session < evidence.sessions.size(); ++session) {
+  for (const std::size_t session : InOrder(evidence.sessions)) {
     const MergeSession& own = evidence.sessions[session];
     for (std::size_t i = 0; i < own.submaps.size(); ++i) {
       graph.nodes.push_back({start[session][i], evidence.is_held[session]});

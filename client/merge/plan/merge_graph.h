@@ -26,8 +26,9 @@ struct MergedPoses {
   int iterations = 0;
 };
 
-// From `start`, where held sessions are as they are stored. The first submap of a part that nothing
-// else holds stays where it starts. Errors as Optimize.
+// From `start`, where held sessions are as they are stored. Where nothing else holds a part, the
+// first submap of its first session in the map stays where it starts, or of its first session where
+// none is. Errors as Optimize, kInvalidArgument for a keyframe's prior without a radius.
 Result<MergedPoses> OptimizeMerge(const MergeEvidence& evidence,
                                   const SubmapPoses& start,
                                   const MergeOptions& options);

@@ -23,12 +23,13 @@ struct MergeOptions {
   PoseGraphOptions graph;
 
   // Odometry, as the stored poses have it from one keyframe to the next.
-  double odometry_drift = 0.01;  // of the way
+  double odometry_drift = 0.01;  // of the way, one standard deviation as all of these
   double odometry_yaw_rad_a_m = 0.5 * std::numbers::pi / 180.0 / 100.0;
   double odometry_sigma_m = 0.01;  // of each step between submaps, besides
   double odometry_sigma_rad = 0.05 * std::numbers::pi / 180.0;
 
-  // A match informs as this share of its features would, and is no better than this.
+  // A match informs as this share of its features would, were they independent, and is no better
+  // than these.
   double information_share = 0.05;
   double match_sigma_m = 0.01;
   double match_sigma_rad = 0.03 * std::numbers::pi / 180.0;
@@ -36,7 +37,7 @@ struct MergeOptions {
   // Submaps of one session with less way between them do not meet: they are neighbours.
   double min_loop_m = 50.0;
   // Without an idea: every so many submaps of a session one is looked for in all others ...
-  std::size_t probe_stride = 2;
+  std::size_t probe_stride = 2;  // at least 1
   // ... and where the stored poses have it near others, around there.
   double near_m = 8.0;
   double near_height_m = 2.0;
@@ -64,7 +65,7 @@ struct MergeOptions {
   double min_move_m = 0.002;
   double min_move_rad = 0.02 * std::numbers::pi / 180.0;
 
-  std::size_t workers = 2;
+  std::size_t workers = 2;  // threads, at least 1
 };
 
 }  // namespace atlas

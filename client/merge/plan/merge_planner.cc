@@ -188,6 +188,7 @@ class Planner {
       }
       outcome.moved.push_back({i, QuantizedPose::FromPose(corrected[i])});
     }
+    if (corrected.empty()) return;
     outcome.rms_move_m = std::sqrt(squares_m2 / static_cast<double>(corrected.size()));
   }
 

@@ -20,7 +20,8 @@
 
 namespace atlas {
 
-// A step of the work, and how much of it is done. A failed status ends it.
+// A step of the work, and how much of it is done; one call at a time, from any thread. A failed
+// status ends the merge.
 using MergeProgress =
     std::function<Status(std::string_view step, std::size_t done, std::size_t all)>;
 
@@ -28,12 +29,12 @@ struct SessionOutcome {
   // It is in the map, or belongs into it now: it meets sessions that are, or where none is, most of
   // the others.
   bool is_joined = false;
-  bool is_held = false;
-  std::string why_not;  // it is not joined; for people
+  bool is_held = false;  // it is in the map, and where it should be
+  std::string why_not;   // it is not joined; for people
   std::size_t closures = 0;
   std::size_t submaps_met = 0;  // that have one, of so many:
   std::size_t submaps = 0;
-  double max_move_m = 0.0;
+  double max_move_m = 0.0;  // of its keyframes, those that move too little to be moved counted
   double rms_move_m = 0.0;
   std::vector<MovedKeyframe> moved;  // none of a session that is not joined
 };
@@ -44,15 +45,17 @@ struct MergePlan {
   std::vector<double> closure_off_m;     // of each, what is left between the submaps
   std::vector<double> closure_off_rad;
   std::vector<SessionMeeting> meetings;
-  std::size_t rejected = 0;  // closures
-  int rounds = 0;
+  std::size_t rejected = 0;                     // closures, each time that it was done
+  int rounds = 0;                               // of the guided search
   std::vector<std::vector<SessionLink>> links;  // by session
   std::set<TileId> tiles;                       // of level 0, that would be fused again
 };
 
-// Fills the sessions' submaps. `readers`: of each session's blobs, which are read twice: submaps
-// are fused again by poses that are nearly right, for within a submap, too, odometry drifts. Errors
-// are those of BuildSubmaps and of `progress`, and kInternal where no poses are found.
+// Fills the sessions' submaps. `readers`: of each session's blobs, one a session, which are read
+// once more for each of `options.refinements`: submaps are fused again by poses that are nearly
+// right, for within a submap, too, odometry drifts. `progress` may be empty.
+// Errors are those of BuildSubmaps and of `progress`, kInvalidArgument for a prior without a
+// radius, and kInternal where no poses are found.
 Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const std::vector<BlobReader>& readers,
                             const MapProfile& profile,

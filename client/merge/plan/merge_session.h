@@ -18,7 +18,7 @@ namespace atlas {
 // A position known from elsewhere, of the sensor in the world.
 struct KeyframePrior {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
-  double radius_m = 0.0;  // one standard deviation, in each axis
+  double radius_m = 0.0;  // one standard deviation, in each axis, above 0
 };
 
 struct MergeKeyframe {

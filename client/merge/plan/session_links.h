@@ -18,16 +18,17 @@ struct SessionLink {
   std::size_t from = 0;
   std::size_t to = 0;
   Pose T_from_to = Pose::Identity();
-  PoseInformation6 information = PoseInformation6::Zero();
-  bool is_matched = false;  // else as the poses have it
+  PoseInformation6 information = PoseInformation6::Zero();  // as GraphEdge's
+  bool is_matched = false;                                  // else as the poses have it
 };
 
-// What a match says, its features' dependence and the map's own error considered.
+// What a match says, in 1/m^2 and 1/rad^2 as SubmapMatch has it, its features' dependence and the
+// map's own error considered: positive definite.
 PoseInformation6 InformationOf(const SubmapMatch& match, const MergeOptions& options);
 
-// From each to the next by the stored poses, unless there is a jump between them; and from each to
-// the next and the one after that by a match from `T_world_submap`, where the session is thought to
-// be, if it is believed and near what the stored poses say.
+// From each submap of session `session` of `sessions` to the next by the stored poses, and again by
+// a match that begins at `T_world_submap`, where its submaps are thought to be, if that is believed
+// and near what the stored poses say. None over a jump. Errors are those of the submaps' tiles.
 Result<std::vector<SessionLink>> LinkSession(std::size_t session,
                                              const std::vector<MergeSession>& sessions,
                                              const std::vector<Pose>& T_world_submap,

@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <sstream>
+#include <string>
 #include <utility>
 
 #include "client/merge/plan/parallel.h"
@@ -16,9 +16,7 @@ namespace atlas {
 namespace {
 
 std::string NameOf(const MergeSession& session, std::size_t keyframe) {
-  std::ostringstream name;
-  name << "keyframe " << KeyframeKey{session.key, session.keyframes[keyframe].sequence};
-  return name.str();
+  return StrCat("keyframe ", KeyframeKey{session.key, session.keyframes[keyframe].sequence});
 }
 
 // Equal for equal sessions: what is fused of them is the same on every machine.
@@ -49,7 +47,7 @@ Result<MergeSubmap> FuseSubmap(const MergeSession& session,
   }
   const std::uint64_t number = NumberOf(session, cut);
   Result<Submap> submap = Submap::Fuse(members, number, profile, options.submaps);
-  if (!submap) return Error(submap.error().WithContext(NameOf(session, cut.begin)));
+  if (!submap) return Error(submap.error());
   return MergeSubmap{cut, *std::move(submap), SubmapFrame(members, number)};
 }
 

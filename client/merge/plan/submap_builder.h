@@ -13,7 +13,7 @@
 
 namespace atlas {
 
-// The blob of a keyframe of the session; asked for in their order, by one thread.
+// The blob of a keyframe of the session; asked for in their order, by the caller's thread.
 using BlobReader = std::function<Result<Bytes>(std::size_t keyframe)>;
 
 // Cuts `session` and fills its submaps, fused by `T_world_sensor` of its keyframes; some are in
@@ -21,7 +21,7 @@ using BlobReader = std::function<Result<Bytes>(std::size_t keyframe)>;
 // same.
 // kInvalidData: a keyframe is damaged, of another profile, or its pose tilted against its grid by
 // more than 2 degrees; the message names it. Else errors are those of `read` and `progress`, which
-// is told of submaps.
+// is told of submaps, by the caller's thread.
 Status BuildSubmaps(MergeSession& session,
                     const std::vector<Pose>& T_world_sensor,
                     const BlobReader& read,
