@@ -7,7 +7,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$cmake" --install "$build" --prefix "$folder/prefix" >/dev/null
 "$cmake" --install "$build" --prefix "$folder/programs" --component programs >/dev/null
-[[ $(find "$folder/programs" -type f -printf '%P\n' | sort | xargs) == "bin/atlas bin/atlasd" ]]
+[[ $(find "$folder/programs" -type f -printf '%P\n' | sort | xargs) == "bin/atlas bin/atlas-merge bin/atlasd" ]]
 if grep -rlE '<boost/asio|\.pb\.h|google/protobuf|<openssl|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
   echo "public headers include what should stay behind the library"
   exit 1
