@@ -81,7 +81,7 @@ class Planner {
     const std::set<std::size_t> joined = JoinedParts();
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
       if (is_held_[i] || !joined.contains(parts_.part_of[i])) continue;
-      ATLAS_RETURN_IF_ERROR(Fuse(i, CorrectedPoses(sessions_[i], poses_.T_world_submap[i])));
+      ATLAS_RETURN_IF_ERROR(FuseAgain(i));
     }
     const SubmapPoses before = poses_.T_world_submap;
     ATLAS_RETURN_IF_ERROR(Link(before));
@@ -89,6 +89,19 @@ class Planner {
     auto again = search.MatchAgain(choice_.believed, before, Step("closures again"));
     if (!again) return again.error();
     return Settle(*again, &before);
+  }
+
+  // One that would have to be tilted too far keeps the submaps it has; LookAtEffect leaves it out.
+  Status FuseAgain(std::size_t i) {
+    MergeSession& session = sessions_[i];
+    const std::vector<Pose> corrected = CorrectedPoses(session, poses_.T_world_submap[i]);
+    std::vector<MergeSubmap> submaps = std::move(session.submaps);
+    std::vector<Pose> T_world_sensor = std::move(session.T_world_sensor);
+    Status status = Fuse(i, corrected);
+    if (status.code() != StatusCode::kInvalidData) return status;
+    session.submaps = std::move(submaps);
+    session.T_world_sensor = std::move(T_world_sensor);
+    return {};
   }
 
   ClosureSearch::Progress Step(std::string_view name) const {
