@@ -141,6 +141,8 @@ void AddNet(const NetFigures& net, Families& out) {
   AddGauge(out, "requests_in_flight", "Requests that were read and are not answered yet.",
            net.in_flight);
   AddGauge(out, "held_bytes", "Bytes of requests and parts of them that are held.", net.held_bytes);
+  AddGauge(out, "large_request_bytes",
+           "Bytes of large requests that are not whole or wait to be read.", net.part_bytes);
   AddCounter(out, "large_requests_closed_total",
              "Large requests that were not whole and had to go, for the room they took.",
              net.parts_closed);

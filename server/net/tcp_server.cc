@@ -136,6 +136,7 @@ class TcpServer::Impl {
     figures.refused = refused_.value();
     figures.held_bytes = limits_.held.taken_bytes();
     figures.queued_bytes = limits_.queued.taken_bytes();
+    figures.part_bytes = limits_.large.bytes();
     figures.parts_closed = limits_.large.closed();
     for (const auto& thread : threads_) {
       thread->counters().AddTo(figures);

@@ -45,6 +45,7 @@ class LargeParts {
   };
 
   std::size_t max_bytes() const { return max_bytes_; }
+  std::size_t bytes() const { return bytes_.load(); }
   // How many had to go, since the start.
   std::uint64_t closed() const { return closed_.load(); }
 

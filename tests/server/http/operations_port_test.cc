@@ -171,6 +171,7 @@ TEST_F(OperationsPortTest, CountersMoveByWhatWasDone) {
   EXPECT_EQ(metrics.at("roadatlas_requests_in_flight"), 0);
   EXPECT_EQ(metrics.at("roadatlas_held_bytes"), 0);
   EXPECT_EQ(metrics.at("roadatlas_queued_reply_bytes"), 0);
+  EXPECT_EQ(metrics.at("roadatlas_large_request_bytes"), 0);
   EXPECT_EQ(metrics.at("roadatlas_large_requests_closed_total"), 0);
   EXPECT_EQ(metrics.at("roadatlas_broken_frames_total"), 0);
   EXPECT_EQ(metrics.at("roadatlas_tls_handshakes_failed_total"), 0);

@@ -309,7 +309,7 @@ TEST_F(LimitTest, WhoeverStallsMakesRoomForWhoeverComes) {
   for (std::uint64_t i = 1; i <= 4; ++i) {
     peers.push_back(Connect());
     peers.back()->SendBytes(part);
-    ExpectHolds(i * part.size());
+    ExpectParts(i * part.size());
   }
   peers.push_back(Connect());
   peers.back()->SendBytes(part);

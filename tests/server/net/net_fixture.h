@@ -63,13 +63,16 @@ class NetTest : public ServiceTest {
   // Nothing is left of any request, a moment after the reply to the last one.
   void ExpectHoldsNothing() const { ExpectHolds(0); }
   // So much of requests is there, in a moment.
-  void ExpectHolds(std::uint64_t bytes) const {
+  void ExpectHolds(std::uint64_t bytes) const { ExpectFigure(&NetFigures::held_bytes, bytes); }
+  // So much of large requests that are not whole, and their deadlines are known.
+  void ExpectParts(std::uint64_t bytes) const { ExpectFigure(&NetFigures::part_bytes, bytes); }
+  void ExpectFigure(std::uint64_t NetFigures::*figure, std::uint64_t expected) const {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (server_->ReadFigures().held_bytes != bytes &&
+    while (server_->ReadFigures().*figure != expected &&
            std::chrono::steady_clock::now() < deadline) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    EXPECT_EQ(server_->ReadFigures().held_bytes, bytes);
+    EXPECT_EQ(server_->ReadFigures().*figure, expected);
   }
   // What was queued until nothing changes any more, and is then. A plan that takes long looks as if
   // nothing changed: with more than `expected` queued, it is waited for.
