@@ -70,6 +70,7 @@ MergePicture MergeRun::Picture() const {
 Result<MergeRun> RunMerge(SessionSource& source,
                           const std::vector<SessionKey>& wanted,
                           const MergeOptions& options,
+                          MergeWork& work,
                           const MergeProgress& progress) {
   Result<KeyframeSpool> spool = KeyframeSpool::Create();
   if (!spool) return Error(spool.error());
@@ -77,7 +78,7 @@ Result<MergeRun> RunMerge(SessionSource& source,
     return progress ? progress("keyframes", done, all) : Status();
   });
   if (!read) return Error(read.error());
-  auto plan = PlanMerge(read->sessions, read->readers, source.profile(), options, progress);
+  auto plan = PlanMerge(read->sessions, read->readers, {source.profile(), options, work}, progress);
   if (!plan) return Error(plan.error());
   return MergeRun{std::move(read->sessions), *std::move(plan), std::move(read->left_out),
                   read->revision};

@@ -10,6 +10,7 @@
 #include "client/merge/report/merge_picture.h"
 #include "client/merge/source/session_selection.h"
 #include "client/merge/source/session_source.h"
+#include "client/merge/work/merge_work.h"
 #include "core/base/status.h"
 
 namespace atlas {
@@ -33,6 +34,7 @@ struct MergeRun {
 Result<MergeRun> RunMerge(SessionSource& source,
                           const std::vector<SessionKey>& wanted,
                           const MergeOptions& options,
+                          MergeWork& work,
                           const MergeProgress& progress);
 
 // One step of the daemon's, all or nothing. kConflict: a session of the merge is not what it was

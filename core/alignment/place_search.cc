@@ -20,19 +20,19 @@ Pose PoseAt(const SubmapPlace& place, std::size_t turn, const SubmapPlace& of_se
 
 }  // namespace
 
-std::vector<SubmapCandidate> SearchPlaces(std::span<const Submap* const> submaps,
-                                          const Submap& searcher,
+std::vector<SubmapCandidate> SearchPlaces(std::span<const SubmapPlaces> submaps,
+                                          SubmapPlaces searcher,
                                           const std::function<bool(std::size_t)>& may_be,
                                           const PlaceSearchOptions& options) {
   std::vector<SubmapCandidate> candidates;
-  if (searcher.places().empty()) {
+  if (searcher.empty()) {
     return candidates;
   }
-  const SubmapPlace& here = searcher.places()[searcher.places().size() / 2];
+  const SubmapPlace& here = searcher[searcher.size() / 2];
   for (std::size_t i = 0; i < submaps.size(); ++i) {
     if (!may_be(i)) continue;
     SubmapCandidate best{i, Pose::Identity(), options.max_difference};
-    for (const SubmapPlace& place : submaps[i]->places()) {
+    for (const SubmapPlace& place : submaps[i]) {
       const auto differences = Differences(here.profile, place.profile);
       const auto least = std::min_element(differences.begin(), differences.end());
       if (*least >= best.difference) continue;

@@ -18,6 +18,8 @@ struct PlaceSearchOptions {
   std::uint32_t max_difference = 1'300;
 };
 
+using SubmapPlaces = std::span<const SubmapPlace>;  // of one
+
 // A submap among those searched, and where the searcher would lie in it.
 struct SubmapCandidate {
   std::size_t submap = 0;
@@ -27,8 +29,8 @@ struct SubmapCandidate {
 
 // The submaps that look most like the searcher's middle place, the likest first, each once. Only
 // those for which `may_be` holds are looked at.
-std::vector<SubmapCandidate> SearchPlaces(std::span<const Submap* const> submaps,
-                                          const Submap& searcher,
+std::vector<SubmapCandidate> SearchPlaces(std::span<const SubmapPlaces> submaps,
+                                          SubmapPlaces searcher,
                                           const std::function<bool(std::size_t)>& may_be,
                                           const PlaceSearchOptions& options);
 

@@ -31,8 +31,8 @@ Result<std::vector<PlacedKeyframe>> Placed(std::span<const SubmapMember> members
 
 }  // namespace
 
-Pose SubmapFrame(std::span<const SubmapMember> members, std::uint64_t number) {
-  const Pose& middle = members[members.size() / 2].T_world_sensor;
+Pose SubmapFrame(std::span<const Pose> T_world_sensor, std::uint64_t number) {
+  const Pose& middle = T_world_sensor[T_world_sensor.size() / 2];
   const YawAndLevel attitude = SplitYaw(Eigen::Quaterniond(middle.linear()));
   Pose T_world_submap = Pose::Identity();
   T_world_submap.translation() = middle.translation();
@@ -40,6 +40,14 @@ Pose SubmapFrame(std::span<const SubmapMember> members, std::uint64_t number) {
       Eigen::AngleAxisd(attitude.yaw_rad + GridYaw(number), Eigen::Vector3d::UnitZ())
           .toRotationMatrix();
   return T_world_submap;
+}
+
+Pose SubmapFrame(std::span<const SubmapMember> members, std::uint64_t number) {
+  std::vector<Pose> T_world_sensor;
+  for (const SubmapMember& member : members) {
+    T_world_sensor.push_back(member.T_world_sensor);
+  }
+  return SubmapFrame(T_world_sensor, number);
 }
 
 Result<Submap> Submap::Fuse(std::span<const SubmapMember> members,

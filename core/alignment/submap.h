@@ -43,8 +43,9 @@ struct SubmapPlace {
   RangeProfile profile;
 };
 
-// T_world_submap: upright at the sensor of the middle one of `members`, which are not empty, of two
-// the later one; turned from its heading by GridYaw(number).
+// T_world_submap: upright at the sensor of the middle one of the members, which are not none, of
+// two the later one; turned from its heading by GridYaw(number).
+Pose SubmapFrame(std::span<const Pose> T_world_sensor, std::uint64_t number);
 Pose SubmapFrame(std::span<const SubmapMember> members, std::uint64_t number);
 
 // Its tiles are kept encoded: decoded, those of a submap are megabytes.
@@ -59,6 +60,10 @@ class Submap {
                              std::uint64_t number,
                              const MapProfile& profile,
                              const SubmapOptions& options);
+
+  // For a file of this machine's, with a checksum, and back. kInvalidData: they are no submap's.
+  Bytes Encode() const;
+  static Result<Submap> Decode(ByteSpan bytes);
 
   // All in the submap's frame. kInvalidData: the profile is another one.
   Result<Tiles> DecodeTiles(const MapProfile& profile) const;

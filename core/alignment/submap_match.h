@@ -2,6 +2,7 @@
 // both have to come to the same answer.
 #pragma once
 
+#include <cstdint>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -16,6 +17,9 @@
 #include "core/localization/window/map_window.h"
 
 namespace atlas {
+
+// Raised when submaps or matches come out otherwise than before: what was kept is forgotten then.
+inline constexpr std::uint64_t kAlignmentRules = 1;
 
 struct MatchOptions {
   PlaceOptions window;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <numbers>
 #include <tuple>
@@ -39,16 +40,15 @@ SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions) {
 
 ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
                              const std::vector<SessionWay>& ways,
-                             const MapProfile& profile,
-                             const MergeOptions& options)
-    : sessions_(sessions), ways_(ways), options_(options) {
+                             const MergeContext& context)
+    : sessions_(sessions), ways_(ways), options_(context.options) {
   for (std::size_t session = 0; session < sessions.size(); ++session) {
     for (std::size_t submap = 0; submap < sessions[session].submaps.size(); ++submap) {
       all_.push_back({session, submap});
     }
   }
-  for (std::size_t worker = 0; worker < options.workers; ++worker) {
-    workers_.emplace_back(sessions, profile, options.match);
+  for (std::size_t worker = 0; worker < options_.workers; ++worker) {
+    workers_.emplace_back(sessions, context);
   }
 }
 
@@ -58,6 +58,7 @@ Result<std::vector<FoundClosure>> ClosureSearch::SearchAnywhere(const Progress& 
       LieNear(StoredPoses(sessions_), std::vector<std::size_t>(sessions_.size(), 0),
               {options_.near_m, options_.near_height_m, 1}, options_.reach);
   tasks.insert(tasks.end(), near.begin(), near.end());
+  DropAskedTwice(tasks);
   Result<std::vector<FoundClosure>> closures = Run(std::move(tasks), progress);
   if (closures) KeepLikeliest(*closures);
   return closures;
@@ -107,12 +108,25 @@ ClosureSearch::Task ClosureSearch::TaskOf(const SubmapRef& from,
   return from < to ? Task{from, to, T_from_to, reach} : Task{to, from, T_from_to.inverse(), reach};
 }
 
+// Of searches for one submap in another, as far around nearly the same start, the first stays.
+void ClosureSearch::DropAskedTwice(std::vector<Task>& tasks) {
+  std::map<std::pair<SubmapRef, SubmapRef>, std::vector<Task>> asked;
+  std::erase_if(tasks, [&](const Task& task) {
+    std::vector<Task>& others = asked[{task.a, task.b}];
+    const bool is_asked = std::any_of(others.begin(), others.end(), [&](const Task& other) {
+      return IsSameSearch(*other.reach, other.T_a_b, *task.reach, task.T_a_b);
+    });
+    if (!is_asked) others.push_back(task);
+    return is_asked;
+  });
+}
+
 std::vector<ClosureSearch::Task> ClosureSearch::LookAlike() const {
   // A place's own profile is right within a sector and a few metres.
   const SearchReach reach{2.0, 2.0, 4.0 * std::numbers::pi / 180.0};
-  std::vector<const Submap*> submaps;
+  std::vector<SubmapPlaces> submaps;
   for (const SubmapRef& ref : all_) {
-    submaps.push_back(&At(sessions_, ref).submap);
+    submaps.emplace_back(At(sessions_, ref).sketch.places);
   }
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < all_.size(); ++i) {
@@ -121,7 +135,7 @@ std::vector<ClosureSearch::Task> ClosureSearch::LookAlike() const {
       return MayMeet(all_[i], all_[other]);
     };
     for (const SubmapCandidate& candidate :
-         SearchPlaces(submaps, *submaps[i], may_be, options_.places)) {
+         SearchPlaces(submaps, submaps[i], may_be, options_.places)) {
       tasks.push_back(TaskOf(all_[candidate.submap], all_[i], candidate.T_submap_searcher, reach));
     }
   }

@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "client/merge/plan/match_worker.h"
-#include "client/merge/plan/merge_options.h"
+#include "client/merge/plan/merge_context.h"
 #include "client/merge/plan/merge_session.h"
 #include "core/alignment/closure_sets.h"
 #include "core/base/status.h"
-#include "core/geometry/map_profile.h"
 
 namespace atlas {
 
@@ -29,7 +28,7 @@ using SubmapPoses = std::vector<std::vector<Pose>>;
 SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions);
 
 // Its calls return closures that are believed one by one, rising, each pair once. Errors are those
-// of the submaps' tiles and of `progress`, which may be empty.
+// of the work and of `progress`, which may be empty.
 class ClosureSearch {
  public:
   // Of pairs; one call at a time, from any of the worker threads.
@@ -38,8 +37,7 @@ class ClosureSearch {
   // `sessions` and `ways` (of each session) outlive it.
   ClosureSearch(const std::vector<MergeSession>& sessions,
                 const std::vector<SessionWay>& ways,
-                const MapProfile& profile,
-                const MergeOptions& options);
+                const MergeContext& context);
 
   // By what places look like, and by where the stored poses have them, in frames that may have
   // nothing to do with each other.
@@ -74,6 +72,7 @@ class ClosureSearch {
                      const SubmapRef& to,
                      const Pose& T_from_to,
                      const std::optional<SearchReach>& reach);
+  static void DropAskedTwice(std::vector<Task>& tasks);
   std::vector<Task> LookAlike() const;
   std::vector<Task> LieNear(const SubmapPoses& T_world_submap,
                             const std::vector<std::size_t>& part_of,

@@ -22,13 +22,12 @@ class Planner {
  public:
   Planner(std::vector<MergeSession>& sessions,
           const std::vector<BlobReader>& readers,
-          const MapProfile& profile,
-          const MergeOptions& options,
+          const MergeContext& context,
           const MergeProgress& progress)
       : sessions_(sessions),
         readers_(readers),
-        profile_(profile),
-        options_(options),
+        context_(context),
+        options_(context.options),
         progress_(progress) {}
 
   Result<MergePlan> Plan() {
@@ -53,12 +52,12 @@ class Planner {
   }
 
   Status Fuse(std::size_t session, const std::vector<Pose>& T_world_sensor) {
-    return BuildSubmaps(sessions_[session], T_world_sensor, readers_[session], profile_, options_,
+    return BuildSubmaps(sessions_[session], T_world_sensor, readers_[session], context_,
                         Step("submaps"));
   }
 
   Status Search() {
-    ClosureSearch search(sessions_, ways_, profile_, options_);
+    ClosureSearch search(sessions_, ways_, context_);
     auto found = search.SearchAnywhere(Step("search"));
     if (!found) return found.error();
     ATLAS_RETURN_IF_ERROR(Settle(*found, nullptr));
@@ -85,7 +84,7 @@ class Planner {
     }
     const SubmapPoses before = poses_.T_world_submap;
     ATLAS_RETURN_IF_ERROR(Link(before));
-    ClosureSearch search(sessions_, ways_, profile_, options_);
+    ClosureSearch search(sessions_, ways_, context_);
     auto again = search.MatchAgain(choice_.believed, before, Step("closures again"));
     if (!again) return again.error();
     return Settle(*again, &before);
@@ -93,15 +92,9 @@ class Planner {
 
   // One that would have to be tilted too far keeps the submaps it has; LookAtEffect leaves it out.
   Status FuseAgain(std::size_t i) {
-    MergeSession& session = sessions_[i];
-    const std::vector<Pose> corrected = CorrectedPoses(session, poses_.T_world_submap[i]);
-    std::vector<MergeSubmap> submaps = std::move(session.submaps);
-    std::vector<Pose> T_world_sensor = std::move(session.T_world_sensor);
+    const std::vector<Pose> corrected = CorrectedPoses(sessions_[i], poses_.T_world_submap[i]);
     Status status = Fuse(i, corrected);
-    if (status.code() != StatusCode::kInvalidData) return status;
-    session.submaps = std::move(submaps);
-    session.T_world_sensor = std::move(T_world_sensor);
-    return {};
+    return status.code() == StatusCode::kInvalidData ? Status() : status;
   }
 
   ClosureSearch::Progress Step(std::string_view name) const {
@@ -114,7 +107,7 @@ class Planner {
     links_.assign(sessions_.size(), {});
     std::vector<MatchWorker> workers;
     for (std::size_t i = 0; i < options_.workers; ++i) {
-      workers.emplace_back(sessions_, profile_, options_.match);
+      workers.emplace_back(sessions_, context_);
     }
     std::mutex mutex;
     std::size_t done = 0;
@@ -209,7 +202,7 @@ class Planner {
   Status LookAtEffect(std::size_t session, SessionOutcome& outcome) {
     const bool is_published = outcome.is_joined && sessions_[session].is_staged;
     const Status status = AddTouchedTiles(sessions_[session], outcome.moved, is_published,
-                                          readers_[session], profile_, plan_.tiles);
+                                          readers_[session], context_.profile, plan_.tiles);
     if (status.code() != StatusCode::kInvalidData) return status;
     outcome.is_joined = false;
     outcome.moved.clear();
@@ -236,7 +229,7 @@ class Planner {
 
   std::vector<MergeSession>& sessions_;
   const std::vector<BlobReader>& readers_;
-  const MapProfile& profile_;
+  const MergeContext& context_;
   const MergeOptions& options_;
   const MergeProgress& progress_;
   std::vector<std::vector<SessionLink>> links_;
@@ -252,10 +245,9 @@ class Planner {
 
 Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const std::vector<BlobReader>& readers,
-                            const MapProfile& profile,
-                            const MergeOptions& options,
+                            const MergeContext& context,
                             const MergeProgress& progress) {
-  return Planner(sessions, readers, profile, options, progress).Plan();
+  return Planner(sessions, readers, context, progress).Plan();
 }
 
 }  // namespace atlas

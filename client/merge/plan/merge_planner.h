@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/merge/plan/closure_choice.h"
+#include "client/merge/plan/merge_context.h"
 #include "client/merge/plan/merge_effect.h"
-#include "client/merge/plan/merge_options.h"
 #include "client/merge/plan/merge_session.h"
 #include "client/merge/plan/session_links.h"
 #include "client/merge/plan/submap_builder.h"
@@ -58,8 +58,7 @@ struct MergePlan {
 // radius, and kInternal where no poses are found.
 Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const std::vector<BlobReader>& readers,
-                            const MapProfile& profile,
-                            const MergeOptions& options,
+                            const MergeContext& context,
                             const MergeProgress& progress);
 
 }  // namespace atlas

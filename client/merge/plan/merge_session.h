@@ -7,9 +7,9 @@
 
 #include <Eigen/Core>
 
+#include "client/merge/work/merge_work.h"
 #include "core/alignment/closure_sets.h"
 #include "core/alignment/session_cut.h"
-#include "core/alignment/submap.h"
 #include "core/geometry/keyframe_key.h"
 #include "core/geometry/pose.h"
 
@@ -25,12 +25,13 @@ struct MergeKeyframe {
   std::uint32_t sequence = 0;
   std::int64_t time_ms = 0;
   QuantizedPose T_world_sensor;  // as it is stored
-  std::optional<KeyframePrior> prior;
+  std::optional<KeyframePrior> prior = std::nullopt;
+  std::uint64_t blob_hash = 0;  // Hash64
 };
 
 struct MergeSubmap {
   SubmapCut cut;
-  Submap submap;
+  SubmapSketch sketch;                     // of the submap that MergeWork has
   Pose T_world_submap = Pose::Identity();  // as it was fused
 
   std::size_t middle() const { return cut.begin + (cut.end - cut.begin) / 2; }

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include "core/base/hash.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -70,8 +71,8 @@ class Reading {
           const auto number = spool_.Add(keyframe.blob);
           if (!number) return number.error();
           numbers->push_back(*number);
-          session.keyframes.push_back(
-              {keyframe.sequence, keyframe.time_ms, keyframe.T_world_sensor, PriorOf(keyframe)});
+          session.keyframes.push_back({keyframe.sequence, keyframe.time_ms, keyframe.T_world_sensor,
+                                       PriorOf(keyframe), Hash64(keyframe.blob)});
           return {};
         });
     if (!reading) return reading.error();

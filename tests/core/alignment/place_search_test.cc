@@ -37,9 +37,9 @@ class StreetSubmaps {
     }
   }
 
-  std::vector<const Submap*> all() const {
-    std::vector<const Submap*> all;
-    for (const Submap& submap : submaps_) all.push_back(&submap);
+  std::vector<SubmapPlaces> all() const {
+    std::vector<SubmapPlaces> all;
+    for (const Submap& submap : submaps_) all.emplace_back(submap.places());
     return all;
   }
   const Submap& operator[](std::size_t i) const { return submaps_[i]; }
@@ -68,7 +68,7 @@ class PlaceSearchTest : public ::testing::Test {
 
   static std::vector<SubmapCandidate> Search(const std::function<bool(std::size_t)>& may_be,
                                              const PlaceSearchOptions& options = {}) {
-    return SearchPlaces(street_->all(), (*again_)[0], may_be, options);
+    return SearchPlaces(street_->all(), (*again_)[0].places(), may_be, options);
   }
 
   inline static std::unique_ptr<StreetSubmaps> street_;
@@ -137,7 +137,7 @@ TEST_F(PlaceSearchTest, KeepsToItsLimits) {
 
 TEST_F(PlaceSearchTest, ItselfIsTheLikestOfAllAndNotTurned) {
   for (std::size_t i = 0; i < 5; ++i) {
-    const auto candidates = SearchPlaces(street_->all(), (*street_)[i], Any, {});
+    const auto candidates = SearchPlaces(street_->all(), (*street_)[i].places(), Any, {});
     ASSERT_FALSE(candidates.empty());
     EXPECT_EQ(candidates[0].submap, i);
     EXPECT_EQ(candidates[0].difference, 0U);
@@ -146,7 +146,7 @@ TEST_F(PlaceSearchTest, ItselfIsTheLikestOfAllAndNotTurned) {
 }
 
 TEST_F(PlaceSearchTest, NothingIsFoundInNothing) {
-  EXPECT_TRUE(SearchPlaces({}, (*again_)[0], Any, {}).empty());
+  EXPECT_TRUE(SearchPlaces({}, (*again_)[0].places(), Any, {}).empty());
 }
 
 }  // namespace

@@ -40,6 +40,8 @@ class Progress {
   std::optional<ProgressBar> bar_;
 };
 
+constexpr std::uint64_t kMaxWorkBytes = 16ULL << 30U;
+
 class MergeRunCommand : public Command {
  public:
   std::string Name() const override { return "run"; }
@@ -56,6 +58,9 @@ class MergeRunCommand : public Command {
     arguments.Optional("--picture", "FILE.png", picture_, "Draw the ways before and after");
     arguments.Optional("--corrections", "FILE", corrections_,
                        "Write the corrected poses as `atlas poses apply` reads them");
+    arguments.Optional("--work", "DIR", work_,
+                       "Keep what was found there: the next merge, and one that was ended, are "
+                       "done with what is new [nothing is kept]");
     author_.Declare(arguments);
   }
 
@@ -84,10 +89,13 @@ class MergeRunCommand : public Command {
                const std::string& author,
                CommandContext& context) {
     constexpr int kAttempts = 3;
+    Result<MergeWork> work =
+        work_ ? MergeWork::Open(*work_, kAlignmentRules, kMaxWorkBytes) : MergeWork::Temporary();
+    if (!work) return work.error();
     const bool is_applied = client != nullptr && !is_dry_run_;
     Progress progress(context);
     for (int attempt = 1;; ++attempt) {
-      const auto run = RunMerge(source, wanted_, options_, std::ref(progress));
+      const auto run = RunMerge(source, wanted_, options_, *work, std::ref(progress));
       progress.Wipe();
       if (!run) return run.error();
       ATLAS_RETURN_IF_ERROR(WriteFiles(*run));
@@ -144,6 +152,7 @@ class MergeRunCommand : public Command {
   bool is_dry_run_ = false;
   std::optional<std::string> picture_;
   std::optional<std::string> corrections_;
+  std::optional<std::string> work_;
   AuthorFlag author_;
   MergeOptions options_;
 };

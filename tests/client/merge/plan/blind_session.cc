@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/merge/plan/submap_builder.h"
+#include "core/base/hash.h"
 #include "core/keyframe/keyframe_codec.h"
 #include "tests/core/support/keyframe_worlds.h"
 
@@ -24,6 +25,11 @@ std::vector<Pose> Straight(const Pose& start, std::size_t count, double step_m) 
   return poses;
 }
 
+MergeWork& SharedWork() {
+  static MergeWork work = MergeWork::Temporary().value();
+  return work;
+}
+
 MergeSession BlindSession(const std::string& vehicle,
                           const std::vector<Pose>& T_world_sensor,
                           const MergeOptions& options) {
@@ -36,9 +42,10 @@ MergeSession BlindSession(const std::string& vehicle,
   }
   const MapProfile profile;
   const Bytes blob = EncodeKeyframe(BlankKeyframe(profile, 4));
+  for (MergeKeyframe& keyframe : session.keyframes) keyframe.blob_hash = Hash64(blob);
   const Status built = BuildSubmaps(
-      session, StoredPoses(session), [&](std::size_t) -> Result<Bytes> { return blob; }, profile,
-      options, nullptr);
+      session, StoredPoses(session), [&](std::size_t) -> Result<Bytes> { return blob; },
+      {profile, options, SharedWork()}, nullptr);
   if (!built.ok()) throw std::runtime_error(built.message());
   return session;
 }

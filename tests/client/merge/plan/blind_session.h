@@ -10,6 +10,9 @@
 
 namespace atlas::testing {
 
+// One for all of a test program, where nothing is asked of it twice with another answer.
+MergeWork& SharedWork();
+
 // Upright.
 Pose At(double x_m, double y_m = 0.0, double z_m = 0.0, double yaw_rad = 0.0);
 

@@ -29,7 +29,7 @@ class ClosureSearchTest : public ::testing::Test {
   ClosureSearch Make() {
     ways_.clear();
     for (const MergeSession& session : sessions_) ways_.push_back(WayOf(session, {}));
-    return {sessions_, ways_, profile_, options_};
+    return {sessions_, ways_, {profile_, options_, testing::SharedWork()}};
   }
 
   // Pairs that are looked at.
@@ -145,9 +145,9 @@ class StreetSearchTest : public ClosureSearchTest {
     for (const auto* drive : {&one_, other_.get()}) {
       sessions_.push_back(drive->session());
       MergeSession& session = sessions_.back();
-      ASSERT_TRUE(
-          BuildSubmaps(session, StoredPoses(session), drive->reader(), profile_, options_, nullptr)
-              .ok());
+      ASSERT_TRUE(BuildSubmaps(session, StoredPoses(session), drive->reader(),
+                               {profile_, options_, testing::SharedWork()}, nullptr)
+                      .ok());
     }
     ASSERT_EQ(sessions_[0].submaps.size(), 1U);
   }

@@ -22,7 +22,7 @@ class MergeGraphTest : public ::testing::Test {
                   BlindSession("two", Straight(At(0.0, 4.0), 50))},
         is_held_(2, false) {
     const MapProfile profile;
-    MatchWorker worker(sessions_, profile, options_.match);
+    MatchWorker worker(sessions_, {profile, options_, testing::SharedWork()});
     for (const std::size_t i : {0U, 1U}) {
       links_.push_back(
           LinkSession(i, sessions_, StoredPoses(sessions_)[i], options_, worker).value());

@@ -37,7 +37,7 @@ class Merge {
   }
 
   Result<MergePlan> Plan(const MergeProgress& progress = nullptr) {
-    return PlanMerge(sessions_, readers_, MapProfile(), options_, progress);
+    return PlanMerge(sessions_, readers_, {MapProfile(), options_, work_}, progress);
   }
   void MustPlan(const MergeProgress& progress = nullptr) {
     auto plan = Plan(progress);
@@ -131,6 +131,7 @@ class Merge {
   std::vector<MergeSession> sessions_;
   std::vector<BlobReader> readers_;
   MergeOptions options_;
+  MergeWork work_ = MergeWork::Temporary().value();
   MergePlan plan_;
 };
 
@@ -296,7 +297,8 @@ TEST(EmptyMergeTest, SessionsWithoutKeyframesAreNoMatter) {
     const auto none = [](std::size_t) -> Result<Bytes> {
       return Bytes();
     };
-    const auto plan = PlanMerge(sessions, {none, none}, MapProfile(), {}, nullptr);
+    const auto plan = PlanMerge(sessions, {none, none},
+                                {MapProfile(), MergeOptions(), testing::SharedWork()}, nullptr);
     ASSERT_TRUE(plan.has_value());
     for (const SessionOutcome& outcome : plan->sessions) {
       EXPECT_TRUE(outcome.moved.empty());

@@ -25,7 +25,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 std::vector<SessionLink> Links(const std::vector<MergeSession>& sessions,
                                const MergeOptions& options = {}) {
   const MapProfile profile;
-  MatchWorker worker(sessions, profile, options.match);
+  MatchWorker worker(sessions, {profile, options, testing::SharedWork()});
   return LinkSession(0, sessions, StoredPoses(sessions)[0], options, worker).value();
 }
 
@@ -67,8 +67,8 @@ TEST(SessionLinksTest, NothingIsMatchedOverAJump) {
     options.cut.jump_m = jump_m;
     options.cut.length_m = 1.5;
     std::vector<MergeSession> sessions{street.session()};
-    ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(), MapProfile(),
-                             options, nullptr)
+    ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(),
+                             {MapProfile(), options, testing::SharedWork()}, nullptr)
                     .ok());
     ASSERT_GT(sessions[0].submaps.size(), 2U);
     EXPECT_EQ(Links(sessions, options).empty(), jump_m < 1.25);
@@ -118,8 +118,8 @@ TEST(SessionLinksTest, OnAStreetMatchesAreBetterThanOdometry) {
   const testing::SimulatedSession street(
       "car", {.first = 40, .count = 48, .drift = DriftOptions{.seed = 3}});
   std::vector<MergeSession> sessions{street.session()};
-  ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(), MapProfile(), {},
-                           nullptr)
+  ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(),
+                           {MapProfile(), MergeOptions(), testing::SharedWork()}, nullptr)
                   .ok());
   std::array<double, 2> squares_m2{};  // of odometry, of matches
   std::array<std::size_t, 2> links{};

@@ -1,5 +1,6 @@
 #include "tests/client/merge/plan/simulated_session.h"
 
+#include "core/base/hash.h"
 #include "core/keyframe/keyframe_codec.h"
 
 namespace atlas::testing {
@@ -12,10 +13,10 @@ SimulatedSession::SimulatedSession(const std::string& vehicle,
   truth_ = driven.truth;
   for (std::size_t i = 0; i < driven.keyframes.size(); ++i) {
     const auto sequence = static_cast<std::uint32_t>(piece.first + i);
+    blobs_->push_back(EncodeKeyframe(*driven.keyframes[i]));
     session_.keyframes.push_back({sequence, 250 * static_cast<std::int64_t>(sequence),
                                   QuantizedPose::FromPose(T_frame_world * driven.T_world_sensor[i]),
-                                  std::nullopt});
-    blobs_->push_back(EncodeKeyframe(*driven.keyframes[i]));
+                                  std::nullopt, Hash64(blobs_->back())});
   }
 }
 

@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
 
+#include "core/base/hash.h"
 #include "core/keyframe/keyframe_codec.h"
 #include "tests/client/merge/plan/blind_session.h"
 #include "tests/core/support/keyframe_worlds.h"
@@ -25,13 +27,20 @@ class SubmapBuilderTest : public ::testing::Test {
       session_.keyframes[i].sequence = static_cast<std::uint32_t>(100 + 2 * i);
       blobs_.push_back(
           EncodeKeyframe(testing::StreetKeyframe(profile_, 30, static_cast<std::uint32_t>(i))));
+      session_.keyframes[i].blob_hash = Hash64(blobs_.back());
     }
   }
 
-  Status Build(MergeSession& session) const {
+  MergeContext Context() { return {profile_, options_, work_}; }
+
+  Status Build(MergeSession& session) {
     return BuildSubmaps(
         session, StoredPoses(session), [&](std::size_t i) -> Result<Bytes> { return blobs_[i]; },
-        profile_, options_, nullptr);
+        Context(), nullptr);
+  }
+
+  Submap::Tiles TilesOf(const MergeSession& session, std::size_t i) const {
+    return work_.LoadSubmap(session.submaps[i].sketch.name).value().DecodeTiles(profile_).value();
   }
 
   void ExpectInvalid(const std::string& name) {
@@ -44,6 +53,7 @@ class SubmapBuilderTest : public ::testing::Test {
   MergeOptions options_;
   MergeSession session_;
   std::vector<Bytes> blobs_;
+  MergeWork work_ = MergeWork::Temporary().value();
 };
 
 TEST_F(SubmapBuilderTest, EachKeyframeIsReadOnceInOrderByTheCaller) {
@@ -59,7 +69,7 @@ TEST_F(SubmapBuilderTest, EachKeyframeIsReadOnceInOrderByTheCaller) {
         read.push_back(i);
         return blobs_[i];
       },
-      profile_, options_,
+      Context(),
       [&](std::size_t submaps, std::size_t all) {
         EXPECT_EQ(all, 10U);
         done.push_back(submaps);
@@ -77,14 +87,16 @@ TEST_F(SubmapBuilderTest, SubmapsAreTheSameFromAnyNumberOfWorkers) {
   options_.workers = 1;
   ASSERT_TRUE(Build(session_).ok());
   options_.workers = 3;
+  const MergeWork first = std::exchange(work_, MergeWork::Temporary().value());
   ASSERT_TRUE(Build(other).ok());
   ASSERT_EQ(other.submaps.size(), session_.submaps.size());
   for (std::size_t i = 0; i < other.submaps.size(); ++i) {
     EXPECT_EQ(other.submaps[i].cut, session_.submaps[i].cut);
     EXPECT_EQ(other.submaps[i].T_world_submap.matrix(),
               session_.submaps[i].T_world_submap.matrix());
-    const auto tiles = session_.submaps[i].submap.DecodeTiles(profile_).value();
-    const auto others = other.submaps[i].submap.DecodeTiles(profile_).value();
+    const auto tiles =
+        first.LoadSubmap(session_.submaps[i].sketch.name).value().DecodeTiles(profile_).value();
+    const auto others = TilesOf(other, i);
     ASSERT_FALSE(tiles.empty());
     ASSERT_EQ(tiles.size(), others.size());
     for (std::size_t k = 0; k < tiles.size(); ++k) EXPECT_EQ(*tiles[k], *others[k]);
@@ -112,7 +124,7 @@ TEST_F(SubmapBuilderTest, TheCutIsThatOfTheStoredPoses) {
   const std::vector<Pose> longer = Straight(At(0.0), 31, 2.0);
   ASSERT_TRUE(BuildSubmaps(
                   session_, longer, [&](std::size_t i) -> Result<Bytes> { return blobs_[i]; },
-                  profile_, options_, nullptr)
+                  Context(), nullptr)
                   .ok());
   ASSERT_EQ(session_.submaps.size(), cuts.size());
   for (std::size_t i = 0; i < cuts.size(); ++i) {
@@ -131,6 +143,11 @@ TEST_F(SubmapBuilderTest, ADamagedKeyframeIsNamed) {
   ExpectInvalid("car/drive/134");
 }
 
+TEST_F(SubmapBuilderTest, AnotherKeyframeThanItsHashSaysIsNamed) {
+  blobs_[17] = blobs_[18];
+  ExpectInvalid("car/drive/134");
+}
+
 TEST_F(SubmapBuilderTest, ATruncatedKeyframeIsNamed) {
   blobs_[3].resize(10);
   ExpectInvalid("car/drive/106");
@@ -140,6 +157,7 @@ TEST_F(SubmapBuilderTest, AKeyframeOfAnotherProfileIsNamed) {
   MapProfile other = profile_;
   other.hit_units = 26;
   blobs_[8] = EncodeKeyframe(testing::StreetKeyframe(other, 30, 8));
+  session_.keyframes[8].blob_hash = Hash64(blobs_[8]);
   ExpectInvalid("car/drive/116");
 }
 
@@ -163,12 +181,11 @@ TEST_F(SubmapBuilderTest, ErrorsOfTheReaderAndOfProgressEndIt) {
         if (i == 20) return Error(StatusCode::kUnavailable, "gone");
         return blobs_[i];
       },
-      profile_, options_, nullptr);
+      Context(), nullptr);
   EXPECT_EQ(of_reader, Status(StatusCode::kUnavailable, "gone"));
   const Status of_progress = BuildSubmaps(
       session_, StoredPoses(session_), [&](std::size_t i) -> Result<Bytes> { return blobs_[i]; },
-      profile_, options_,
-      [](std::size_t, std::size_t) { return Status(StatusCode::kTimeout, "enough"); });
+      Context(), [](std::size_t, std::size_t) { return Status(StatusCode::kTimeout, "enough"); });
   EXPECT_EQ(of_progress, Status(StatusCode::kTimeout, "enough"));
 }
 

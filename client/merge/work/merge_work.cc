@@ -1,0 +1,309 @@
+#include "client/merge/work/merge_work.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <numbers>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "client/merge/work/work_log.h"
+#include "client/vehicle/folder_lock.h"
+#include "client/vehicle/stored_file.h"
+#include "core/base/disk_error.h"
+#include "core/base/hash.h"
+#include "core/base/str_cat.h"
+
+namespace atlas {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMaxSubmapBytes = 256U << 20U;
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr std::string_view kSuffix = ".submap";
+
+struct Nearness {
+  double metres;
+  double rad;
+};
+constexpr Nearness kSameShape{0.002, 0.02 * kDegree};
+constexpr Nearness kSameMatch{0.25, 1.5 * kDegree};
+constexpr Nearness kSameSearch{0.5, 2.0 * kDegree};
+
+bool IsNear(const Pose& one, const Pose& other, const Nearness& nearness) {
+  return (one.translation() - other.translation()).norm() <= nearness.metres &&
+         Eigen::Quaterniond(one.linear()).angularDistance(Eigen::Quaterniond(other.linear())) <=
+             nearness.rad;
+}
+
+bool IsNear(std::span<const Pose> one, std::span<const Pose> other, const Nearness& nearness) {
+  return std::equal(one.begin(), one.end(), other.begin(), other.end(),
+                    [&](const Pose& a, const Pose& b) { return IsNear(a, b, nearness); });
+}
+
+std::string Hex(std::uint64_t value) {
+  std::array<char, 16> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value, 16).ptr;
+  return {digits.data(), end};
+}
+
+std::uint64_t ShapeOf(std::span<const Pose> T_submap_member) {
+  Hash64Stream hash;
+  for (const Pose& pose : T_submap_member) {
+    hash.Add({reinterpret_cast<const std::uint8_t*>(pose.data()), 16 * sizeof(double)});
+  }
+  return hash.value();
+}
+
+Result<fs::path> MakeTemporaryFolder() {
+  std::error_code error;
+  std::string name = (fs::temp_directory_path(error) / "atlas-merge.XXXXXX").string();
+  if (error) return Error(DiskError("cannot find", "the temporary folder", error.value()));
+  if (mkdtemp(name.data()) == nullptr) return Error(DiskError("cannot make folder", name, errno));
+  return fs::path(name);
+}
+
+}  // namespace
+
+bool IsSameSearch(const SearchReach& one,
+                  const Pose& T_a_b_one,
+                  const SearchReach& other,
+                  const Pose& T_a_b_other) {
+  return one.along_m == other.along_m && one.beside_m == other.beside_m &&
+         one.yaw_rad == other.yaw_rad && one.direction_rad == other.direction_rad &&
+         IsNear(T_a_b_one, T_a_b_other, kSameSearch);
+}
+
+struct MergeWork::Folder {
+  fs::path path;
+  bool is_temporary = false;
+  std::optional<FolderLock> lock = std::nullopt;
+  std::mutex mutex = {};
+  std::optional<WorkLog> log = std::nullopt;
+  std::map<std::uint64_t, std::vector<SubmapRecord>> submaps = {};
+  std::map<std::pair<SubmapName, SubmapName>, std::vector<MatchRecord>> matches = {};
+  std::map<std::pair<std::uint64_t, std::uint64_t>, std::vector<SearchRecord>> searches = {};
+
+  fs::path PathOf(const SubmapName& name) const {
+    return path / StrCat(Hex(name.content), "-", Hex(name.shape), kSuffix);
+  }
+
+  void Learn(const SubmapRecord& record) { submaps[record.name.content].push_back(record); }
+  void Learn(const MatchRecord& record) { matches[{record.a, record.b}].push_back(record); }
+  void Learn(const SearchRecord& record) { searches[{record.a, record.b}].push_back(record); }
+
+  Status Keep(const WorkRecord& record) {
+    const std::lock_guard guard(mutex);
+    std::visit([this](const auto& one) { Learn(one); }, record);
+    return log->Append(EncodeRecord(record));
+  }
+
+  Status Open(std::uint64_t rules, std::uint64_t max_bytes);
+  Result<std::set<fs::path>> Tidy(const std::set<fs::path>& known, std::uint64_t max_bytes) const;
+};
+
+// The submaps' files that are there: of those that are `known` the latest ones; others are removed.
+Result<std::set<fs::path>> MergeWork::Folder::Tidy(const std::set<fs::path>& known,
+                                                   std::uint64_t max_bytes) const {
+  struct File {
+    fs::file_time_type used;
+    fs::path path;
+    std::uint64_t bytes;
+  };
+  std::vector<File> files;
+  std::error_code error;
+  fs::directory_iterator entry(path, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    std::error_code gone;
+    if (entry->path().extension() != kSuffix && entry->path().extension() != kPartialSuffix) {
+      continue;
+    }
+    files.push_back({entry->last_write_time(gone), entry->path(), entry->file_size(gone)});
+  }
+  if (error) return Error(DiskError("cannot read", path, error.value()));
+  std::sort(files.begin(), files.end(),
+            [](const File& one, const File& other) { return one.used > other.used; });
+  std::set<fs::path> kept;
+  std::uint64_t bytes = 0;
+  for (const File& file : files) {
+    bytes += file.bytes;
+    if (known.contains(file.path) && bytes <= max_bytes) {
+      kept.insert(file.path);
+    } else if (!fs::remove(file.path, error) && error) {
+      return Error(DiskError("cannot remove", file.path, error.value()));
+    }
+  }
+  return kept;
+}
+
+// Records of submaps whose files are gone are forgotten, and what was found with them.
+Status MergeWork::Folder::Open(std::uint64_t rules, std::uint64_t max_bytes) {
+  const fs::path file = path / StrCat("found-", Hex(rules), ".log");
+  std::vector<WorkRecord> records;
+  std::set<fs::path> known;
+  auto opened = WorkLog::Open(file, [&](ByteSpan bytes) {
+    auto record = DecodeRecord(bytes);
+    if (!record) return false;
+    if (const auto* submap = std::get_if<SubmapRecord>(&*record)) {
+      known.insert(PathOf(submap->name));
+    }
+    records.push_back(*std::move(record));
+    return true;
+  });
+  if (!opened) return opened.error();
+  const auto kept = Tidy(known, max_bytes);
+  if (!kept) return kept.error();
+  std::set<SubmapName> names;
+  std::set<std::uint64_t> contents;
+  for (const WorkRecord& record : records) {
+    const auto* submap = std::get_if<SubmapRecord>(&record);
+    if (submap == nullptr || !kept->contains(PathOf(submap->name))) continue;
+    names.insert(submap->name);
+    contents.insert(submap->name.content);
+  }
+  const auto is_of_use = [&](const WorkRecord& record) {
+    if (const auto* submap = std::get_if<SubmapRecord>(&record))
+      return names.contains(submap->name);
+    if (const auto* match = std::get_if<MatchRecord>(&record)) {
+      return names.contains(match->a) && names.contains(match->b);
+    }
+    const auto& search = std::get<SearchRecord>(record);
+    return contents.contains(search.a) && contents.contains(search.b);
+  };
+  const auto forgotten =
+      std::erase_if(records, [&](const WorkRecord& record) { return !is_of_use(record); });
+  for (const WorkRecord& record : records) {
+    std::visit([this](const auto& one) { Learn(one); }, record);
+  }
+  log = *std::move(opened);
+  if (forgotten <= records.size()) return {};
+  // Mostly what is forgotten: written anew.
+  log.reset();
+  std::error_code error;
+  if (!fs::remove(file, error) && error) return DiskError("cannot remove", file, error.value());
+  opened = WorkLog::Open(file, [](ByteSpan) { return true; });
+  if (!opened) return opened.error();
+  log = *std::move(opened);
+  for (const WorkRecord& record : records) {
+    ATLAS_RETURN_IF_ERROR(log->Append(EncodeRecord(record)));
+  }
+  return {};
+}
+
+MergeWork::MergeWork(std::unique_ptr<Folder> folder) : folder_(std::move(folder)) {}
+MergeWork::MergeWork(MergeWork&&) noexcept = default;
+MergeWork& MergeWork::operator=(MergeWork&&) noexcept = default;
+
+MergeWork::~MergeWork() {
+  if (folder_ == nullptr || !folder_->is_temporary) return;
+  const fs::path path = folder_->path;
+  folder_.reset();
+  std::error_code ignored;  // the system removes it some day
+  fs::remove_all(path, ignored);
+}
+
+Result<MergeWork> MergeWork::Open(const fs::path& folder,
+                                  std::uint64_t rules,
+                                  std::uint64_t max_bytes) {
+  if (Status status = MakeFolder(folder); !status.ok()) return Error(std::move(status));
+  Result<FolderLock> lock = FolderLock::Take(folder);
+  if (!lock) return Error(lock.error());
+  auto opened = std::make_unique<Folder>();
+  opened->path = folder;
+  opened->lock = *std::move(lock);
+  if (Status status = opened->Open(rules, max_bytes); !status.ok()) return Error(std::move(status));
+  return MergeWork(std::move(opened));
+}
+
+Result<MergeWork> MergeWork::Temporary() {
+  const auto path = MakeTemporaryFolder();
+  if (!path) return Error(path.error());
+  auto folder = std::make_unique<Folder>();
+  folder->path = *path;
+  folder->is_temporary = true;
+  MergeWork work(std::move(folder));
+  if (Status status = work.folder_->Open(0, 0); !status.ok()) return Error(std::move(status));
+  return work;
+}
+
+std::optional<SubmapSketch> MergeWork::FindSubmap(std::uint64_t content,
+                                                  std::span<const Pose> T_submap_member) const {
+  const std::lock_guard guard(folder_->mutex);
+  const auto found = folder_->submaps.find(content);
+  if (found == folder_->submaps.end()) return std::nullopt;
+  for (const SubmapRecord& record : found->second) {
+    if (!IsNear(record.T_submap_member, T_submap_member, kSameShape)) continue;
+    // It was asked for: others go before it.
+    std::error_code is_gone;
+    fs::last_write_time(folder_->PathOf(record.name), fs::file_time_type::clock::now(), is_gone);
+    if (is_gone) continue;
+    return SubmapSketch{record.name, record.places};
+  }
+  return std::nullopt;
+}
+
+Result<SubmapSketch> MergeWork::KeepSubmap(std::uint64_t content,
+                                           std::span<const Pose> T_submap_member,
+                                           const Submap& submap) {
+  SubmapRecord record{{content, ShapeOf(T_submap_member)},
+                      {T_submap_member.begin(), T_submap_member.end()},
+                      submap.places()};
+  Status status = StoreFile(folder_->PathOf(record.name), submap.Encode(), Durability::kWhole);
+  if (status.ok()) status = folder_->Keep(record);
+  if (!status.ok()) return Error(std::move(status));
+  return SubmapSketch{record.name, std::move(record.places)};
+}
+
+Result<Submap> MergeWork::LoadSubmap(const SubmapName& name) const {
+  const fs::path path = folder_->PathOf(name);
+  const auto bytes = LoadFile(path, kMaxSubmapBytes);
+  if (!bytes) return Error(bytes.error());
+  Result<Submap> submap = Submap::Decode(*bytes);
+  if (submap) return submap;
+  std::error_code ignored;  // then it is damaged the next time, too
+  fs::remove(path, ignored);
+  return Error(submap.error().WithContext(path.string()));
+}
+
+std::optional<SubmapMatch> MergeWork::FindMatch(const SubmapName& a,
+                                                const SubmapName& b,
+                                                const Pose& T_a_b_start) const {
+  const std::lock_guard guard(folder_->mutex);
+  const auto found = folder_->matches.find({a, b});
+  if (found == folder_->matches.end()) return std::nullopt;
+  for (const MatchRecord& record : found->second) {
+    if (IsNear(record.T_a_b_start, T_a_b_start, kSameMatch)) return record.match;
+  }
+  return std::nullopt;
+}
+
+Status MergeWork::KeepMatch(const MatchRecord& match) {
+  return folder_->Keep(match);
+}
+
+std::optional<SearchRecord> MergeWork::FindSearch(std::uint64_t a,
+                                                  std::uint64_t b,
+                                                  const Pose& T_a_b_start,
+                                                  const SearchReach& reach) const {
+  const std::lock_guard guard(folder_->mutex);
+  const auto found = folder_->searches.find({a, b});
+  if (found == folder_->searches.end()) return std::nullopt;
+  for (const SearchRecord& record : found->second) {
+    if (IsSameSearch(record.reach, record.T_a_b_start, reach, T_a_b_start)) return record;
+  }
+  return std::nullopt;
+}
+
+Status MergeWork::KeepSearch(const SearchRecord& search) {
+  return folder_->Keep(search);
+}
+
+}  // namespace atlas
