@@ -54,10 +54,14 @@ ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
 
 Result<std::vector<FoundClosure>> ClosureSearch::SearchAnywhere(const Progress& progress) {
   std::vector<Task> tasks = LookAlike();
-  const std::vector<Task> near =
-      LieNear(StoredPoses(sessions_), std::vector<std::size_t>(sessions_.size(), 0),
-              {options_.near_m, options_.near_height_m, 1}, options_.reach);
-  tasks.insert(tasks.end(), near.begin(), near.end());
+  for (Task& near : LieNear(StoredPoses(sessions_), std::vector<std::size_t>(sessions_.size(), 0),
+                            {options_.near_m, options_.near_height_m, 1}, options_.reach)) {
+    // What is in the map is where it should be, or is found as others are.
+    if (!sessions_[near.a.session].is_staged && !sessions_[near.b.session].is_staged) {
+      near.reach.reset();
+    }
+    tasks.push_back(near);
+  }
   DropAskedTwice(tasks);
   Result<std::vector<FoundClosure>> closures = Run(std::move(tasks), progress);
   if (closures) KeepLikeliest(*closures);
@@ -112,6 +116,7 @@ ClosureSearch::Task ClosureSearch::TaskOf(const SubmapRef& from,
 void ClosureSearch::DropAskedTwice(std::vector<Task>& tasks) {
   std::map<std::pair<SubmapRef, SubmapRef>, std::vector<Task>> asked;
   std::erase_if(tasks, [&](const Task& task) {
+    if (!task.reach) return false;
     std::vector<Task>& others = asked[{task.a, task.b}];
     const bool is_asked = std::any_of(others.begin(), others.end(), [&](const Task& other) {
       return IsSameSearch(*other.reach, other.T_a_b, *task.reach, task.T_a_b);

@@ -34,7 +34,7 @@ struct Nearness {
   double metres;
   double rad;
 };
-constexpr Nearness kSameShape{0.002, 0.02 * kDegree};
+constexpr Nearness kSameShape{0.005, 0.06 * kDegree};
 constexpr Nearness kSameMatch{0.25, 1.5 * kDegree};
 constexpr Nearness kSameSearch{0.5, 2.0 * kDegree};
 

@@ -46,7 +46,7 @@ class MergeWork {
   MergeWork& operator=(const MergeWork&) = delete;
   ~MergeWork();
 
-  // Of this content with its members at `T_submap_member`, or so nearly (2 mm, 0.02 degrees) that
+  // Of this content with its members at `T_submap_member`, or so nearly (5 mm, 0.06 degrees) that
   // it does not matter.
   std::optional<SubmapSketch> FindSubmap(std::uint64_t content,
                                          std::span<const Pose> T_submap_member) const;

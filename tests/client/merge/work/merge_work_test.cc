@@ -121,11 +121,11 @@ TEST_F(MergeWorkTest, OnlyItsContentAndItsShapeFindIt) {
   Keep(5);
   EXPECT_FALSE(work_->FindSubmap(6, shape_).has_value());
   EXPECT_FALSE(work_->FindSubmap(5, std::vector<Pose>{At(-1.0), At(0.0)}).has_value());
-  shape_[2] = At(1.0019, 0.019 * kDegree);
+  shape_[2] = At(1.0049, 0.059 * kDegree);
   EXPECT_TRUE(work_->FindSubmap(5, shape_).has_value());
-  shape_[2] = At(1.0021);
+  shape_[2] = At(1.0051);
   EXPECT_FALSE(work_->FindSubmap(5, shape_).has_value());
-  shape_[2] = At(1.0, 0.021 * kDegree);
+  shape_[2] = At(1.0, 0.061 * kDegree);
   EXPECT_FALSE(work_->FindSubmap(5, shape_).has_value());
   const SubmapName other = Keep(5);
   EXPECT_EQ(work_->FindSubmap(5, shape_)->name, other);
