@@ -1,128 +1,26 @@
 """Merging: sessions of one simulated city, and of one garage, each with a drift of its own, uploaded staged, merged by
-`atlas-merge run`, and compared with the true poses."""
+`atlas-merge run`, and compared with the true poses: four sessions of a city and three of a garage; with --long ten
+kilometres, too, and then one more."""
 
-import json
-import os
 import pathlib
 import shutil
 import subprocess
-import sys
 import tempfile
-import time
 
-import numpy
-
+import bench_asked
 from bench_daemon import Atlas
+from bench_merge_measures import (Visit, closures_of, laid_into, localization_errors, overall, overlaps, pose_lines,
+                                  relative, relative_to_last, rms, timed, visits_after, visits_before, wrong_closures)
 
 IMAGES = pathlib.Path(__file__).parent.parent / "docs/images"
 EVERY_M = 1.0
 CITY = [(0, 760), (660, 1420), (1320, 2080), (1980, 2712)]  # scans of the trajectory, overlapping
+LATER = (500, 1000)  # of a drive that comes when all is merged: over the first and the second session
 # A garage: one session from deck to deck, two on a deck or two each.
 GARAGE = [("0", 0, 216), ("2", 24, 66), ("4", 120, 162)]
-NEAR_M, DECK_M, WRONG_M, WRONG_DEG, ALONG = 5.0, 1.0, 0.5, 3.0, 8
-
-
-def matrices(lines):
-    rows = numpy.array([[float(word) for word in line.split()] for line in lines]).reshape(-1, 3, 4)
-    poses = numpy.tile(numpy.eye(4), (len(rows), 1, 1))
-    poses[:, :3, :] = rows
-    return poses
-
-
-def read_poses(file):
-    return matrices(file.read_text().splitlines())
-
-
-def degrees(rotations):
-    trace = numpy.trace(rotations, axis1=-2, axis2=-1)
-    return numpy.degrees(numpy.arccos(numpy.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
-
-
-def rms(values):
-    return float(numpy.sqrt(numpy.mean(numpy.square(values)))) if len(values) else 0.0
-
-
-class Visit:
-    """A session: its true poses, and those that it has now, by sequence number."""
-
-    def __init__(self, folder):
-        self.truth = read_poses(folder / "truth.txt")
-        self.poses = read_poses(folder / "poses.txt")
-        self.stored = []
-
-    def correct(self, words):
-        self.poses[int(words[2])] = matrices([" ".join(words[3:])])[0]
-
-
-def distances(pose, others):
-    """To places on the same deck; others are far away."""
-    away = others[:, :3, 3] - pose[:3, 3]
-    return numpy.where(numpy.abs(away[:, 2]) > DECK_M, numpy.inf, numpy.linalg.norm(away, axis=1))
-
-
-def relative(visits):
-    """How far keyframes of two sessions that were within 5 m are from where they should be to each other."""
-    metres, turns = [], []
-    for i, one in enumerate(visits):
-        for other in visits[i + 1:]:
-            for k in one.stored if other.stored else []:
-                away = distances(one.truth[k], other.truth[other.stored])
-                nearest = int(away.argmin())
-                if away[nearest] > NEAR_M:
-                    continue
-                m = other.stored[nearest]
-                is_so = numpy.linalg.inv(one.poses[k]) @ other.poses[m]
-                should = numpy.linalg.inv(one.truth[k]) @ other.truth[m]
-                off = numpy.linalg.inv(should) @ is_so
-                metres.append(numpy.linalg.norm(off[:3, 3]))
-                turns.append(degrees(off[:3, :3]))
-    return metres, turns
-
-
-def overall(visits):
-    """The same after all are laid on the truth (Umeyama, no scale)."""
-    poses = numpy.concatenate([visit.poses[visit.stored] for visit in visits])
-    truth = numpy.concatenate([visit.truth[visit.stored] for visit in visits])
-    a, b = poses[:, :3, 3], truth[:, :3, 3]
-    u, _, v = numpy.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
-    turn = v.T @ numpy.diag([1.0, 1.0, numpy.linalg.det(v.T @ u.T)]) @ u.T
-    off = (a - a.mean(0)) @ turn.T - (b - b.mean(0))
-    return numpy.linalg.norm(off, axis=1), degrees(numpy.swapaxes(turn @ poses[:, :3, :3], 1, 2) @ truth[:, :3, :3])
-
-
-def closures_of(report, index):
-    """(session, sequence) of both ends."""
-    for closure in report["closures"]:
-        yield tuple((index[(end["vehicle"], end["session"])], end["sequence"]) for end in (closure["a"], closure["b"]))
-
-
-def wrong_closures(visits, closures):
-    """Places that were taken for one and are not."""
-    wrong = 0
-    for (i, k), (j, m) in closures:
-        off = (numpy.linalg.inv(numpy.linalg.inv(visits[i].truth[k]) @ visits[j].truth[m])
-               @ numpy.linalg.inv(visits[i].poses[k]) @ visits[j].poses[m])
-        wrong += numpy.linalg.norm(off[:3, 3]) > WRONG_M or degrees(off[:3, :3]) > WRONG_DEG
-    return int(wrong)
-
-
-def overlaps(visits, closures):
-    """Keyframes within 5 m of another session, and those of them near which a closure with it was found."""
-    found = {}
-    for (i, k), (j, m) in closures:
-        found.setdefault((i, j), []).append(k)
-        found.setdefault((j, i), []).append(m)
-    near = seen = 0
-    for i, one in enumerate(visits):
-        for j, other in enumerate(visits):
-            if i == j:
-                continue
-            for k in range(len(one.truth)):
-                if distances(one.truth[k], other.truth).min() > NEAR_M:
-                    continue
-                near += 1
-                seen += any(abs(k - other_k) <= ALONG for other_k in found.get((i, j), []))
-    return seen, near
+LONG = [(197 * i, 197 * i + 740) for i in range(10)]  # 1 km each
+ELEVENTH = (1100, 1840)
+WRONG_SHARE, WRONG_SEEDS = 0.3, (1, 2, 3)
 
 
 def simulate(bin_dir, world, folder, *flags):
@@ -130,73 +28,189 @@ def simulate(bin_dir, world, folder, *flags):
     return folder
 
 
-def run_merge(bin_dir, atlas, corrections, picture):
-    """The report, and what it cost."""
-    began = time.monotonic()
-    process = subprocess.Popen([bin_dir / "atlas-merge", "run", "--json", "--server", atlas.server, "--corrections",
-                                corrections, "--picture", picture], stdout=subprocess.PIPE, text=True)
-    report = json.loads(process.stdout.read())
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        sys.exit(process.returncode)
-    return report, {"seconds": time.monotonic() - began, "cpu_s": used.ru_utime + used.ru_stime,
-                    "memory_mb": used.ru_maxrss / 1000.0}
+def city_drive(bin_dir, drive, folder, scans, seed, *flags):
+    return simulate(bin_dir, "city", folder, "--trajectory", drive("kitti_trajectories") / "00.txt", "--every",
+                    str(EVERY_M), "--range", f"{scans[0]}:{scans[1]}", "--seed", str(seed), *flags)
 
 
-def merge(bin_dir, emit, name, folders, work):
-    """Uploads, merges and compares: the report, the visits as they are, how far they were, what it cost."""
-    with Atlas(bin_dir) as atlas:
-        for i, folder in enumerate(folders):
-            atlas.run("ingest", folder, "--vehicle", f"car{i}", "--session", "day", "--staged")
-        corrections = work / f"{name}.txt"
-        report, cost = run_merge(bin_dir, atlas, corrections, work / f"{name}.png")
-        atlas.run("wait", "--timeout", "3000")
-        atlas.run("verify", "--rebuild", "--timeout", "3000")  # or it fails: tiles are what these poses make
-    visits = [Visit(folder) for folder in folders]
-    moves = [line.split() for line in corrections.read_text().splitlines() if not line.startswith("#")]
-    for words in moves:  # nearly all that ingest took: a few do not move
-        visits[int(words[0].removeprefix("car"))].stored.append(int(words[2]))
-    before = relative(visits)
-    for words in moves:
-        visits[int(words[0].removeprefix("car"))].correct(words)
-    return report, visits, before, cost
+def with_poses(folder, poses, target):
+    """The same drive with other poses."""
+    target.mkdir()
+    for entry in folder.iterdir():
+        if entry.name != "poses.txt":
+            (target / entry.name).symlink_to(entry)
+    (target / "poses.txt").write_text(pose_lines(poses))
+    return target
 
 
-def report_merge(emit, name, asked, report, visits, before, cost):
-    index = {(f"car{i}", "day"): i for i in range(len(visits))}
-    closures = list(closures_of(report, index))
-    metres, turns = relative(visits)
-    off_m, off_deg = overall(visits)
-    seen, near = overlaps(visits, closures)
-    emit(f"merge.{name}.joined", sum(session["joined"] for session in report["sessions"]),
-         f"of {len(visits)} sessions", "asked", len(visits))
-    emit(f"merge.{name}.before.relative", rms(before[0]), "m", "none", None)
-    emit(f"merge.{name}.relative", rms(metres), f"m, {len(metres)} pairs within {NEAR_M:g} m", "asked", asked["relative_m"])
-    emit(f"merge.{name}.relative_turn", rms(turns), "deg", "asked", 0.1)
-    emit(f"merge.{name}.overall", rms(off_m), "m, after alignment", "asked", 0.3)
-    emit(f"merge.{name}.overall_turn", rms(off_deg), "deg, after alignment", "asked", 0.2)
-    emit(f"merge.{name}.wrong", wrong_closures(visits, closures), f"of {len(closures)} closures", "asked", 0)
-    emit(f"merge.{name}.overlaps", seen / max(1, near), f"of {near} keyframes near another session", "asked", 0.9)
-    emit(f"merge.{name}.seconds", cost["seconds"], "s", "asked", 600)
-    emit(f"merge.{name}.cpu", cost["cpu_s"], "s of CPU", "none", None)
-    emit(f"merge.{name}.memory", cost["memory_mb"], "MB", "asked", 2000)
+def upload(atlas, folders, first=0, *flags):
+    for i, folder in enumerate(folders, first):
+        atlas.run("ingest", folder, "--vehicle", f"car{i}", "--session", "day", *flags)
+
+
+class Merge:
+    """Sessions merged in a daemon, with what came of it."""
+
+    def __init__(self, bin_dir, atlas, folders, work, name):
+        self.bin, self.atlas, self.folders, self.work, self.name = bin_dir, atlas, folders, work, name
+        self.submaps = work / f"{name}.work"
+        upload(atlas, folders, 0, "--staged")
+
+    def run(self, *flags):
+        """Merges; keeps the report, what it cost, and the visits as they are then and were before."""
+        corrections = self.work / f"{self.name}.txt"
+        self.report, self.cost = timed([
+            self.bin / "atlas-merge", "run", "--json", "--server", self.atlas.server, "--work", self.submaps,
+            "--corrections", corrections, "--picture", self.work / f"{self.name}.png", *flags])
+        self.visits = visits_after(self.folders, corrections)
+        self.before = visits_before(self.folders, self.visits)
+
+    def show(self, emit, asked):
+        name = f"merge.{self.name}"
+        closures = closures_of(self.report, self.visits)
+        metres, turns = relative(self.visits)
+        off_m, off_deg = overall(self.visits)
+        seen, near = overlaps(self.visits, closures)
+        emit(f"{name}.joined", sum(session["joined"] for session in self.report["sessions"]),
+             f"of {len(self.visits)} sessions", "asked", len(self.visits))
+        emit(f"{name}.before.relative", rms(relative(self.before)[0]), "m", "none", None)
+        emit(f"{name}.before.overall", rms(overall(self.before)[0]), "m, after alignment", "none", None)
+        emit(f"{name}.relative", rms(metres), f"m, {len(metres)} pairs within 5 m on one deck", "asked",
+             asked["relative_m"])
+        emit(f"{name}.relative_turn", rms(turns), "deg", "asked", 0.1)
+        emit(f"{name}.overall", rms(off_m), "m, after alignment", "asked", 0.3)
+        emit(f"{name}.overall_turn", rms(off_deg), "deg, after alignment", "asked", 0.2)
+        emit(f"{name}.wrong", wrong_closures(self.visits, closures), f"of {len(closures)} closures", "asked", 0)
+        emit(f"{name}.overlaps", seen / max(1, near), f"of {near} keyframes near another session", "asked", 0.9)
+        self.show_cost(emit, name, 600)
+
+    def show_cost(self, emit, name, asked_s):
+        emit(f"{name}.seconds", self.cost["seconds"], "s", "asked", asked_s)
+        emit(f"{name}.cpu", self.cost["cpu_s"], "s of CPU", "none", None)
+        emit(f"{name}.memory", self.cost["memory_mb"], "MB", "asked", 2000)
+
+    def check_tiles(self, emit):
+        """The atlas is what these poses make of it, and no other tile was fused again."""
+        self.atlas.run("wait", "--timeout", "3000")
+        verified = self.atlas.run("verify", "--rebuild", "--timeout", "3000")  # it fails where a tile differs
+        emit(f"merge.{self.name}.rebuilt_damaged", verified["damaged"], "tiles that differ from a build", "asked", 0)
+        emit(f"merge.{self.name}.tiles", self.report["tiles_marked"], "marked by the daemon",
+             "under the footprints of what moved", self.report["tiles"])
+
+
+def show_wrong_ones(emit, merge, bin_dir):
+    """Before anything is applied: wrong closures beside those that are found."""
+    clean = rms(overall(merge.visits)[0])
+    for seed in WRONG_SEEDS:
+        corrections = merge.work / f"wrong{seed}.txt"
+        row, _ = timed([bin_dir / "merge_bench", merge.atlas.database, merge.submaps, WRONG_SHARE, seed, corrections])
+        visits = visits_after(merge.folders, corrections)
+        emit(f"merge.wrong.{seed}.overall", rms(overall(visits)[0]), f"m with {row['put']} wrong ones",
+             "without them", clean)
+        emit(f"merge.wrong.{seed}.relative", rms(relative(visits)[0]), "m", "without them",
+             rms(relative(merge.visits)[0]))
+        emit(f"merge.wrong.{seed}.believed", row["wrong"], f"wrong of {row['believed']}", "asked", 0)
+
+
+def localize(atlas, folder, work):
+    rows = work / "later.csv"
+    atlas.run("localize", folder, "--output", rows)
+    return localization_errors(rows)
+
+
+def show_localization(emit, bin_dir, merge, later):
+    """A later drive in the merged map, by where that map has it, and in a map of true poses."""
+    truth = Visit(later).truth
+    in_map = with_poses(later, laid_into(merge.visits, truth), merge.work / "later_in_map")
+    metres, turn, lost = localize(merge.atlas, in_map, merge.work)
+    with Atlas(bin_dir) as other:
+        for i, visit in enumerate(merge.visits):
+            upload(other, [with_poses(merge.folders[i], visit.truth, merge.work / f"true{i}")], i)
+        other.run("wait", "--timeout", "3000")
+        true_metres, true_turn, true_lost = localize(other, with_poses(later, truth, merge.work / "later_truth"),
+                                                     merge.work)
+    emit("merge.localization", metres, f"m in the merged map, {len(truth)} scans", "in a map of true poses", true_metres)
+    emit("merge.localization_turn", turn, "deg", "in a map of true poses", true_turn)
+    emit("merge.localization_lost", lost, "scans", f"{true_lost} in a map of true poses", None)
+
+
+def layers_at(atlas, poses):
+    return [len(atlas.run("point", f"{pose[0, 3]:.3f}", f"{pose[1, 3]:.3f}")["surfaces"]) for pose in poses]
+
+
+def show_layers(emit, bin_dir, merge):
+    """Surfaces above each other at every fourth keyframe: in the merged map, and in one of true poses."""
+    with Atlas(bin_dir) as other:
+        for i, visit in enumerate(merge.visits):
+            upload(other, [with_poses(merge.folders[i], visit.truth, merge.work / f"deck{i}")], i)
+        other.run("wait", "--timeout", "3000")
+        is_so = [count for visit in merge.visits for count in layers_at(merge.atlas, visit.poses[visit.stored[::4]])]
+        should = [count for visit in merge.visits for count in layers_at(other, visit.truth[visit.stored[::4]])]
+    same = sum(a == b for a, b in zip(is_so, should))
+    emit("merge.garage.layers", same / len(should), f"of {len(should)} places with as many surfaces, up to {max(should)}",
+         "in a map of true poses", 1.0)
+    emit("merge.garage.most_layers", max(is_so), "surfaces above each other", "in a map of true poses", max(should))
+
+
+def merge_city(bin_dir, emit, drive):
+    with tempfile.TemporaryDirectory() as folder, Atlas(bin_dir) as atlas:
+        work = pathlib.Path(folder)
+        city = [city_drive(bin_dir, drive, work / f"city{i}", scans, i + 1, "--drift", str(i + 21))
+                for i, scans in enumerate(CITY)]
+        merge = Merge(bin_dir, atlas, city, work, "city")
+        merge.run("--dry-run")
+        merge.show(emit, {"relative_m": 0.05})
+        shutil.copy(work / "city.png", IMAGES / "merge.png")
+        show_wrong_ones(emit, merge, bin_dir)
+        merge.run()
+        merge.show_cost(emit, "merge.city.again", 60)
+        merge.check_tiles(emit)
+        later = city_drive(bin_dir, drive, work / "later", LATER, 9, "--drift", "9")
+        show_localization(emit, bin_dir, merge, later)
+
+
+def merge_garage(bin_dir, emit):
+    with tempfile.TemporaryDirectory() as folder, Atlas(bin_dir) as atlas:
+        work = pathlib.Path(folder)
+        garage = [simulate(bin_dir, "garage", work / f"garage{i}", "--seed", seed, "--range", f"{begin}:{end}",
+                           "--drift", str(i + 31)) for i, (seed, begin, end) in enumerate(GARAGE)]
+        merge = Merge(bin_dir, atlas, garage, work, "garage")
+        merge.run()
+        merge.show(emit, {"relative_m": 0.08})
+        merge.check_tiles(emit)
+        show_layers(emit, bin_dir, merge)
+
+
+def merge_long(bin_dir, emit, drive):
+    with tempfile.TemporaryDirectory() as folder, Atlas(bin_dir) as atlas:
+        work = pathlib.Path(folder)
+        ten = [city_drive(bin_dir, drive, work / f"long{i}", scans, i + 41, "--drift", str(i + 61))
+               for i, scans in enumerate(LONG)]
+        merge = Merge(bin_dir, atlas, ten, work, "long")
+        merge.run()
+        merge.show(emit, {"relative_m": 0.05})
+        merge.check_tiles(emit)
+        first = merge.visits
+        eleventh = city_drive(bin_dir, drive, work / "long10", ELEVENTH, 51, "--drift", "71")
+        upload(atlas, [eleventh], len(ten), "--staged")
+        merge.folders.append(eleventh)
+        merge.run()
+        joined = merge.report["sessions"][-1]
+        emit("merge.eleventh.joined", int(joined["joined"]), "of 1 session", "asked", 1)
+        emit("merge.eleventh.moved", sum(session["moved"] > 0 for session in merge.report["sessions"][:-1]),
+             "other sessions moved", "none", None)
+        metres, turns = relative_to_last(first + merge.visits[-1:])
+        emit("merge.eleventh.relative", rms(metres), f"m, {len(metres)} pairs within 5 m", "asked", 0.05)
+        emit("merge.eleventh.relative_turn", rms(turns), "deg", "asked", 0.1)
+        merge.show_cost(emit, "merge.eleventh", 60)
+        merge.check_tiles(emit)
 
 
 def bench_merge(bin_dir, emit, drive):
-    trajectory = drive("kitti_trajectories") / "00.txt"
-    with tempfile.TemporaryDirectory() as work:
-        work = pathlib.Path(work)
-        city = [simulate(bin_dir, "city", work / f"city{i}", "--trajectory", trajectory, "--every", str(EVERY_M),
-                         "--range", f"{begin}:{end}", "--seed", str(i + 1), "--drift", str(i + 21))
-                for i, (begin, end) in enumerate(CITY)]
-        report, visits, before, cost = merge(bin_dir, emit, "city", city, work)
-        report_merge(emit, "city", {"relative_m": 0.05}, report, visits, before, cost)
-        shutil.copy(work / "city.png", IMAGES / "merge.png")
-        garage = [simulate(bin_dir, "garage", work / f"garage{i}", "--seed", seed, "--range", f"{begin}:{end}",
-                           "--drift", str(i + 31)) for i, (seed, begin, end) in enumerate(GARAGE)]
-        report, visits, before, cost = merge(bin_dir, emit, "garage", garage, work)
-        report_merge(emit, "garage", {"relative_m": 0.08}, report, visits, before, cost)
+    merge_city(bin_dir, emit, drive)
+    merge_garage(bin_dir, emit)
+    if bench_asked.LONG:
+        merge_long(bin_dir, emit, drive)
 
 
 BENCHMARKS = {"merge": bench_merge}

@@ -23,7 +23,7 @@ install_packages "${BUILD_PACKAGES[@]}" python3
 
 say "building"
 cmake --preset release >/dev/null
-cmake --build build/release --target atlas atlasd
+cmake --build build/release --target atlas atlasd atlas-merge
 atlas=$root/build/release/bin/atlas
 work=$root/build/quickstart
 rm -rf "$work"

@@ -63,6 +63,8 @@ class AtlasClient {
   const MapProfile& profile() const { return profile_; }
   const AtlasIdentity& atlas() const { return atlas_; }
 
+  // Waits 3 ms longer for each pose than for other replies. After kTimeout and kUnavailable it may
+  // have been applied.
   // All or nothing: kNotFound names an unknown keyframe, kInvalidData a refused pose. kConflict:
   // with a condition, what changed; or a session to be published that is neither staged nor in the
   // map. kUnsupported: with terms, a daemon before 1.11.

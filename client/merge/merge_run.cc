@@ -15,14 +15,6 @@ std::vector<Eigen::Vector2d> PlacesOf(const std::vector<Pose>& poses) {
   return places;
 }
 
-std::vector<Pose> PosesAfter(const MergeSession& session, const SessionOutcome& outcome) {
-  std::vector<Pose> poses = StoredPoses(session);
-  for (const MovedKeyframe& moved : outcome.moved) {
-    poses[moved.keyframe] = moved.T_world_sensor.ToPose();
-  }
-  return poses;
-}
-
 }  // namespace
 
 std::vector<PoseCorrection> MergeRun::Corrections() const {
@@ -44,15 +36,21 @@ std::vector<SessionKey> MergeRun::Published() const {
   return published;
 }
 
+std::vector<Pose> MergeRun::PosesAfter(std::size_t session) const {
+  std::vector<Pose> poses = StoredPoses(sessions[session]);
+  for (const MovedKeyframe& moved : plan.sessions[session].moved) {
+    poses[moved.keyframe] = moved.T_world_sensor.ToPose();
+  }
+  return poses;
+}
+
 MergePicture MergeRun::Picture() const {
   MergePicture picture;
-  std::vector<std::vector<Pose>> after;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
-    after.push_back(PosesAfter(sessions[i], plan.sessions[i]));
     std::ostringstream name;
     name << sessions[i].key << (plan.sessions[i].is_joined ? "" : ", stays as it is");
     picture.sessions.push_back(
-        {name.str(), PlacesOf(StoredPoses(sessions[i])), PlacesOf(after.back())});
+        {name.str(), PlacesOf(StoredPoses(sessions[i])), PlacesOf(PosesAfter(i))});
   }
   for (const FoundClosure& closure : plan.closures) {
     const std::size_t a = At(sessions, closure.a).middle();
@@ -71,17 +69,22 @@ Result<MergeRun> RunMerge(SessionSource& source,
                           const std::vector<SessionKey>& wanted,
                           const MergeOptions& options,
                           MergeWork& work,
-                          const MergeProgress& progress) {
-  Result<KeyframeSpool> spool = KeyframeSpool::Create();
-  if (!spool) return Error(spool.error());
+                          const MergeProgress& progress,
+                          const MoreClosures& more_closures) {
+  Result<KeyframeSpool> created = KeyframeSpool::Create();
+  if (!created) return Error(created.error());
+  auto spool = std::make_shared<KeyframeSpool>(*std::move(created));
   auto read = ReadForMerge(source, wanted, *spool, [&](std::size_t done, std::size_t all) {
     return progress ? progress("keyframes", done, all) : Status();
   });
   if (!read) return Error(read.error());
-  auto plan = PlanMerge(read->sessions, read->readers, {source.profile(), options, work}, progress);
+  auto plan = PlanMerge(read->sessions, read->readers, {source.profile(), options, work}, progress,
+                        more_closures);
   if (!plan) return Error(plan.error());
-  return MergeRun{std::move(read->sessions), *std::move(plan), std::move(read->left_out),
-                  read->revision};
+  return MergeRun{std::move(read->sessions), *std::move(plan),
+                  std::move(read->left_out), read->revision,
+                  source.profile(),          std::move(read->readers),
+                  std::move(spool)};
 }
 
 Result<PoseBatchSummary> ApplyMerge(const MergeRun& run,

@@ -15,6 +15,14 @@ struct OneWay {
   double explained = 0.0;
 };
 
+template <typename Predicate>
+std::vector<Eigen::Vector3f> Chosen(const std::vector<Eigen::Vector3f>& points,
+                                    const Predicate& is_wanted) {
+  std::vector<Eigen::Vector3f> chosen;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(chosen), is_wanted);
+  return chosen;
+}
+
 // `seen` in `map`, as far as it could be seen by who made the map.
 OneWay RegisterIn(const SubmapWindow& map,
                   const SubmapWindow& seen,
@@ -63,6 +71,11 @@ Result<SubmapWindow> SubmapWindow::Make(const Submap& submap,
   if (!tiles) return Error(tiles.error());
   SubmapWindow window(submap, profile, options);
   window.window_.Renew(*tiles, Eigen::Vector3d::Zero(), submap.radius_m());
+  const ScanFeatures& all = submap.features();
+  const auto is_upright = [&](const Eigen::Vector3f& p) {
+    return !window.IsFlat(p, options);
+  };
+  window.upright_ = {Chosen(all.columns, is_upright), all.ground, Chosen(all.returns, is_upright)};
   return window;
 }
 
@@ -77,15 +90,10 @@ ScanFeatures SubmapWindow::SeenFrom(const std::vector<Eigen::Vector3d>& places,
   for (const Eigen::Vector3d& place : places) {
     viewers.emplace_back(place.head<2>().cast<float>());
   }
-  const auto is_of_use = [&](const Eigen::Vector3f& p) {
-    return !IsFlat(p, options) && !IsTurnedAway(p, viewers, options);
+  const auto is_seen = [&](const Eigen::Vector3f& p) {
+    return !IsTurnedAway(p, viewers, options);
   };
-  const ScanFeatures& all = submap_->features();
-  ScanFeatures seen;
-  std::copy_if(all.columns.begin(), all.columns.end(), std::back_inserter(seen.columns), is_of_use);
-  std::copy_if(all.returns.begin(), all.returns.end(), std::back_inserter(seen.returns), is_of_use);
-  seen.ground = all.ground;
-  return seen;
+  return {Chosen(upright_.columns, is_seen), upright_.ground, Chosen(upright_.returns, is_seen)};
 }
 
 bool SubmapWindow::IsFlat(const Eigen::Vector3f& p, const MatchOptions& options) const {

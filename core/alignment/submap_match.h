@@ -76,6 +76,7 @@ class SubmapWindow {
                     const MatchOptions& options) const;
 
   const Submap* submap_;
+  ScanFeatures upright_;  // those that are not flat, and the ground
   MapWindow window_;
   float coarse_block_m_;
   std::optional<CoarseOccupancy> coarse_;

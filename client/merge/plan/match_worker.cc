@@ -85,8 +85,13 @@ Result<SubmapMatch> MatchWorker::Search(const SubmapRef& a,
   Result<SubmapMatch> best = SearchNow(in_a, in_b, T_a_b_start, reach);
   if (!best) return best;
   SearchRecord record{in_a.content, in_b.content, T_a_b_start, reach, std::nullopt};
-  if (IsBelieved(*best, context_.options.match)) record.T_a_b = best->T_a_b;
-  Status status = context_.work.KeepSearch(record);
+  Status status;
+  if (IsBelieved(*best, context_.options.match)) {
+    record.T_a_b = best->T_a_b;
+    // Whoever asks again begins there.
+    status = context_.work.KeepMatch({in_a, in_b, best->T_a_b, *best});
+  }
+  if (status.ok()) status = context_.work.KeepSearch(record);
   if (!status.ok()) return Error(std::move(status));
   return best;
 }

@@ -29,7 +29,7 @@ class MatchWorker {
                              const SearchReach& reach);
 
  private:
-  static constexpr std::size_t kKept = 24;  // some 10 MB each
+  static constexpr std::size_t kKept = 56;  // some 10 MB each
   struct Prepared {
     SubmapName name;
     std::unique_ptr<const Submap> submap;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "client/merge/graph/pose_graph.h"
+#include "client/merge/work/merge_work.h"
 #include "core/alignment/closure_sets.h"
 #include "core/alignment/place_search.h"
 #include "core/alignment/session_cut.h"
@@ -55,6 +56,11 @@ struct MergeOptions {
   double max_surprise_m = 1.0;        // of a match from where it was expected
   double max_surprise_rad = 3.0 * std::numbers::pi / 180.0;
   int guided_rounds = 3;
+
+  // Submaps that were fused before by poses this near are taken as they are, at the beginning, and
+  // when all are fused again.
+  ShapeTolerance known_shape{0.01, 0.15 * std::numbers::pi / 180.0};
+  ShapeTolerance refined_shape{0.005, 0.06 * std::numbers::pi / 180.0};
 
   int refinements = 2;  // times that submaps are fused again by the poses found
 

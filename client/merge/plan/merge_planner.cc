@@ -23,12 +23,14 @@ class Planner {
   Planner(std::vector<MergeSession>& sessions,
           const std::vector<BlobReader>& readers,
           const MergeContext& context,
-          const MergeProgress& progress)
+          const MergeProgress& progress,
+          const MoreClosures& more_closures)
       : sessions_(sessions),
         readers_(readers),
         context_(context),
         options_(context.options),
-        progress_(progress) {}
+        progress_(progress),
+        more_closures_(more_closures) {}
 
   Result<MergePlan> Plan() {
     Status status = Run();
@@ -41,7 +43,7 @@ class Planner {
  private:
   Status Run() {
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
-      ATLAS_RETURN_IF_ERROR(Fuse(i, StoredPoses(sessions_[i])));
+      ATLAS_RETURN_IF_ERROR(Fuse(i, StoredPoses(sessions_[i]), options_.known_shape));
     }
     ATLAS_RETURN_IF_ERROR(Link(StoredPoses(sessions_)));
     ATLAS_RETURN_IF_ERROR(Search());
@@ -51,8 +53,10 @@ class Planner {
     return {};
   }
 
-  Status Fuse(std::size_t session, const std::vector<Pose>& T_world_sensor) {
-    return BuildSubmaps(sessions_[session], T_world_sensor, readers_[session], context_,
+  Status Fuse(std::size_t session,
+              const std::vector<Pose>& T_world_sensor,
+              const ShapeTolerance& tolerance) {
+    return BuildSubmaps(sessions_[session], T_world_sensor, readers_[session], context_, tolerance,
                         Step("submaps"));
   }
 
@@ -93,7 +97,7 @@ class Planner {
   // One that would have to be tilted too far keeps the submaps it has; LookAtEffect leaves it out.
   Status FuseAgain(std::size_t i) {
     const std::vector<Pose> corrected = CorrectedPoses(sessions_[i], poses_.T_world_submap[i]);
-    Status status = Fuse(i, corrected);
+    Status status = Fuse(i, corrected, options_.refined_shape);
     return status.code() == StatusCode::kInvalidData ? Status() : status;
   }
 
@@ -127,7 +131,11 @@ class Planner {
   }
 
   // Which closures are believed, who hangs together, and where everything is.
-  Status Settle(const std::vector<FoundClosure>& found, const SubmapPoses* start) {
+  Status Settle(std::vector<FoundClosure> found, const SubmapPoses* start) {
+    if (more_closures_) {
+      const std::vector<FoundClosure> more = more_closures_(found, ways_);
+      found.insert(found.end(), more.begin(), more.end());
+    }
     choice_ = ChooseClosures(found, ways_, options_);
     plan_.rejected += choice_.rejected.size();
     parts_ = PutTogether(sessions_, ways_, choice_);
@@ -232,6 +240,7 @@ class Planner {
   const MergeContext& context_;
   const MergeOptions& options_;
   const MergeProgress& progress_;
+  const MoreClosures& more_closures_;
   std::vector<std::vector<SessionLink>> links_;
   std::vector<SessionWay> ways_;
   ClosureChoice choice_;
@@ -246,8 +255,9 @@ class Planner {
 Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const std::vector<BlobReader>& readers,
                             const MergeContext& context,
-                            const MergeProgress& progress) {
-  return Planner(sessions, readers, context, progress).Plan();
+                            const MergeProgress& progress,
+                            const MoreClosures& more_closures) {
+  return Planner(sessions, readers, context, progress, more_closures).Plan();
 }
 
 }  // namespace atlas

@@ -51,6 +51,11 @@ struct MergePlan {
   std::set<TileId> tiles;                       // of level 0, that would be fused again
 };
 
+// Closures from elsewhere, which are judged with those that were found by `ways`, each time that
+// these are: how a merge bears wrong ones is tried with it.
+using MoreClosures = std::function<std::vector<FoundClosure>(const std::vector<FoundClosure>& found,
+                                                             const std::vector<SessionWay>& ways)>;
+
 // Fills the sessions' submaps. `readers`: of each session's blobs, one a session, which are read
 // once more for each of `options.refinements`: submaps are fused again by poses that are nearly
 // right, for within a submap, too, odometry drifts. `progress` may be empty.
@@ -59,6 +64,7 @@ struct MergePlan {
 Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const std::vector<BlobReader>& readers,
                             const MergeContext& context,
-                            const MergeProgress& progress);
+                            const MergeProgress& progress,
+                            const MoreClosures& more_closures = nullptr);
 
 }  // namespace atlas

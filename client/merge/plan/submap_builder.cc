@@ -68,8 +68,12 @@ class Builder {
  public:
   Builder(const MergeSession& session,
           const std::vector<Pose>& T_world_sensor,
-          const MergeContext& context)
-      : session_(session), T_world_sensor_(T_world_sensor), context_(context) {}
+          const MergeContext& context,
+          const ShapeTolerance& tolerance)
+      : session_(session),
+        T_world_sensor_(T_world_sensor),
+        context_(context),
+        tolerance_(tolerance) {}
 
   Wanted Want(const SubmapCut& cut) const {
     Wanted wanted{cut, ContentOf(session_, cut, context_), {}, {}, {}, {}};
@@ -80,7 +84,7 @@ class Builder {
     for (std::size_t i = cut.begin; i < cut.end; ++i) {
       wanted.T_submap_member.push_back(T_submap_world * T_world_sensor_[i]);
     }
-    wanted.sketch = context_.work.FindSubmap(wanted.content, wanted.T_submap_member);
+    wanted.sketch = context_.work.FindSubmap(wanted.content, wanted.T_submap_member, tolerance_);
     return wanted;
   }
 
@@ -130,7 +134,31 @@ class Builder {
   const MergeSession& session_;
   const std::vector<Pose>& T_world_sensor_;
   const MergeContext& context_;
+  const ShapeTolerance& tolerance_;
 };
+
+// Of which keyframes a session consists, and how it is cut.
+std::uint64_t HashOf(const MergeSession& session, const CutOptions& options) {
+  ByteWriter out;
+  out.U64(std::bit_cast<std::uint64_t>(options.length_m));
+  out.U64(options.max_keyframes);
+  out.U64(std::bit_cast<std::uint64_t>(options.jump_m));
+  for (const MergeKeyframe& keyframe : session.keyframes) {
+    out.U32(keyframe.sequence);
+    out.I64(keyframe.time_ms);
+    out.U64(keyframe.blob_hash);
+  }
+  return Hash64(out.bytes());
+}
+
+Result<std::vector<SubmapCut>> Cut(const MergeSession& session, const MergeContext& context) {
+  CutRecord record{HashOf(session, context.options.cut), {}};
+  if (auto known = context.work.FindCut(record.session)) return *std::move(known);
+  record.cuts = CutSession(StoredPoses(session), context.options.cut);
+  Status status = context.work.KeepCut(record);
+  if (!status.ok()) return Error(std::move(status));
+  return std::move(record.cuts);
+}
 
 }  // namespace
 
@@ -138,11 +166,14 @@ Status BuildSubmaps(MergeSession& session,
                     const std::vector<Pose>& T_world_sensor,
                     const BlobReader& read,
                     const MergeContext& context,
+                    const ShapeTolerance& tolerance,
                     const std::function<Status(std::size_t done, std::size_t all)>& progress) {
-  const std::vector<SubmapCut> cuts = CutSession(StoredPoses(session), context.options.cut);
+  const auto cut = Cut(session, context);
+  if (!cut) return cut.error();
+  const std::vector<SubmapCut>& cuts = *cut;
   const std::size_t workers = context.options.workers;
   const std::size_t at_once = 4 * workers;
-  const Builder builder(session, T_world_sensor, context);
+  const Builder builder(session, T_world_sensor, context, tolerance);
   std::vector<MergeSubmap> submaps;
   for (std::size_t first = 0; first < cuts.size(); first += at_once) {
     const std::size_t count = std::min(at_once, cuts.size() - first);

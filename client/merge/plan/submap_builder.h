@@ -16,8 +16,8 @@ namespace atlas {
 using BlobReader = std::function<Result<Bytes>(std::size_t keyframe)>;
 
 // Cuts `session` and fills its submaps, fused by `T_world_sensor` of its keyframes unless the work
-// has them; some are in work at a time, not all keyframes in memory. The cut is that of the stored
-// poses, always the same.
+// has them as near as `tolerance`; some are in work at a time, not all keyframes in memory. The cut
+// is that of the stored poses, and stays when these are corrected, as long as the work lasts.
 // kInvalidData: a keyframe is damaged, not what its hash says, of another profile, or its pose
 // tilted against its grid by more than 2 degrees; the message names it. Else errors are those of
 // `read`, the work and `progress`, which is told of submaps, by the caller's thread.
@@ -25,6 +25,7 @@ Status BuildSubmaps(MergeSession& session,
                     const std::vector<Pose>& T_world_sensor,
                     const BlobReader& read,
                     const MergeContext& context,
+                    const ShapeTolerance& tolerance,
                     const std::function<Status(std::size_t done, std::size_t all)>& progress);
 
 }  // namespace atlas

@@ -34,7 +34,6 @@ struct Nearness {
   double metres;
   double rad;
 };
-constexpr Nearness kSameShape{0.005, 0.06 * kDegree};
 constexpr Nearness kSameMatch{0.25, 1.5 * kDegree};
 constexpr Nearness kSameSearch{0.5, 2.0 * kDegree};
 
@@ -44,9 +43,35 @@ bool IsNear(const Pose& one, const Pose& other, const Nearness& nearness) {
              nearness.rad;
 }
 
-bool IsNear(std::span<const Pose> one, std::span<const Pose> other, const Nearness& nearness) {
-  return std::equal(one.begin(), one.end(), other.begin(), other.end(),
-                    [&](const Pose& a, const Pose& b) { return IsNear(a, b, nearness); });
+// The farthest of them, for choosing; none where one is further off than tolerated.
+std::optional<double> MisfitOf(std::span<const Pose> one,
+                               std::span<const Pose> other,
+                               const Nearness& nearness) {
+  if (one.size() != other.size()) return std::nullopt;
+  double worst = 0.0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    if (!IsNear(one[i], other[i], nearness)) return std::nullopt;
+    worst = std::max(worst, (one[i].translation() - other[i].translation()).norm());
+  }
+  return worst;
+}
+
+// The record with the least misfit, the first of equals; null where none has any.
+template <typename Record, typename Misfit>
+const Record* Nearest(const std::vector<Record>& records, const Misfit& misfit_of) {
+  const Record* nearest = nullptr;
+  double least = 0.0;
+  for (const Record& record : records) {
+    const std::optional<double> misfit = misfit_of(record);
+    if (!misfit || (nearest != nullptr && *misfit >= least)) continue;
+    nearest = &record;
+    least = *misfit;
+  }
+  return nearest;
+}
+
+std::span<const Pose> One(const Pose& pose) {
+  return {&pose, 1};
 }
 
 std::string Hex(std::uint64_t value) {
@@ -91,6 +116,7 @@ struct MergeWork::Folder {
   std::map<std::uint64_t, std::vector<SubmapRecord>> submaps = {};
   std::map<std::pair<SubmapName, SubmapName>, std::vector<MatchRecord>> matches = {};
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::vector<SearchRecord>> searches = {};
+  std::map<std::uint64_t, std::vector<SubmapCut>> cuts = {};
 
   fs::path PathOf(const SubmapName& name) const {
     return path / StrCat(Hex(name.content), "-", Hex(name.shape), kSuffix);
@@ -99,6 +125,7 @@ struct MergeWork::Folder {
   void Learn(const SubmapRecord& record) { submaps[record.name.content].push_back(record); }
   void Learn(const MatchRecord& record) { matches[{record.a, record.b}].push_back(record); }
   void Learn(const SearchRecord& record) { searches[{record.a, record.b}].push_back(record); }
+  void Learn(const CutRecord& record) { cuts[record.session] = record.cuts; }
 
   Status Keep(const WorkRecord& record) {
     const std::lock_guard guard(mutex);
@@ -175,8 +202,8 @@ Status MergeWork::Folder::Open(std::uint64_t rules, std::uint64_t max_bytes) {
     if (const auto* match = std::get_if<MatchRecord>(&record)) {
       return names.contains(match->a) && names.contains(match->b);
     }
-    const auto& search = std::get<SearchRecord>(record);
-    return contents.contains(search.a) && contents.contains(search.b);
+    const auto* search = std::get_if<SearchRecord>(&record);
+    return search == nullptr || (contents.contains(search->a) && contents.contains(search->b));
   };
   const auto forgotten =
       std::erase_if(records, [&](const WorkRecord& record) { return !is_of_use(record); });
@@ -234,20 +261,32 @@ Result<MergeWork> MergeWork::Temporary() {
   return work;
 }
 
+std::optional<std::vector<SubmapCut>> MergeWork::FindCut(std::uint64_t session) const {
+  const std::lock_guard guard(folder_->mutex);
+  const auto found = folder_->cuts.find(session);
+  return found == folder_->cuts.end() ? std::nullopt : std::optional(found->second);
+}
+
+Status MergeWork::KeepCut(const CutRecord& cut) {
+  return folder_->Keep(cut);
+}
+
 std::optional<SubmapSketch> MergeWork::FindSubmap(std::uint64_t content,
-                                                  std::span<const Pose> T_submap_member) const {
+                                                  std::span<const Pose> T_submap_member,
+                                                  const ShapeTolerance& tolerance) const {
   const std::lock_guard guard(folder_->mutex);
   const auto found = folder_->submaps.find(content);
   if (found == folder_->submaps.end()) return std::nullopt;
-  for (const SubmapRecord& record : found->second) {
-    if (!IsNear(record.T_submap_member, T_submap_member, kSameShape)) continue;
-    // It was asked for: others go before it.
-    std::error_code is_gone;
-    fs::last_write_time(folder_->PathOf(record.name), fs::file_time_type::clock::now(), is_gone);
-    if (is_gone) continue;
-    return SubmapSketch{record.name, record.places};
-  }
-  return std::nullopt;
+  const auto* const nearest = Nearest(found->second, [&](const SubmapRecord& record) {
+    return fs::exists(folder_->PathOf(record.name))
+               ? MisfitOf(record.T_submap_member, T_submap_member,
+                          {tolerance.metres, tolerance.rad})
+               : std::nullopt;
+  });
+  if (nearest == nullptr) return std::nullopt;
+  std::error_code ignored;  // it was asked for, and others go before it if that can be told
+  fs::last_write_time(folder_->PathOf(nearest->name), fs::file_time_type::clock::now(), ignored);
+  return SubmapSketch{nearest->name, nearest->places};
 }
 
 Result<SubmapSketch> MergeWork::KeepSubmap(std::uint64_t content,
@@ -279,10 +318,10 @@ std::optional<SubmapMatch> MergeWork::FindMatch(const SubmapName& a,
   const std::lock_guard guard(folder_->mutex);
   const auto found = folder_->matches.find({a, b});
   if (found == folder_->matches.end()) return std::nullopt;
-  for (const MatchRecord& record : found->second) {
-    if (IsNear(record.T_a_b_start, T_a_b_start, kSameMatch)) return record.match;
-  }
-  return std::nullopt;
+  const auto* const nearest = Nearest(found->second, [&](const MatchRecord& record) {
+    return MisfitOf(One(record.T_a_b_start), One(T_a_b_start), kSameMatch);
+  });
+  return nearest == nullptr ? std::nullopt : std::optional(nearest->match);
 }
 
 Status MergeWork::KeepMatch(const MatchRecord& match) {
@@ -296,10 +335,12 @@ std::optional<SearchRecord> MergeWork::FindSearch(std::uint64_t a,
   const std::lock_guard guard(folder_->mutex);
   const auto found = folder_->searches.find({a, b});
   if (found == folder_->searches.end()) return std::nullopt;
-  for (const SearchRecord& record : found->second) {
-    if (IsSameSearch(record.reach, record.T_a_b_start, reach, T_a_b_start)) return record;
-  }
-  return std::nullopt;
+  const auto* const nearest = Nearest(found->second, [&](const SearchRecord& record) {
+    return IsSameSearch(record.reach, record.T_a_b_start, reach, T_a_b_start)
+               ? MisfitOf(One(record.T_a_b_start), One(T_a_b_start), kSameSearch)
+               : std::nullopt;
+  });
+  return nearest == nullptr ? std::nullopt : std::optional(*nearest);
 }
 
 Status MergeWork::KeepSearch(const SearchRecord& search) {

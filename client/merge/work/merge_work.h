@@ -17,6 +17,12 @@
 
 namespace atlas {
 
+// How far members of a submap may be from where they were fused.
+struct ShapeTolerance {
+  double metres = 0.0;
+  double rad = 0.0;
+};
+
 struct SubmapSketch {
   SubmapName name;
   std::vector<SubmapPlace> places;
@@ -46,10 +52,15 @@ class MergeWork {
   MergeWork& operator=(const MergeWork&) = delete;
   ~MergeWork();
 
-  // Of this content with its members at `T_submap_member`, or so nearly (5 mm, 0.06 degrees) that
-  // it does not matter.
+  // None where the session was not cut yet.
+  std::optional<std::vector<SubmapCut>> FindCut(std::uint64_t session) const;
+  Status KeepCut(const CutRecord& cut);
+
+  // Of this content the one whose members lie nearest `T_submap_member`, if all lie as near as
+  // `tolerance`.
   std::optional<SubmapSketch> FindSubmap(std::uint64_t content,
-                                         std::span<const Pose> T_submap_member) const;
+                                         std::span<const Pose> T_submap_member,
+                                         const ShapeTolerance& tolerance) const;
   // As all that is kept: kResourceExhausted on a full disk, else what the disk said.
   Result<SubmapSketch> KeepSubmap(std::uint64_t content,
                                   std::span<const Pose> T_submap_member,

@@ -7,9 +7,10 @@
 namespace atlas {
 namespace {
 
-enum class Kind : std::uint8_t { kSubmap = 1, kMatch, kSearch };
+enum class Kind : std::uint8_t { kSubmap = 1, kMatch, kSearch, kCut };
 
 constexpr std::size_t kPoseBytes = 12 * 8;
+constexpr std::size_t kCutBytes = 2 * 8 + 1;
 
 class Writer {
  public:
@@ -32,6 +33,14 @@ class Writer {
     for (const Pose& pose : poses) Add(pose);
   }
   void Add(const std::vector<SubmapPlace>& places) { WritePlaces(places, out_); }
+  void Add(const std::vector<SubmapCut>& cuts) {
+    out_.U32(static_cast<std::uint32_t>(cuts.size()));
+    for (const SubmapCut& cut : cuts) {
+      out_.U64(cut.begin);
+      out_.U64(cut.end);
+      out_.U8(cut.follows_jump ? 1 : 0);
+    }
+  }
   Bytes Take() { return out_.Take(); }
 
  private:
@@ -61,16 +70,30 @@ class Reader {
     return pose;
   }
   std::vector<Pose> ReadPoses() {
-    const std::uint32_t count = in_.U32();
-    if (count > in_.remaining() / kPoseBytes) in_.Fail();
-    std::vector<Pose> poses(in_.ok() ? count : 0, Pose::Identity());
+    std::vector<Pose> poses(ReadCount(kPoseBytes), Pose::Identity());
     for (Pose& pose : poses) pose = ReadPose();
     return poses;
+  }
+  std::vector<SubmapCut> ReadCuts() {
+    std::vector<SubmapCut> cuts(ReadCount(kCutBytes));
+    for (SubmapCut& cut : cuts) {
+      cut.begin = in_.U64();
+      cut.end = in_.U64();
+      cut.follows_jump = in_.U8() != 0;
+    }
+    return cuts;
   }
   std::vector<SubmapPlace> ReadAllPlaces() { return ReadPlaces(in_); }
   bool IsAtEnd() const { return in_.ok() && in_.remaining() == 0; }
 
  private:
+  // As many as there is room for, or none and it has failed.
+  std::size_t ReadCount(std::size_t bytes_each) {
+    const std::uint32_t count = in_.U32();
+    if (count > in_.remaining() / bytes_each) in_.Fail();
+    return in_.ok() ? count : 0;
+  }
+
   ByteReader in_;
 };
 
@@ -144,6 +167,19 @@ SearchRecord ReadSearch(Reader& in) {
   return record;
 }
 
+void Write(const CutRecord& record, Writer& out) {
+  out.Add(Kind::kCut);
+  out.Add(record.session);
+  out.Add(record.cuts);
+}
+
+CutRecord ReadCut(Reader& in) {
+  CutRecord record;
+  record.session = in.ReadNumber();
+  record.cuts = in.ReadCuts();
+  return record;
+}
+
 }  // namespace
 
 Bytes EncodeRecord(const WorkRecord& record) {
@@ -164,6 +200,9 @@ std::optional<WorkRecord> DecodeRecord(ByteSpan bytes) {
       break;
     case Kind::kSearch:
       record = ReadSearch(in);
+      break;
+    case Kind::kCut:
+      record = ReadCut(in);
       break;
   }
   return in.IsAtEnd() ? record : std::nullopt;

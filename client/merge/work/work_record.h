@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/merge/work/submap_name.h"
+#include "core/alignment/session_cut.h"
 #include "core/alignment/submap.h"
 #include "core/alignment/submap_match.h"
 #include "core/base/bytes.h"
@@ -38,7 +39,13 @@ struct SearchRecord {
   std::optional<Pose> T_a_b;
 };
 
-using WorkRecord = std::variant<SubmapRecord, MatchRecord, SearchRecord>;
+// How a session was cut.
+struct CutRecord {
+  std::uint64_t session = 0;  // Hash64 of its keyframes and of how it was cut
+  std::vector<SubmapCut> cuts;
+};
+
+using WorkRecord = std::variant<SubmapRecord, MatchRecord, SearchRecord, CutRecord>;
 
 Bytes EncodeRecord(const WorkRecord& record);
 // None: they are no record's.

@@ -51,6 +51,8 @@ DatabaseOptions CopierOptions(std::filesystem::path file) {
   return {std::move(file), DatabaseOptions::Mode::kReadWrite, 64, 100};
 }
 
+constexpr std::size_t kFewPoses = 64;  // of a batch, that shares a transaction with other writes
+
 std::uint64_t ReadRevision(Connection& connection) {
   return ReadCounter(connection, Counter::kRevision);
 }
@@ -93,14 +95,23 @@ class SqliteStore final : public AtlasStore {
         });
   }
   void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) override {
-    Write<PoseBatchResult>(std::move(done), [this, b = std::move(batch)](Connection& connection) {
-      return UpdatePosesInStore(connection, identity_, b);
-    });
+    // Many poses in a savepoint take time by their square: with each statement of its own journal
+    // SQLite walks over all that the savepoint keeps.
+    const bool is_large = batch.poses.size() > kFewPoses || !batch.published.empty();
+    WriteQueue::Operation operation = MakeWrite<PoseBatchResult>(
+        std::move(done), [this, b = std::move(batch)](Connection& connection) {
+          return UpdatePosesInStore(connection, identity_, b);
+        });
+    operation.is_alone = is_large;
+    writes_.Submit(std::move(operation));
   }
   void UndoPoses(PoseUndo undo, Done<PoseBatchResult> done) override {
-    Write<PoseBatchResult>(std::move(done), [u = std::move(undo)](Connection& connection) {
-      return UndoPosesInStore(connection, u);
-    });
+    WriteQueue::Operation operation = MakeWrite<PoseBatchResult>(
+        std::move(done), [u = std::move(undo)](Connection& connection) {
+          return UndoPosesInStore(connection, u);
+        });
+    operation.is_alone = true;
+    writes_.Submit(std::move(operation));
   }
   void ChangeSession(SessionChange change, Done<SessionChangeResult> done) override {
     const bool is_purge = change.action == SessionAction::kPurge;

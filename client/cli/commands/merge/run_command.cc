@@ -7,9 +7,11 @@
 #include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/merge/merge_commands.h"
 #include "client/cli/commands/merge/merge_text.h"
+#include "client/cli/files/change_file.h"
 #include "client/cli/files/pose_file.h"
 #include "client/cli/files/whole_file.h"
 #include "client/cli/output/progress_bar.h"
+#include "client/merge/change_report.h"
 #include "client/merge/merge_run.h"
 
 namespace atlas {
@@ -58,6 +60,11 @@ class MergeRunCommand : public Command {
     arguments.Optional("--picture", "FILE.png", picture_, "Draw the ways before and after");
     arguments.Optional("--corrections", "FILE", corrections_,
                        "Write the corrected poses as `atlas poses apply` reads them");
+    arguments.Optional("--changes", "FILE.csv|.geojson", changes_,
+                       "Write what the sessions that are published saw otherwise than those before "
+                       "them: what appeared, what vanished");
+    arguments.Optional("--changes-picture", "FILE.png", changes_picture_,
+                       "Draw it: red appeared, blue vanished");
     arguments.Optional("--work", "DIR", work_,
                        "Keep what was found there: the next merge, and one that was ended, are "
                        "done with what is new [nothing is kept]");
@@ -67,8 +74,12 @@ class MergeRunCommand : public Command {
   Status Run(CommandContext& context) override {
     const Result<std::string> author = author_.Author("atlas-merge");
     if (!author) return author.error();
-    for (const auto& file : {picture_, corrections_}) {
+    for (const auto& file : {picture_, corrections_, changes_, changes_picture_}) {
       if (file) ATLAS_RETURN_IF_ERROR(CheckPlace(*file));
+    }
+    if (changes_) {
+      const auto format = ChangeFormatOf(*changes_);
+      if (!format) return format.error();
     }
     if (context.atlas_file) {
       Result<AtlasFile> file = AtlasFile::Open(*context.atlas_file);
@@ -99,6 +110,7 @@ class MergeRunCommand : public Command {
       progress.Wipe();
       if (!run) return run.error();
       ATLAS_RETURN_IF_ERROR(WriteFiles(*run));
+      ATLAS_RETURN_IF_ERROR(WriteChanges(*run, progress));
       std::optional<PoseBatchSummary> batch;
       if (is_applied && !run->IsNothing()) {
         auto applied = ApplyMerge(*run, *client, author);
@@ -106,12 +118,21 @@ class MergeRunCommand : public Command {
           context.err << "note: " << applied.error().message() << ": merged again\n";
           continue;
         }
-        if (!applied) return applied.error();
+        if (!applied) return NotApplied(applied.error());
         batch = *std::move(applied);
       }
       Print(*run, batch, is_applied, context);
       return {};
     }
+  }
+
+  static Status NotApplied(const Status& status) {
+    const bool is_known =
+        status.code() != StatusCode::kTimeout && status.code() != StatusCode::kUnavailable;
+    return is_known ? status
+                    : status.WithContext(
+                          "whether the merge was applied is not known, and `atlas log` tells; to "
+                          "merge again does no harm");
   }
 
   Status WriteFiles(const MergeRun& run) const {
@@ -120,6 +141,19 @@ class MergeRunCommand : public Command {
       ATLAS_RETURN_IF_ERROR(WriteTextFile(*corrections_, PoseFileText(run.Corrections())));
     }
     return {};
+  }
+
+  Status WriteChanges(const MergeRun& run, Progress& progress) const {
+    if (!changes_ && !changes_picture_) return {};
+    const auto report = ReportChanges(run, std::ref(progress));
+    progress.Wipe();
+    if (!report) return report.error();
+    if (changes_) {
+      const ChangeFormat format = *ChangeFormatOf(*changes_);
+      ATLAS_RETURN_IF_ERROR(WriteTextFile(*changes_, ChangeText(format, report->changes)));
+    }
+    if (!changes_picture_ || !report->picture) return {};
+    return WritePng(*report->picture, *changes_picture_);
   }
 
   static void Print(const MergeRun& run,
@@ -152,6 +186,8 @@ class MergeRunCommand : public Command {
   bool is_dry_run_ = false;
   std::optional<std::string> picture_;
   std::optional<std::string> corrections_;
+  std::optional<std::string> changes_;
+  std::optional<std::string> changes_picture_;
   std::optional<std::string> work_;
   AuthorFlag author_;
   MergeOptions options_;

@@ -41,11 +41,14 @@ MergeSession BlindSession(const std::string& vehicle,
                                  QuantizedPose::FromPose(pose), std::nullopt});
   }
   const MapProfile profile;
-  const Bytes blob = EncodeKeyframe(BlankKeyframe(profile, 4));
+  static std::int32_t made = 0;  // no two are the same session
+  Keyframe blank = BlankKeyframe(profile, 4);
+  blank.sensor_height_mm = 1'000 + made++;
+  const Bytes blob = EncodeKeyframe(blank);
   for (MergeKeyframe& keyframe : session.keyframes) keyframe.blob_hash = Hash64(blob);
   const Status built = BuildSubmaps(
       session, StoredPoses(session), [&](std::size_t) -> Result<Bytes> { return blob; },
-      {profile, options, SharedWork()}, nullptr);
+      {profile, options, SharedWork()}, {}, nullptr);
   if (!built.ok()) throw std::runtime_error(built.message());
   return session;
 }

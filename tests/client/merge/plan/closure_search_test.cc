@@ -146,7 +146,7 @@ class StreetSearchTest : public ClosureSearchTest {
       sessions_.push_back(drive->session());
       MergeSession& session = sessions_.back();
       ASSERT_TRUE(BuildSubmaps(session, StoredPoses(session), drive->reader(),
-                               {profile_, options_, testing::SharedWork()}, nullptr)
+                               {profile_, options_, testing::SharedWork()}, {}, nullptr)
                       .ok());
     }
     ASSERT_EQ(sessions_[0].submaps.size(), 1U);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -14,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/client/merge/plan/blind_session.h"
+#include "tests/client/merge/plan/planned_merge.h"
 #include "tests/client/merge/plan/simulated_session.h"
 
 namespace atlas {
@@ -22,118 +24,10 @@ namespace {
 using testing::AngleBetween;
 using testing::At;
 using testing::DistanceBetween;
+using testing::Merge;
 using testing::SimulatedSession;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-
-// A merge of some of the drives, in some order; its results by the drive.
-class Merge {
- public:
-  void Add(const SimulatedSession& drive, bool is_staged) {
-    drives_.push_back(&drive);
-    sessions_.push_back(drive.session());
-    sessions_.back().is_staged = is_staged;
-    readers_.push_back(drive.reader());
-  }
-
-  Result<MergePlan> Plan(const MergeProgress& progress = nullptr) {
-    return PlanMerge(sessions_, readers_, {MapProfile(), options_, work_}, progress);
-  }
-  void MustPlan(const MergeProgress& progress = nullptr) {
-    auto plan = Plan(progress);
-    ASSERT_TRUE(plan.has_value()) << plan.error().message();
-    plan_ = *std::move(plan);
-    ASSERT_EQ(plan_.sessions.size(), sessions_.size());
-  }
-
-  const MergePlan& plan() const { return plan_; }
-  MergeOptions& options() { return options_; }
-  std::vector<MergeSession>& sessions() { return sessions_; }
-  std::vector<BlobReader>& readers() { return readers_; }
-
-  // As the poses of session `i` would be stored afterwards; as they are where nothing was planned.
-  std::vector<Pose> After(std::size_t i) const {
-    std::vector<Pose> poses = StoredPoses(sessions_[i]);
-    if (plan_.sessions.empty()) return poses;
-    for (const MovedKeyframe& moved : plan_.sessions[i].moved) {
-      poses[moved.keyframe] = moved.T_world_sensor.ToPose();
-    }
-    return poses;
-  }
-
-  // Of keyframes of `a` and the nearest of `b`, as far as those are near: from where they truly lie
-  // to each other, root mean square.
-  struct Error {
-    double place_m = 0.0;
-    double turn_rad = 0.0;
-    int pairs = 0;
-  };
-  Error ErrorBetween(std::size_t a, std::size_t b, double near_m = 3.0) const {
-    const std::vector<Pose> of_a = After(a);
-    const std::vector<Pose> of_b = After(b);
-    Error error;
-    for (std::size_t i = 0; i < of_a.size(); ++i) {
-      const Pose& T_world_a = drives_[a]->truth()[i];
-      const std::vector<Pose>& others = drives_[b]->truth();
-      const auto nearest =
-          std::min_element(others.begin(), others.end(), [&](const Pose& one, const Pose& other) {
-            return DistanceBetween(one, T_world_a) < DistanceBetween(other, T_world_a);
-          });
-      if (DistanceBetween(*nearest, T_world_a) > near_m) continue;
-      const Pose is = of_a[i].inverse() * of_b[static_cast<std::size_t>(nearest - others.begin())];
-      const Pose should = T_world_a.inverse() * *nearest;
-      error.place_m += std::pow(DistanceBetween(is, should), 2);
-      error.turn_rad += std::pow(AngleBetween(is, should), 2);
-      ++error.pairs;
-    }
-    error.place_m = std::sqrt(error.place_m / std::max(1, error.pairs));
-    error.turn_rad = std::sqrt(error.turn_rad / std::max(1, error.pairs));
-    return error;
-  }
-
-  void ExpectTogether(std::size_t a, std::size_t b) const {
-    const Error error = ErrorBetween(a, b);
-    EXPECT_GT(error.pairs, 30);
-    EXPECT_LT(error.place_m, 0.05);
-    EXPECT_LT(error.turn_rad, 0.1 * kDegree);
-  }
-
-  void ExpectTrueClosures() const {
-    ASSERT_FALSE(plan_.closures.empty());
-    ASSERT_EQ(plan_.closure_off_m.size(), plan_.closures.size());
-    for (std::size_t i = 0; i < plan_.closures.size(); ++i) {
-      const FoundClosure& closure = plan_.closures[i];
-      const auto truth_of = [&](const SubmapRef& ref) {
-        return drives_[ref.session]->TruthOf(sessions_[ref.session], ref.submap);
-      };
-      const Pose should = truth_of(closure.a).inverse() * truth_of(closure.b);
-      EXPECT_LT(DistanceBetween(closure.match.T_a_b, should), 0.15);
-      EXPECT_LT(AngleBetween(closure.match.T_a_b, should), 0.6 * kDegree);
-      EXPECT_LT(plan_.closure_off_m[i], 0.1);
-      EXPECT_LT(plan_.closure_off_rad[i], 0.3 * kDegree);
-    }
-  }
-
-  void ExpectApart(std::size_t i) const {
-    const SessionOutcome& outcome = plan_.sessions[i];
-    EXPECT_FALSE(outcome.is_joined);
-    EXPECT_FALSE(outcome.is_held);
-    EXPECT_TRUE(outcome.moved.empty());
-    EXPECT_EQ(outcome.max_move_m, 0.0);
-    for (const FoundClosure& closure : plan_.closures) {
-      EXPECT_TRUE(closure.a.session != i || closure.b.session != i);
-      EXPECT_EQ(closure.a.session == i, closure.b.session == i);
-    }
-  }
-
- private:
-  std::vector<const SimulatedSession*> drives_;
-  std::vector<MergeSession> sessions_;
-  std::vector<BlobReader> readers_;
-  MergeOptions options_;
-  MergeWork work_ = MergeWork::Temporary().value();
-  MergePlan plan_;
-};
 
 // What is driven, and merged for the first time, is once for all tests.
 class MergePlannerTest : public ::testing::Test {
@@ -197,14 +91,7 @@ TEST_F(MergePlannerTest, WhatIsFromElsewhereStaysApart) {
 
 TEST_F(MergePlannerTest, WhatWasMergedStays) {
   Merge again;
-  again.Add(*first_, false);
-  again.Add(*second_, false);
-  for (const std::size_t i : {0U, 1U}) {
-    const std::vector<Pose> after = merge_->After(i);
-    for (std::size_t k = 0; k < after.size(); ++k) {
-      again.sessions()[i].keyframes[k].T_world_sensor = QuantizedPose::FromPose(after[k]);
-    }
-  }
+  again.AddMerged(*merge_, {0, 1});
   again.MustPlan();
   EXPECT_FALSE(again.plan().closures.empty());
   for (const SessionOutcome& outcome : again.plan().sessions) {
@@ -213,6 +100,81 @@ TEST_F(MergePlannerTest, WhatWasMergedStays) {
     EXPECT_TRUE(outcome.moved.empty());
     EXPECT_EQ(outcome.max_move_m, 0.0);
   }
+}
+
+TEST_F(MergePlannerTest, WhatWasDoneOnceIsRemembered) {
+  Merge again(merge_->work());
+  again.Add(*first_, false);
+  again.Add(*second_, true);
+  again.Add(*garage_, true);
+  again.MustPlan();
+  EXPECT_GT(merge_->reads(), 2 * merge_->keyframes());
+  EXPECT_LE(again.reads(), again.keyframes()) << "for the tiles alone";
+  ASSERT_EQ(again.plan().closures.size(), merge_->plan().closures.size());
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    const std::vector<Pose> is = again.After(i);
+    const std::vector<Pose> should = merge_->After(i);
+    for (std::size_t k = 0; k < is.size(); ++k) {
+      EXPECT_EQ(is[k].matrix(), should[k].matrix()) << i << " " << k;
+    }
+  }
+}
+
+// After it was applied, with a session that is new.
+TEST_F(MergePlannerTest, OnlyWhatIsNewIsFused) {
+  const testing::DrivePiece piece{
+      .seed = 4, .first = 50, .count = 48, .drift = DriftOptions{.seed = 7}};
+  const SimulatedSession third("third", piece, At(1.0, 0.5));
+  Merge later(merge_->work());
+  later.AddMerged(*merge_, {0, 1});
+  later.Add(third, true);
+  later.MustPlan();
+  EXPECT_TRUE(later.plan().sessions[0].is_held);
+  EXPECT_TRUE(later.plan().sessions[1].is_held);
+  EXPECT_TRUE(later.plan().sessions[2].is_joined);
+  later.ExpectTrueClosures();
+  EXPECT_LT(later.ErrorBetween(2, 0).place_m, 0.05);
+  EXPECT_LE(later.reads(), 4 * third.session().keyframes.size());
+}
+
+TEST_F(MergePlannerTest, OneThatWasEndedGoesOn) {
+  Merge ended;
+  ended.Add(*first_, false);
+  ended.Add(*second_, true);
+  const auto plan = ended.Plan([](std::string_view step, std::size_t, std::size_t) {
+    return step == "guided search" ? Status(StatusCode::kUnavailable, "enough") : Status();
+  });
+  ASSERT_FALSE(plan.has_value());
+  Merge again(ended.work());
+  again.Add(*first_, false);
+  again.Add(*second_, true);
+  again.MustPlan();
+  again.ExpectTogether(0, 1);
+  EXPECT_LE(again.reads(), 3 * again.keyframes()) << "two refinements, and the tiles";
+}
+
+// As many wrong ones as right ones, which do not agree with each other.
+TEST_F(MergePlannerTest, WrongClosuresAreNotBelieved) {
+  Merge merge(merge_->work());
+  merge.Add(*first_, false);
+  merge.Add(*second_, true);
+  std::size_t put = 0;
+  merge.MustPlan(
+      nullptr, [&](const std::vector<FoundClosure>& found, const std::vector<SessionWay>& ways) {
+        std::vector<FoundClosure> wrong;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          wrong.push_back(found[i]);
+          wrong.back().a.submap = (7 * i + 3) % ways[wrong.back().a.session].way_m.size();
+          wrong.back().b.submap = (5 * i + 1) % ways[wrong.back().b.session].way_m.size();
+          wrong.back().match.T_a_b.translation().x() += 11.0 + static_cast<double>(i);
+          if (!(wrong.back().a < wrong.back().b)) wrong.pop_back();
+        }
+        put += wrong.size();
+        return wrong;
+      });
+  EXPECT_GT(put, 20U);
+  merge.ExpectTrueClosures();
+  merge.ExpectTogether(0, 1);
 }
 
 // Beyond what registrations that begin elsewhere end apart.

@@ -68,7 +68,7 @@ TEST(SessionLinksTest, NothingIsMatchedOverAJump) {
     options.cut.length_m = 1.5;
     std::vector<MergeSession> sessions{street.session()};
     ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(),
-                             {MapProfile(), options, testing::SharedWork()}, nullptr)
+                             {MapProfile(), options, testing::SharedWork()}, {}, nullptr)
                     .ok());
     ASSERT_GT(sessions[0].submaps.size(), 2U);
     EXPECT_EQ(Links(sessions, options).empty(), jump_m < 1.25);
@@ -119,7 +119,7 @@ TEST(SessionLinksTest, OnAStreetMatchesAreBetterThanOdometry) {
       "car", {.first = 40, .count = 48, .drift = DriftOptions{.seed = 3}});
   std::vector<MergeSession> sessions{street.session()};
   ASSERT_TRUE(BuildSubmaps(sessions[0], StoredPoses(sessions[0]), street.reader(),
-                           {MapProfile(), MergeOptions(), testing::SharedWork()}, nullptr)
+                           {MapProfile(), MergeOptions(), testing::SharedWork()}, {}, nullptr)
                   .ok());
   std::array<double, 2> squares_m2{};  // of odometry, of matches
   std::array<std::size_t, 2> links{};

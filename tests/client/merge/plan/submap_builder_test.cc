@@ -36,7 +36,7 @@ class SubmapBuilderTest : public ::testing::Test {
   Status Build(MergeSession& session) {
     return BuildSubmaps(
         session, StoredPoses(session), [&](std::size_t i) -> Result<Bytes> { return blobs_[i]; },
-        Context(), nullptr);
+        Context(), {}, nullptr);
   }
 
   Submap::Tiles TilesOf(const MergeSession& session, std::size_t i) const {
@@ -69,7 +69,7 @@ TEST_F(SubmapBuilderTest, EachKeyframeIsReadOnceInOrderByTheCaller) {
         read.push_back(i);
         return blobs_[i];
       },
-      Context(),
+      Context(), {},
       [&](std::size_t submaps, std::size_t all) {
         EXPECT_EQ(all, 10U);
         done.push_back(submaps);
@@ -124,7 +124,7 @@ TEST_F(SubmapBuilderTest, TheCutIsThatOfTheStoredPoses) {
   const std::vector<Pose> longer = Straight(At(0.0), 31, 2.0);
   ASSERT_TRUE(BuildSubmaps(
                   session_, longer, [&](std::size_t i) -> Result<Bytes> { return blobs_[i]; },
-                  Context(), nullptr)
+                  Context(), {}, nullptr)
                   .ok());
   ASSERT_EQ(session_.submaps.size(), cuts.size());
   for (std::size_t i = 0; i < cuts.size(); ++i) {
@@ -181,11 +181,12 @@ TEST_F(SubmapBuilderTest, ErrorsOfTheReaderAndOfProgressEndIt) {
         if (i == 20) return Error(StatusCode::kUnavailable, "gone");
         return blobs_[i];
       },
-      Context(), nullptr);
+      Context(), {}, nullptr);
   EXPECT_EQ(of_reader, Status(StatusCode::kUnavailable, "gone"));
   const Status of_progress = BuildSubmaps(
       session_, StoredPoses(session_), [&](std::size_t i) -> Result<Bytes> { return blobs_[i]; },
-      Context(), [](std::size_t, std::size_t) { return Status(StatusCode::kTimeout, "enough"); });
+      Context(), {},
+      [](std::size_t, std::size_t) { return Status(StatusCode::kTimeout, "enough"); });
   EXPECT_EQ(of_progress, Status(StatusCode::kTimeout, "enough"));
 }
 

@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr ShapeTolerance kTolerance{0.005, 0.06 * kDegree};
 constexpr std::uint64_t kMuch = 1ULL << 30U;
 
 Pose At(double x_m, double yaw_rad = 0.0) {
@@ -96,7 +97,7 @@ TEST_F(MergeWorkTest, ASubmapComesBackAsItWas) {
   Open();
   const SubmapName name = Keep(5);
   for (int run = 0; run < 2; ++run) {
-    const auto sketch = work_->FindSubmap(5, shape_);
+    const auto sketch = work_->FindSubmap(5, shape_, kTolerance);
     ASSERT_TRUE(sketch.has_value());
     EXPECT_EQ(sketch->name, name);
     ASSERT_EQ(sketch->places.size(), submap_->places().size());
@@ -119,16 +120,16 @@ TEST_F(MergeWorkTest, ASubmapComesBackAsItWas) {
 TEST_F(MergeWorkTest, OnlyItsContentAndItsShapeFindIt) {
   Open();
   Keep(5);
-  EXPECT_FALSE(work_->FindSubmap(6, shape_).has_value());
-  EXPECT_FALSE(work_->FindSubmap(5, std::vector<Pose>{At(-1.0), At(0.0)}).has_value());
+  EXPECT_FALSE(work_->FindSubmap(6, shape_, kTolerance).has_value());
+  EXPECT_FALSE(work_->FindSubmap(5, std::vector<Pose>{At(-1.0), At(0.0)}, kTolerance).has_value());
   shape_[2] = At(1.0049, 0.059 * kDegree);
-  EXPECT_TRUE(work_->FindSubmap(5, shape_).has_value());
+  EXPECT_TRUE(work_->FindSubmap(5, shape_, kTolerance).has_value());
   shape_[2] = At(1.0051);
-  EXPECT_FALSE(work_->FindSubmap(5, shape_).has_value());
+  EXPECT_FALSE(work_->FindSubmap(5, shape_, kTolerance).has_value());
   shape_[2] = At(1.0, 0.061 * kDegree);
-  EXPECT_FALSE(work_->FindSubmap(5, shape_).has_value());
+  EXPECT_FALSE(work_->FindSubmap(5, shape_, kTolerance).has_value());
   const SubmapName other = Keep(5);
-  EXPECT_EQ(work_->FindSubmap(5, shape_)->name, other);
+  EXPECT_EQ(work_->FindSubmap(5, shape_, kTolerance)->name, other);
 }
 
 TEST_F(MergeWorkTest, MatchesAreOfTheirSubmapsAndStarts) {
@@ -183,8 +184,8 @@ TEST_F(MergeWorkTest, WhatIsWithoutItsFileIsForgottenWithAllThatWasFoundWithIt) 
   }
   for (int run = 0; run < 2; ++run) {
     Open();
-    EXPECT_TRUE(work_->FindSubmap(5, shape_).has_value());
-    EXPECT_FALSE(work_->FindSubmap(6, shape_).has_value());
+    EXPECT_TRUE(work_->FindSubmap(5, shape_, kTolerance).has_value());
+    EXPECT_FALSE(work_->FindSubmap(6, shape_, kTolerance).has_value());
     EXPECT_FALSE(work_->FindMatch(a, b, At(1.0)).has_value());
     EXPECT_FALSE(work_->FindSearch(5, 6, At(1.0), {}).has_value());
   }
@@ -199,7 +200,7 @@ TEST_F(MergeWorkTest, ADamagedFileIsToldAndMadeAnew) {
   const auto damaged = work_->LoadSubmap(name);
   ASSERT_FALSE(damaged.has_value());
   EXPECT_EQ(damaged.error().code(), StatusCode::kInvalidData);
-  EXPECT_FALSE(work_->FindSubmap(5, shape_).has_value());
+  EXPECT_FALSE(work_->FindSubmap(5, shape_, kTolerance).has_value());
   EXPECT_EQ(Keep(5), name);
   EXPECT_TRUE(work_->LoadSubmap(name).has_value());
 }
@@ -208,7 +209,7 @@ TEST_F(MergeWorkTest, WhatWasMadeByOtherRulesIsGone) {
   Open(1);
   Keep(5);
   Open(2);
-  EXPECT_FALSE(work_->FindSubmap(5, shape_).has_value());
+  EXPECT_FALSE(work_->FindSubmap(5, shape_, kTolerance).has_value());
   EXPECT_TRUE(Files().empty());
 }
 
@@ -221,10 +222,10 @@ TEST_F(MergeWorkTest, ItTakesNoMoreThanItMay) {
   for (const fs::path& file : files) {
     fs::last_write_time(file, fs::last_write_time(file) - std::chrono::hours(1));
   }
-  EXPECT_TRUE(work_->FindSubmap(6, shape_).has_value());
+  EXPECT_TRUE(work_->FindSubmap(6, shape_, kTolerance).has_value());
   Open(1, fs::file_size(files[0]) + 1);
   EXPECT_EQ(Files().size(), 1U);
-  EXPECT_TRUE(work_->FindSubmap(6, shape_).has_value());
+  EXPECT_TRUE(work_->FindSubmap(6, shape_, kTolerance).has_value());
 }
 
 TEST_F(MergeWorkTest, OneProgramAtATimeWorksInIt) {
@@ -247,7 +248,7 @@ TEST_F(MergeWorkTest, ATemporaryOneGoes) {
   {
     MergeWork work = MergeWork::Temporary().value();
     ASSERT_TRUE(work.KeepSubmap(5, shape_, *submap_).has_value());
-    EXPECT_TRUE(work.FindSubmap(5, shape_).has_value());
+    EXPECT_TRUE(work.FindSubmap(5, shape_, kTolerance).has_value());
     during = entries();
   }
   const std::set<fs::path> after = entries();
