@@ -43,12 +43,14 @@ Result<ChangeReport> ReportChanges(const MergeRun& run, const MergeProgress& pro
   ChangePicture picture(part, run.profile);
   for (std::size_t i = 0; i < placed.size(); ++i) {
     if (!IsPublished(run, i)) continue;
-    std::vector<PlacedSession> others;
+    std::vector<PlacedSession> earlier;
     for (std::size_t k = 0; k < placed.size(); ++k) {
-      if (k != i && run.plan.sessions[k].is_joined) others.push_back(placed[k]);
+      const bool is_before = IsEarlier(run.sessions[k], run.sessions[i]);
+      if (is_before && run.plan.sessions[k].is_joined) earlier.push_back(placed[k]);
     }
+    if (earlier.empty()) continue;
     auto changes = ChangesSeenBy(
-        placed[i], others, run.profile, {}, [&](const Tile& tile) { picture.Draw(tile); },
+        placed[i], earlier, run.profile, {}, [&](const Tile& tile) { picture.Draw(tile); },
         [&](std::size_t done, std::size_t all) {
           return progress ? progress("changes", done, all) : Status();
         });

@@ -11,10 +11,19 @@
 namespace atlas {
 namespace {
 
+// Whether rays passed at `p` (window frame), or a road lies so little below it that nothing stands
+// there where one can drive.
+bool WasLookedAt(const MapWindow& other, const Eigen::Vector3f& p) {
+  constexpr float kDriven_m = 1.6F;
+  if (other.IsFree(p)) return true;
+  const auto road = other.NearestSurface(p, kDriven_m);
+  return road && road->height_m > 0.0F;
+}
+
 // Whether `other` was there and found nothing at `p` (world), nor around it.
 bool IsBare(const MapWindow& other, const Eigen::Vector3d& p, float step_m, int steps) {
   const Eigen::Vector3f middle = (p - other.origin()).cast<float>();
-  if (!other.IsFree(middle)) return false;
+  if (!WasLookedAt(other, middle)) return false;
   for (int x = -steps; x <= steps; ++x) {
     for (int y = -steps; y <= steps; ++y) {
       for (int z = -1; z <= 1; ++z) {
@@ -82,8 +91,9 @@ class Groups {
   }
   // The earlier one stands for both.
   void Join(std::size_t a, std::size_t b) {
-    const auto [first, second] = std::minmax(Of(a), Of(b));
-    parent_[second] = first;
+    const std::size_t of_a = Of(a);
+    const std::size_t of_b = Of(b);
+    parent_[std::max(of_a, of_b)] = std::min(of_a, of_b);
   }
 
  private:

@@ -43,9 +43,13 @@ std::int64_t MiddleTime(const MergeSession& session) {
 
 }  // namespace
 
+bool IsEarlier(const MergeSession& one, const MergeSession& other) {
+  return MiddleTime(one) < MiddleTime(other);
+}
+
 Result<std::vector<MapChange>> ChangesSeenBy(
     const PlacedSession& later,
-    const std::vector<PlacedSession>& others,
+    const std::vector<PlacedSession>& earlier,
     const MapProfile& profile,
     const ChangeOptions& options,
     const std::function<void(const Tile&)>& on_tile,
@@ -54,9 +58,8 @@ Result<std::vector<MapChange>> ChangesSeenBy(
   FusedSide before(profile);
   FusedSide after(profile);
   Status status = after.Add(*later.session, later.T_world_sensor, *later.read, is_near);
-  for (const PlacedSession& other : others) {
-    if (!status.ok() || MiddleTime(*other.session) >= MiddleTime(*later.session)) continue;
-    status = before.Add(*other.session, other.T_world_sensor, *other.read, is_near);
+  for (auto other = earlier.begin(); other != earlier.end() && status.ok(); ++other) {
+    status = before.Add(*other->session, other->T_world_sensor, *other->read, is_near);
   }
   if (!status.ok()) return Error(std::move(status));
   auto changes = FindChanges(before, after, profile, options, on_tile, progress);

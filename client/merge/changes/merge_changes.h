@@ -21,12 +21,15 @@ struct PlacedSession {
   const BlobReader* read = nullptr;
 };
 
-// Of `later`, against those of `others` that were there before: the middle of whose keyframes was
-// taken earlier. Things as FindChanges has them. `on_tile` is told of each tile of `later`;
-// both it and `progress` may be empty. Errors are those of FusedSide and of `progress`.
+// By when the middle of their keyframes was taken.
+bool IsEarlier(const MergeSession& one, const MergeSession& other);
+
+// Of `later`, against those that were there before. Things as FindChanges has them. `on_tile` is
+// told of each tile of `later`; both it and `progress` may be empty. Errors are those of FusedSide
+// and of `progress`.
 Result<std::vector<MapChange>> ChangesSeenBy(
     const PlacedSession& later,
-    const std::vector<PlacedSession>& others,
+    const std::vector<PlacedSession>& earlier,
     const MapProfile& profile,
     const ChangeOptions& options,
     const std::function<void(const Tile&)>& on_tile,
