@@ -124,11 +124,19 @@ SubmapMatch MatchSubmaps(const SubmapWindow& a,
                          const Pose& T_a_b_start,
                          const MatchOptions& options) {
   const OneWay a_way = RegisterIn(a, b, T_a_b_start, options);
-  const OneWay b_way = RegisterIn(b, a, T_a_b_start.inverse(), options);
   const RegistrationResult& there = a_way.result;
+  SubmapMatch match;
+  if (there.fit < options.min_fit || there.column_inliers < options.min_columns) {
+    match.T_a_b = there.T_world_level;
+    match.fit = there.fit;
+    match.columns = there.column_inliers;
+    match.explained = a_way.explained;
+    match.sigma_m = WorstSigma(there);
+    return match;
+  }
+  const OneWay b_way = RegisterIn(b, a, T_a_b_start.inverse(), options);
   const RegistrationResult& back = b_way.result;
   const Pose T_a_b_back = back.T_world_level.inverse();
-  SubmapMatch match;
   match.T_a_b = Midway(there.T_world_level, T_a_b_back);
   match.information = there.information + Inverted(back.information, match.T_a_b);
   match.fit = std::min(there.fit, back.fit);

@@ -98,7 +98,8 @@ struct SubmapMatch {
 };
 
 // From nearby: as far as registrations reach, half a metre and some degrees. Always an answer;
-// IsBelieved tells whether it is one.
+// IsBelieved tells whether it is one. Where b does not fit into a (min_fit, min_columns), a is not
+// tried in b: nothing is believed then, and what it says is of the one way.
 SubmapMatch MatchSubmaps(const SubmapWindow& a,
                          const SubmapWindow& b,
                          const Pose& T_a_b_start,

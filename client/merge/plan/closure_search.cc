@@ -41,7 +41,7 @@ SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions) {
 ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
                              const std::vector<SessionWay>& ways,
                              const MergeContext& context)
-    : sessions_(sessions), ways_(ways), options_(context.options) {
+    : sessions_(sessions), ways_(ways), options_(context.options), work_(context.work) {
   for (std::size_t session = 0; session < sessions.size(); ++session) {
     for (std::size_t submap = 0; submap < sessions[session].submaps.size(); ++submap) {
       all_.push_back({session, submap});
@@ -64,7 +64,10 @@ Result<std::vector<FoundClosure>> ClosureSearch::SearchAnywhere(const Progress& 
   }
   DropAskedTwice(tasks);
   Result<std::vector<FoundClosure>> closures = Run(std::move(tasks), progress);
-  if (closures) KeepLikeliest(*closures);
+  if (!closures) return closures;
+  KeepLikeliest(*closures);
+  Status status = KeepSearched();
+  if (!status.ok()) return Error(std::move(status));
   return closures;
 }
 
@@ -112,6 +115,23 @@ ClosureSearch::Task ClosureSearch::TaskOf(const SubmapRef& from,
   return from < to ? Task{from, to, T_from_to, reach} : Task{to, from, T_from_to.inverse(), reach};
 }
 
+// A session that comes to the map looks for itself there, and nobody there for it. Two that are in
+// the map and were looked for in each other before are where they are.
+bool ClosureSearch::LooksFor(std::size_t session, std::size_t other) const {
+  const MergeSession& own = sessions_[session];
+  if (own.is_staged) return true;
+  return !sessions_[other].is_staged && !work_.WereSearched(own.content, sessions_[other].content);
+}
+
+Status ClosureSearch::KeepSearched() {
+  for (const MergeSession& one : sessions_) {
+    for (const MergeSession& other : sessions_) {
+      ATLAS_RETURN_IF_ERROR(work_.KeepSearched(one.content, other.content));
+    }
+  }
+  return {};
+}
+
 // Of searches for one submap in another, as far around nearly the same start, the first stays.
 void ClosureSearch::DropAskedTwice(std::vector<Task>& tasks) {
   std::map<std::pair<SubmapRef, SubmapRef>, std::vector<Task>> asked;
@@ -137,7 +157,7 @@ std::vector<ClosureSearch::Task> ClosureSearch::LookAlike() const {
   for (std::size_t i = 0; i < all_.size(); ++i) {
     if (all_[i].submap % options_.probe_stride != 0) continue;
     const auto may_be = [&](std::size_t other) {
-      return MayMeet(all_[i], all_[other]);
+      return MayMeet(all_[i], all_[other]) && LooksFor(all_[i].session, all_[other].session);
     };
     for (const SubmapCandidate& candidate :
          SearchPlaces(submaps, submaps[i], may_be, options_.places)) {

@@ -72,6 +72,8 @@ class ClosureSearch {
                      const SubmapRef& to,
                      const Pose& T_from_to,
                      const std::optional<SearchReach>& reach);
+  bool LooksFor(std::size_t session, std::size_t other) const;
+  Status KeepSearched();
   static void DropAskedTwice(std::vector<Task>& tasks);
   std::vector<Task> LookAlike() const;
   std::vector<Task> LieNear(const SubmapPoses& T_world_submap,
@@ -84,6 +86,7 @@ class ClosureSearch {
   const std::vector<MergeSession>& sessions_;
   const std::vector<SessionWay>& ways_;
   const MergeOptions& options_;
+  MergeWork& work_;
   std::vector<SubmapRef> all_;
   std::vector<MatchWorker> workers_;
   std::set<std::pair<SubmapRef, SubmapRef>> looked_at_;  // by SearchNear

@@ -43,6 +43,7 @@ struct MergeSession {
   std::vector<MergeKeyframe> keyframes;  // rising in sequence
   std::vector<Pose> T_world_sensor;      // of each, by which the submaps were fused
   std::vector<MergeSubmap> submaps;
+  std::uint64_t content = 0;  // Hash64 of its keyframes and of how it is cut; with the submaps
 };
 
 // One of all submaps of all sessions.

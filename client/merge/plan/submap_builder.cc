@@ -151,8 +151,10 @@ std::uint64_t HashOf(const MergeSession& session, const CutOptions& options) {
   return Hash64(out.bytes());
 }
 
-Result<std::vector<SubmapCut>> Cut(const MergeSession& session, const MergeContext& context) {
-  CutRecord record{HashOf(session, context.options.cut), {}};
+Result<std::vector<SubmapCut>> Cut(const MergeSession& session,
+                                   std::uint64_t content,
+                                   const MergeContext& context) {
+  CutRecord record{content, {}};
   if (auto known = context.work.FindCut(record.session)) return *std::move(known);
   record.cuts = CutSession(StoredPoses(session), context.options.cut);
   Status status = context.work.KeepCut(record);
@@ -168,7 +170,8 @@ Status BuildSubmaps(MergeSession& session,
                     const MergeContext& context,
                     const ShapeTolerance& tolerance,
                     const std::function<Status(std::size_t done, std::size_t all)>& progress) {
-  const auto cut = Cut(session, context);
+  session.content = HashOf(session, context.options.cut);
+  const auto cut = Cut(session, session.content, context);
   if (!cut) return cut.error();
   const std::vector<SubmapCut>& cuts = *cut;
   const std::size_t workers = context.options.workers;

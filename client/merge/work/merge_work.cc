@@ -117,6 +117,7 @@ struct MergeWork::Folder {
   std::map<std::pair<SubmapName, SubmapName>, std::vector<MatchRecord>> matches = {};
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::vector<SearchRecord>> searches = {};
   std::map<std::uint64_t, std::vector<SubmapCut>> cuts = {};
+  std::set<std::pair<std::uint64_t, std::uint64_t>> searched = {};
 
   fs::path PathOf(const SubmapName& name) const {
     return path / StrCat(Hex(name.content), "-", Hex(name.shape), kSuffix);
@@ -126,6 +127,7 @@ struct MergeWork::Folder {
   void Learn(const MatchRecord& record) { matches[{record.a, record.b}].push_back(record); }
   void Learn(const SearchRecord& record) { searches[{record.a, record.b}].push_back(record); }
   void Learn(const CutRecord& record) { cuts[record.session] = record.cuts; }
+  void Learn(const PairRecord& record) { searched.emplace(record.a, record.b); }
 
   Status Keep(const WorkRecord& record) {
     const std::lock_guard guard(mutex);
@@ -269,6 +271,16 @@ std::optional<std::vector<SubmapCut>> MergeWork::FindCut(std::uint64_t session) 
 
 Status MergeWork::KeepCut(const CutRecord& cut) {
   return folder_->Keep(cut);
+}
+
+bool MergeWork::WereSearched(std::uint64_t one, std::uint64_t other) const {
+  const std::lock_guard guard(folder_->mutex);
+  return folder_->searched.contains(std::minmax(one, other));
+}
+
+Status MergeWork::KeepSearched(std::uint64_t one, std::uint64_t other) {
+  if (WereSearched(one, other)) return {};
+  return folder_->Keep(PairRecord{std::min(one, other), std::max(one, other)});
 }
 
 std::optional<SubmapSketch> MergeWork::FindSubmap(std::uint64_t content,

@@ -56,6 +56,10 @@ class MergeWork {
   std::optional<std::vector<SubmapCut>> FindCut(std::uint64_t session) const;
   Status KeepCut(const CutRecord& cut);
 
+  // Whether the two, as FindCut has them, were looked for in each other, in either order.
+  bool WereSearched(std::uint64_t one, std::uint64_t other) const;
+  Status KeepSearched(std::uint64_t one, std::uint64_t other);
+
   // Of this content the one whose members lie nearest `T_submap_member`, if all lie as near as
   // `tolerance`.
   std::optional<SubmapSketch> FindSubmap(std::uint64_t content,

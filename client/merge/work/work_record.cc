@@ -7,7 +7,7 @@
 namespace atlas {
 namespace {
 
-enum class Kind : std::uint8_t { kSubmap = 1, kMatch, kSearch, kCut };
+enum class Kind : std::uint8_t { kSubmap = 1, kMatch, kSearch, kCut, kPair };
 
 constexpr std::size_t kPoseBytes = 12 * 8;
 constexpr std::size_t kCutBytes = 2 * 8 + 1;
@@ -180,6 +180,17 @@ CutRecord ReadCut(Reader& in) {
   return record;
 }
 
+void Write(const PairRecord& record, Writer& out) {
+  out.Add(Kind::kPair);
+  out.Add(record.a);
+  out.Add(record.b);
+}
+
+PairRecord ReadPair(Reader& in) {
+  const std::uint64_t a = in.ReadNumber();
+  return {a, in.ReadNumber()};
+}
+
 }  // namespace
 
 Bytes EncodeRecord(const WorkRecord& record) {
@@ -203,6 +214,9 @@ std::optional<WorkRecord> DecodeRecord(ByteSpan bytes) {
       break;
     case Kind::kCut:
       record = ReadCut(in);
+      break;
+    case Kind::kPair:
+      record = ReadPair(in);
       break;
   }
   return in.IsAtEnd() ? record : std::nullopt;

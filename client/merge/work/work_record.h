@@ -45,7 +45,13 @@ struct CutRecord {
   std::vector<SubmapCut> cuts;
 };
 
-using WorkRecord = std::variant<SubmapRecord, MatchRecord, SearchRecord, CutRecord>;
+// Two sessions that were looked for in each other by what they look like, wherever that is.
+struct PairRecord {
+  std::uint64_t a = 0;  // as CutRecord's, the lesser first
+  std::uint64_t b = 0;
+};
+
+using WorkRecord = std::variant<SubmapRecord, MatchRecord, SearchRecord, CutRecord, PairRecord>;
 
 Bytes EncodeRecord(const WorkRecord& record);
 // None: they are no record's.

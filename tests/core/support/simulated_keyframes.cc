@@ -33,10 +33,12 @@ PointCloud CloudOf(const SimulatedScan& scan) {
 DrivenKeyframes DriveThrough(const DrivePiece& piece, const MapProfile& profile) {
   DriveOptions options;
   options.seed = piece.seed;
+  options.parked_seed = piece.parked_seed;
   const SimulatedDrive drive =
       SimulatedDrive::Create(MakeWorld(piece.world).value(), options).value();
   const KeyframeBuilder builder = BuilderFor(options, profile);
   DrivenKeyframes driven;
+  driven.parked = drive.parked_boxes();
   for (std::size_t i = piece.first; i < piece.first + piece.count; ++i) {
     driven.truth.push_back(drive.sensor_pose(i));
   }

@@ -12,6 +12,7 @@
 #include "core/geometry/pose.h"
 #include "core/keyframe/keyframe.h"
 #include "core/simulation/pose_drift.h"
+#include "core/simulation/truth_box.h"
 #include "core/simulation/worlds/simulated_world.h"
 
 namespace atlas::testing {
@@ -22,6 +23,7 @@ struct DrivePiece {
   std::size_t first = 0;   // scan, 1.25 m apart
   std::size_t count = 1;
   std::optional<DriftOptions> drift = std::nullopt;  // none: true poses
+  std::uint64_t parked_seed = 0;                     // DriveOptions::parked_seed
 };
 
 // As many of each.
@@ -29,6 +31,7 @@ struct DrivenKeyframes {
   std::vector<Pose> truth;           // T_world_sensor
   std::vector<Pose> T_world_sensor;  // with drift: right at the first one
   std::vector<std::shared_ptr<const Keyframe>> keyframes;
+  std::vector<TruthBox> parked;  // cars that are parked in this drive, all along the way
 };
 
 // Throws where the simulation fails.

@@ -11,6 +11,7 @@ SimulatedSession::SimulatedSession(const std::string& vehicle,
   const DrivenKeyframes driven = DriveThrough(piece, MapProfile());
   session_.key = {vehicle, "drive"};
   truth_ = driven.truth;
+  parked_ = driven.parked;
   for (std::size_t i = 0; i < driven.keyframes.size(); ++i) {
     const auto sequence = static_cast<std::uint32_t>(piece.first + i);
     blobs_->push_back(EncodeKeyframe(*driven.keyframes[i]));

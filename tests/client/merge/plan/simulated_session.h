@@ -7,6 +7,7 @@
 
 #include "client/merge/plan/merge_session.h"
 #include "client/merge/plan/submap_builder.h"
+#include "core/simulation/truth_box.h"
 #include "tests/core/support/simulated_keyframes.h"
 
 namespace atlas::testing {
@@ -22,6 +23,7 @@ class SimulatedSession {
   const MergeSession& session() const { return session_; }
   // Of its blobs; valid without it.
   BlobReader reader() const;
+  const std::vector<TruthBox>& parked() const { return parked_; }
   const std::vector<Pose>& truth() const { return truth_; }  // T_world_sensor by keyframe
   // T_world_submap of one of `fused`, this session with submaps.
   Pose TruthOf(const MergeSession& fused, std::size_t submap) const;
@@ -29,6 +31,7 @@ class SimulatedSession {
  private:
   MergeSession session_;
   std::vector<Pose> truth_;
+  std::vector<TruthBox> parked_;
   std::shared_ptr<std::vector<Bytes>> blobs_ = std::make_shared<std::vector<Bytes>>();
 };
 
