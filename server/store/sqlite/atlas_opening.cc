@@ -295,15 +295,19 @@ Status Refusal(const DataDirectory& directory, const Status& status) {
 // Nothing is read by a schema that is damaged. What was put right of it, for people.
 Result<std::string> MakeReadable(Connection& writer,
                                  const DamagedLog& log,
+                                 const DataDirectory& directory,
                                  const SqliteStoreOptions& options) {
-  if (Status status = log.is_lossy() ? CheckBehindDamage(writer, log) : Status(); !status.ok()) {
+  // What was copied of lost commits may be longer than what is left.
+  Status status =
+      log.is_lossy() ? CheckBehindDamage(writer, log) : CheckEnd(writer, directory.database_file());
+  if (!status.ok()) {
     return Error(std::move(status));
   }
   Result<std::string> schema = RepairSchema(writer);
   if (!schema) {
     return schema;
   }
-  Status status = MigrateStore(writer, options.on_upgrade);
+  status = MigrateStore(writer, options.on_upgrade);
   if (status.ok()) {
     status = CheckPagesAreTheirs(writer);
   }
@@ -337,7 +341,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
   try {
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     AddRowHash(*writer);
-    const Result<std::string> schema = MakeReadable(*writer, *log, options);
+    const Result<std::string> schema = MakeReadable(*writer, *log, directory, options);
     if (!schema) {
       return Error(Refusal(directory, schema.error()));
     }
