@@ -4,6 +4,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/migrations/migration.h"
+#include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
@@ -51,12 +53,27 @@ Status RefuseLogOfAnother(const DataDirectory& directory) {
                  "the log away to begin a new atlas")};
 }
 
+// A new atlas in its place would tell vehicles that what they hold is of nobody.
+Status RefusePlaceOfAnother(const DataDirectory& directory) {
+  const std::filesystem::path note = NoteOf(directory.database_file());
+  const auto noted = ReadRevisionNote(note);
+  if (!noted) {
+    return {};
+  }
+  return {
+      StatusCode::kConflict,
+      StrCat(note.string(), " is of an atlas at revision ", noted->revision,
+             " that is not there: put atlas.db back beside it, or restore a backup; or move the "
+             "note away to begin a new atlas")};
+}
+
 Status CreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
   if (!options.new_profile) {
     return Status(StatusCode::kNotFound,
                   StrCat("there is no atlas in ", options.directory.string()));
   }
   ATLAS_RETURN_IF_ERROR(RefuseLogOfAnother(directory));
+  ATLAS_RETURN_IF_ERROR(RefusePlaceOfAnother(directory));
   ATLAS_RETURN_IF_ERROR(options.new_profile->Validate());
   directory.RemoveUnfinished();
   try {
@@ -132,10 +149,15 @@ Result<DamagedLog> MendLog(const std::filesystem::path& log) {
   return damaged;
 }
 
+std::string LossOf(const DamagedLog& log) {
+  return StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.lost_commits,
+                " commits are lost");
+}
+
 // Part of what is lost may have been copied into the database before the damage: then pages of
 // different commits are in it, and what is left of the log goes to none of them. Nothing is written
 // then.
-Status CheckWhatIsLeft(Connection& writer, const DamagedLog& log) {
+Status CheckWhatIsLeft(Connection& writer, const std::string& loss) {
   writer.KeepLog(true);
   Status left;
   try {
@@ -147,14 +169,44 @@ Status CheckWhatIsLeft(Connection& writer, const DamagedLog& log) {
     writer.KeepLog(false);
     return {};
   }
-  if (log.damage.turned.empty()) {
+  return {StatusCode::kInvalidData, StrCat(loss, ", and what is left is no atlas (", left.message(),
+                                           "): nothing was changed; restore a backup")};
+}
+
+Status CheckBehindDamage(Connection& writer, const DamagedLog& log) {
+  Status left = CheckWhatIsLeft(writer, LossOf(log));
+  if (!left.ok() && log.damage.turned.empty()) {
     std::error_code ignored;
     std::filesystem::remove(log.kept, ignored);  // the log is what it was
   }
-  return {StatusCode::kInvalidData,
-          StrCat("the log is damaged at frame ", log.damage.frame, ", ", log.damage.lost_commits,
-                 " commits are lost, and what is left is no atlas (", left.message(),
-                 "): nothing was changed; restore a backup")};
+  return left;
+}
+
+// Which commits are lost, for people: by what the log is, else by how far the atlas is known to
+// have been. Empty: none.
+Result<std::string> FindLoss(Connection& writer,
+                             const StoreIdentity& identity,
+                             const DamagedLog& log,
+                             const std::optional<NotedRevision>& noted) {
+  if (log.is_lossy()) {
+    return LossOf(log);
+  }
+  if (!noted || !IsCounterIntact(writer, Counter::kRevision)) {
+    return std::string();
+  }
+  const std::uint64_t revision = ReadCounter(writer, Counter::kRevision);
+  if (!noted->IsBeyond(identity, revision)) {
+    return std::string();
+  }
+  std::string loss =
+      StrCat("commits are missing: the atlas was at revision ", noted->revision, " of epoch ",
+             noted->epoch, ", and is at revision ", revision, " of epoch ", identity.epoch,
+             ": its log (atlas.db-wal) was removed or cut, or an older copy was put in its place");
+  // A copy of an earlier version is checked by nobody: it lacks what is made of it behind this.
+  const auto version = ReadSchemaVersion(writer);
+  const Status left =
+      version && *version == kStoreSchemaVersion ? CheckWhatIsLeft(writer, loss) : Status();
+  return left.ok() ? Result<std::string>(std::move(loss)) : Error(left);
 }
 
 // Of bits that were turned back.
@@ -171,16 +223,19 @@ std::string NoteMended(Connection& writer, const DamagedLog& log) {
 }
 
 // Vehicles are told by the epoch, as after a restore from a backup.
-std::string NoteLoss(Connection& writer, StoreIdentity& identity, const DamagedLog& log) {
+std::string NoteLoss(Connection& writer,
+                     StoreIdentity& identity,
+                     const std::string& loss,
+                     const std::filesystem::path& kept,
+                     const std::optional<NotedRevision>& noted) {
   writer.Begin();
   const std::uint64_t before = ReadCounter(writer, Counter::kRevision);
-  const NewLine line = BeginLine(writer, identity);
+  const PlaceInLine line = BeginLine(writer, identity, PlaceOf(noted, identity));
   identity.epoch = line.epoch;
-  std::string what =
-      StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.lost_commits,
-             " commits are lost, the atlas goes on from revision ", before, " in epoch ",
-             line.epoch, "; a copy of the log is ", log.kept.filename().string());
-  AddEvent(writer, {EventKind::kLogDamaged, kAtlasItself, log.kept.filename().string(), what});
+  const std::string copy = kept.filename().string();
+  std::string what = StrCat(loss, "; the atlas goes on from revision ", before, " in epoch ",
+                            line.epoch, copy.empty() ? "" : "; a copy of the log is ", copy);
+  AddEvent(writer, {EventKind::kLogDamaged, kAtlasItself, copy, what});
   writer.Commit();
   return what;
 }
@@ -240,19 +295,29 @@ Status Refusal(const DataDirectory& directory, const Status& status) {
 // Nothing is read by a schema that is damaged. What was put right of it, for people.
 Result<std::string> MakeReadable(Connection& writer,
                                  const DamagedLog& log,
+                                 const DataDirectory& directory,
                                  const SqliteStoreOptions& options) {
-  if (Status status = log.is_lossy() ? CheckWhatIsLeft(writer, log) : Status(); !status.ok()) {
+  // What was copied of lost commits may be longer than what is left.
+  Status status =
+      log.is_lossy() ? CheckBehindDamage(writer, log) : CheckEnd(writer, directory.database_file());
+  if (!status.ok()) {
     return Error(std::move(status));
   }
   Result<std::string> schema = RepairSchema(writer);
   if (!schema) {
     return schema;
   }
-  Status status = MigrateStore(writer, options.on_upgrade);
+  status = MigrateStore(writer, options.on_upgrade);
   if (status.ok()) {
     status = CheckPagesAreTheirs(writer);
   }
   return status.ok() ? std::move(schema) : Error(std::move(status));
+}
+
+void Tell(const std::function<void(const std::string&)>& whom, const std::string& what) {
+  if (whom) {
+    whom(what);
+  }
 }
 
 }  // namespace
@@ -276,7 +341,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
   try {
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     AddRowHash(*writer);
-    const Result<std::string> schema = MakeReadable(*writer, *log, options);
+    const Result<std::string> schema = MakeReadable(*writer, *log, directory, options);
     if (!schema) {
       return Error(Refusal(directory, schema.error()));
     }
@@ -284,28 +349,26 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     if (!identity) {
       return Error(identity.error().WithContext(directory.database_file().string()));
     }
+    const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
+    const Result<std::string> loss = FindLoss(*writer, *identity, *log, noted);
+    if (!loss) {
+      return Error(Refusal(directory, loss.error()));
+    }
     writer->Execute("PRAGMA journal_mode = WAL");
     KeepTableSums(*writer);
     MarkAtTheEnd(*writer);
     if (log->damage.has_rest) {  // else what is written from now on would stand before it
       WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
     }
+    if (!loss->empty()) {  // before a revision is given again
+      Tell(options.on_damaged_log, NoteLoss(*writer, *identity, *loss, log->kept, noted));
+    }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
     for (const std::string& what : Mend(*writer, identity->profile.levels, *schema)) {
-      if (options.on_repair) {
-        options.on_repair(what);
-      }
+      Tell(options.on_repair, what);
     }
-    const auto tell = [&options](const std::string& what) {
-      if (options.on_damaged_log) {
-        options.on_damaged_log(what);
-      }
-    };
     if (!log->damage.turned.empty()) {
-      tell(NoteMended(*writer, *log));
-    }
-    if (log->is_lossy()) {
-      tell(NoteLoss(*writer, *identity, *log));
+      Tell(options.on_damaged_log, NoteMended(*writer, *log));
     }
     KeepVehicleBytes(*writer);
     AtlasPast past = ReadPast(*writer);

@@ -14,6 +14,7 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/database_files.h"
+#include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
@@ -75,8 +76,8 @@ Status CheckIdle(const fs::path& folder) {
 }
 
 // The copy becomes an atlas that goes on by itself.
-Status GoOn(const fs::path& copy, const std::string& backup, RestoredAtlas& restored) {
-  Connection connection({copy, DatabaseOptions::Mode::kReadWrite, kCache_kib, 0});
+Status GoOn(const fs::path& target, const std::string& backup, RestoredAtlas& restored) {
+  Connection connection({PartialOf(target), DatabaseOptions::Mode::kReadWrite, kCache_kib, 0});
   connection.Execute("PRAGMA journal_mode = MEMORY;");
   AddRowHash(connection);
   KeepTableSums(connection);
@@ -85,7 +86,8 @@ Status GoOn(const fs::path& copy, const std::string& backup, RestoredAtlas& rest
   if (!identity) {
     return identity.error();
   }
-  const NewLine line = BeginLine(connection, *identity);
+  const auto noted = ReadRevisionNote(NoteOf(target));
+  const PlaceInLine line = BeginLine(connection, *identity, PlaceOf(noted, *identity));
   restored.epoch = line.epoch;
   restored.revision = line.revision;
   AddEvent(connection, {EventKind::kBackupRestored, kAuthor, backup,
@@ -112,7 +114,7 @@ Status MakeCopy(const RestoreOrder& order, const fs::path& target, RestoredAtlas
     const Snapshot snapshot(from);
     ATLAS_RETURN_IF_ERROR(CopyAtlas(from, target, order.work));
   }
-  ATLAS_RETURN_IF_ERROR(GoOn(PartialOf(target), order.backup.filename().string(), restored));
+  ATLAS_RETURN_IF_ERROR(GoOn(target, order.backup.filename().string(), restored));
   const Result<AtlasFacts> copy = ReadAtlasBack(PartialOf(target), order.work);
   return copy ? CheckCopy(restored, *copy) : copy.error().WithContext("the copy was read back");
 }

@@ -1,6 +1,7 @@
 #include "server/store/sqlite/sqlite_store.h"
 
 #include <exception>
+#include <functional>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -12,6 +13,7 @@
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
+#include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/index_check.h"
 #include "server/store/sqlite/schema/schema.h"
@@ -64,13 +66,13 @@ class SqliteStore final : public AtlasStore {
         identity_(std::move(atlas.identity)),
         tiles_(options.tile_directory_bytes),
         room_([directory = options.directory] { return ReadFreeBytes(directory); }),
+        note_(NoteOf(directory_.database_file()), identity_),
         guard_(options.on_failed_sync),
         log_(CopierOptions(directory_.database_file()), {}, *atlas.writer, guard_),
         writes_(std::move(atlas.writer),
                 {options.max_queued_writes, options.max_group, &ReadRevision,
-                 [this](Connection& connection) {
-                   room_.NoteUsed(ReadUsedBytes(connection));
-                 }},
+                 [this](Connection& connection) { room_.NoteUsed(ReadUsedBytes(connection)); },
+                 std::bind_front(&RevisionNote::Write, &note_)},
                 guard_),
         readers_(ReaderOptions(options, directory_.database_file()), options.max_readers) {
     if (atlas.may_have_purged) {
@@ -256,18 +258,14 @@ class SqliteStore final : public AtlasStore {
     return Read(&atlas::ReadKeyframeRecord, id);
   }
   Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) override {
-    return readers_.Run<std::vector<std::int64_t>>([&id](Connection& connection) {
-      return Result<std::vector<std::int64_t>>(atlas::ListKeyframesOfTile(connection, id));
-    });
+    return Read(&atlas::ListKeyframesOfTile, id);
   }
   Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() override {
     return Read(&ReadDamagedKeyframes);
   }
   Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                     std::uint32_t limit) override {
-    return readers_.Run<std::vector<std::int64_t>>([=](Connection& connection) {
-      return Result<std::vector<std::int64_t>>(ListKeyframeRows(connection, after_id, limit));
-    });
+    return Read(&ListKeyframeRows, after_id, limit);
   }
   Result<StoredKeyframe> ReadKeyframe(std::int64_t id) override {
     return Read(&VerifyStoredKeyframe, id);
@@ -281,9 +279,7 @@ class SqliteStore final : public AtlasStore {
   Status ScanTiles(const TileRect& rect,
                    const std::function<void(const TileSummary&)>& visit) override;
   Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key, std::uint32_t limit) override {
-    return readers_.Run<std::vector<TileSummary>>([&](Connection& connection) {
-      return Result<std::vector<TileSummary>>(ListTileRows(connection, after_key, limit));
-    });
+    return Read(&ListTileRows, after_key, limit);
   }
   Result<std::vector<TileId>> ListFootprintTiles(std::uint8_t level,
                                                  std::int64_t after_key,
@@ -295,10 +291,7 @@ class SqliteStore final : public AtlasStore {
     return Check(&ScanFootprintRows, rect, visit);
   }
 
-  Result<DirtyState> ReadDirtyState() override {
-    return readers_.Run<DirtyState>(
-        [](Connection& connection) { return Result<DirtyState>(ReadDirty(connection)); });
-  }
+  Result<DirtyState> ReadDirtyState() override { return Read(&ReadDirty); }
   Result<StoreCounts> ReadCounts() override {
     return readers_.Run<StoreCounts>([this](Connection& connection) {
       StoreCounts counts = ReadStoreCounts(connection);
@@ -334,6 +327,11 @@ class SqliteStore final : public AtlasStore {
   Result<T> Read(Result<T> (*read)(Connection&, Parameters...), const Arguments&... arguments) {
     return readers_.Run<T>([&](Connection& connection) { return read(connection, arguments...); });
   }
+  template <typename T, typename... Parameters, typename... Arguments>
+  Result<T> Read(T (*read)(Connection&, Parameters...), const Arguments&... arguments) {
+    return readers_.Run<T>(
+        [&](Connection& connection) { return Result<T>(read(connection, arguments...)); });
+  }
   template <typename... Parameters, typename... Arguments>
   Status Check(Status (*check)(Connection&, Parameters...), const Arguments&... arguments) {
     return ReadStatus([&](Connection& connection) { return check(connection, arguments...); });
@@ -357,7 +355,8 @@ class SqliteStore final : public AtlasStore {
   DataDirectory directory_;  // first in, last out: the lock outlives every connection
   StoreIdentity identity_;
   TileDirectory tiles_;  // outlives the writes, which report to it
-  UploadRoom room_;      // as do these two, all that writes
+  UploadRoom room_;      // as do these three, all that writes
+  RevisionNote note_;
   SyncGuard guard_;
   LogCopier log_;  // outlives the writer: whoever is closed last empties the write-ahead log
   WriteQueue writes_;

@@ -340,6 +340,18 @@ TEST_F(LostKeysTest, ARetractionOfTheSecondSessionIsOfBoth) {
   ExpectWhole(intact_);
 }
 
+// The second one was in the map already when it was found out that it is to be none.
+TEST_F(LostKeysTest, APurgeOfTheFirstSessionTakesTheTilesOfTheSecond) {
+  Fill();
+  ASSERT_TRUE(Change("day", SessionAction::kPurge));
+  LoseSession();
+  ASSERT_TRUE(Upload(DriveUpload(5)));
+  ASSERT_GT(Digest().tiles, 0U);
+  ASSERT_TRUE(Repair());
+  EXPECT_EQ(Digest().tiles, 0U);
+  EXPECT_EQ(service_->Verify({.rebuild = true}, Long())->mismatched, 0U);
+}
+
 TEST_F(LostKeysTest, APurgeOfOneSessionIsOfBoth) {
   for (const bool is_of_the_first : {false, true}) {
     SCOPED_TRACE(is_of_the_first);

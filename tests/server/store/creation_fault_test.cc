@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "server/store/sqlite/revision_note.h"
 #include "tests/server/store/io_fault_fixture.h"
 
 namespace atlas {
@@ -84,6 +85,8 @@ TEST_F(CreationFaultTest, NoAtlasIsMadeBesideTheLogOfAnother) {
   EXPECT_NE(refused.error().message().find(log.string()), std::string::npos);
   EXPECT_EQ(std::filesystem::file_size(log), std::filesystem::file_size(copy));
   std::filesystem::remove(log);
+  EXPECT_EQ(OpenCode(), StatusCode::kConflict) << "the note tells of it, too";
+  std::filesystem::remove(NoteOf(Database()));
   Open();
   ExpectNew();
 }

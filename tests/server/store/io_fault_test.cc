@@ -111,6 +111,7 @@ class IoFaultTest : public IoFaultFixture {
     const auto counts = store_->ReadCounts();
     ASSERT_TRUE(counts.has_value()) << counts.error().message();
     EXPECT_GE(counts->revision, ledger_.revision);
+    EXPECT_EQ(store_->identity().epoch, 1U) << "commits are said to be missing";
     EXPECT_GE(counts->keyframes, ledger_.x_um.size());
     EXPECT_LE(counts->keyframes, ledger_.tried.size());
     for (const auto& [sequence, places] : ledger_.x_um) {

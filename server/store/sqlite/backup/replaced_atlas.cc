@@ -16,8 +16,8 @@ namespace atlas {
 namespace fs = std::filesystem;
 namespace {
 
-// The database first: a log is of no use to another one, and does harm.
-constexpr std::array kSuffixes = {"", "-wal", "-shm", "-journal"};
+// The database first: a log is of no use to another one, and does harm; nor is the note.
+constexpr std::array kSuffixes = {"", "-wal", "-shm", "-journal", "-revision"};
 
 bool IsThere(const fs::path& file) {
   std::error_code error;

@@ -19,6 +19,7 @@ WriteQueue::WriteQueue(std::unique_ptr<Connection> connection,
       guard_(guard),
       revision_(options_.read_revision(*connection_)) {
   options_.look(*connection_);
+  options_.on_revision(revision());
   thread_ = std::thread([this] { Loop(); });
 }
 
@@ -162,7 +163,9 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
       commits_.Add(std::chrono::steady_clock::now() - begin);
     }
     Settle(group);
-    revision_.store(revision);
+    if (revision_.exchange(revision) != revision) {
+      options_.on_revision(revision);
+    }
     return {};
   } catch (const std::exception& error) {
     guard_.Note(error);

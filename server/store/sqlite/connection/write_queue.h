@@ -35,6 +35,10 @@ class WriteQueue {
     // Looks at what there is, in each transaction before its commit, and once at the start.
     std::function<void(Connection&)> look = [](Connection&) {
     };
+    // Told each revision that is committed, before those who committed it, and once at the start.
+    // Must not throw.
+    std::function<void(std::uint64_t)> on_revision = [](std::uint64_t) {
+    };
   };
   struct Operation {
     std::function<Status(Connection&)> run;     // in a savepoint, unless it is alone

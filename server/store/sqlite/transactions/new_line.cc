@@ -19,15 +19,18 @@ std::uint64_t NowMs() {
 
 }  // namespace
 
-NewLine BeginLine(Connection& connection, const StoreIdentity& identity) {
-  NewLine line;
+PlaceInLine BeginLine(Connection& connection,
+                      const StoreIdentity& identity,
+                      const PlaceInLine& lost) {
+  PlaceInLine begin;
   // Two restores of one backup are two lines, too: the clock tells them apart.
-  line.epoch = std::max(identity.epoch + 1, NowMs());
-  WriteEpoch(connection, identity, line.epoch);
-  NextRevision(connection);
-  line.revision =
-      AddToCounter(connection, Counter::kRevision, static_cast<std::int64_t>(kRevisionsLeftOut));
-  return line;
+  begin.epoch = std::max({identity.epoch + 1, lost.epoch + 1, NowMs()});
+  WriteEpoch(connection, identity, begin.epoch);
+  const std::uint64_t number = LineOf(NextRevision(connection));
+  const std::uint64_t lines = std::max(number, LineOf(lost.revision)) + 1 - number;
+  begin.revision = AddToCounter(connection, Counter::kRevision,
+                                static_cast<std::int64_t>(lines * kRevisionsLeftOut));
+  return begin;
 }
 
 }  // namespace atlas

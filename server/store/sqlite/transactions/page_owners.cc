@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <string>
+#include <system_error>
 
+#include "core/base/str_cat.h"
 #include "server/store/sqlite/tables/session_table.h"
 
 namespace atlas {
@@ -41,6 +43,19 @@ Status CheckPagesAreTheirs(Connection& connection) {
                       "store: the database is damaged: a page of a table is another one's, too: "
                       "nothing was changed; restore a backup")
              : Status();
+}
+
+Status CheckEnd(Connection& connection, const std::filesystem::path& database) {
+  const auto pages = static_cast<std::uintmax_t>(connection.Ask("PRAGMA page_count"));
+  const auto page_bytes = static_cast<std::uintmax_t>(connection.Ask("PRAGMA page_size"));
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(database, error);
+  return error || bytes <= pages * page_bytes
+             ? Status()
+             : Status(StatusCode::kInvalidData,
+                      StrCat("store: the database is damaged: it says that it has ", pages,
+                             " pages, and its file has ", bytes / page_bytes,
+                             ": nothing was changed; restore a backup"));
 }
 
 }  // namespace atlas

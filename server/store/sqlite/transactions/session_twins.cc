@@ -63,6 +63,10 @@ Status JoinSessions(Connection& connection,
   const bool is_purged =
       older.record.state == SessionState::kPurged || younger.record.state == SessionState::kPurged;
   if (is_purged) {
+    // By now its tiles may be made of it; of a purged one they are not, and nobody marks them.
+    if (IsInMap(younger.record.state)) {
+      MarkSession(connection, older.id, NextRevision(connection));
+    }
     const auto purged =
         PurgeSession(connection, *joined, {key, SessionAction::kPurge, author, kReason});
     return purged ? Status() : purged.error();

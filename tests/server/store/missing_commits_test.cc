@@ -1,0 +1,317 @@
+// A log or a database that was removed, cut off or replaced by an older copy while the daemon was
+// away: a shorter history that nothing in it contradicts. The note beside it does.
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/revision_note.h"
+#include "tests/server/store/backup_fixture.h"
+
+namespace atlas {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kPage = 8'192;
+constexpr std::size_t kFrame = 24 + kPage;
+constexpr std::size_t kLogHeader = 32;
+
+Bytes ReadFile(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+void WriteFile(const fs::path& path, const Bytes& bytes) {
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
+}
+
+class MissingCommitsTest : public BackupTest {
+ protected:
+  using Files = std::map<std::string, Bytes>;
+
+  MissingCommitsTest() {
+    options_.on_damaged_log = [this](const std::string& what) {
+      told_ = what;
+    };
+  }
+
+  void PutMany(std::uint32_t first, std::uint32_t count) {
+    for (std::uint32_t i = first; i < first + count; ++i) {
+      const auto put = Put(Keyframe(i));
+      ASSERT_TRUE(put) << put.error().message();
+    }
+  }
+  fs::path Note() const { return NoteOf(Database()); }
+  fs::path Log() const { return Database().string() + "-wal"; }
+  // What a kill leaves.
+  Files Look() const {
+    Files files;
+    for (const fs::path& file : {Database(), Log(), Note()}) {
+      if (fs::exists(file) && fs::file_size(file) > 0) {
+        files[file.filename().string()] = ReadFile(file);
+      }
+    }
+    return files;
+  }
+  void PutThere(const Files& files) {
+    store_.reset();
+    told_.clear();
+    fs::remove_all(options_.directory);
+    fs::create_directories(options_.directory);
+    for (const auto& [name, bytes] : files) {
+      WriteFile(options_.directory / name, bytes);
+    }
+  }
+  std::uint64_t Losses() {
+    const auto events = store_->ListEvents(0, 1'000).value();
+    return static_cast<std::uint64_t>(
+        std::count_if(events.begin(), events.end(),
+                      [](const Event& event) { return event.kind == EventKind::kLogDamaged; }));
+  }
+  // Of what was at `lost` before; and it goes on.
+  void ExpectNoticed(const NotedRevision& lost) {
+    EXPECT_NE(told_.find("commits are missing"), std::string::npos) << told_;
+    EXPECT_EQ(Losses(), 1U);
+    EXPECT_GT(store_->identity().epoch, lost.epoch);
+    EXPECT_GT(LineOf(store_->revision()), LineOf(lost.revision));
+    EXPECT_EQ(store_->CheckRevision(lost.revision).code(), StatusCode::kNotFound);
+    EXPECT_TRUE(Put(Keyframe(1'000)));
+    const Status counted = store_->CheckCounters();
+    EXPECT_TRUE(counted.ok()) << counted.message();
+    told_.clear();
+    Open();
+    EXPECT_TRUE(told_.empty()) << "once is enough: " << told_;
+  }
+  void ExpectNothingMissing() {
+    EXPECT_TRUE(told_.empty()) << told_;
+    EXPECT_EQ(Losses(), 0U);
+  }
+
+  std::string told_;
+};
+
+TEST_F(MissingCommitsTest, ACommitIsNotedBeforeItIsAcknowledged) {
+  Open();
+  EXPECT_EQ(ReadRevisionNote(Note())->revision, 0U);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    std::uint64_t noted = 0;
+    const auto put = Await<PutKeyframeResult>([&](auto done) {
+      store_->PutKeyframe(Keyframe(i), [&, done](Result<PutKeyframeResult> result) {
+        noted = ReadRevisionNote(Note())->revision;
+        done(std::move(result));
+      });
+    });
+    EXPECT_EQ(noted, put->revision);
+  }
+  EXPECT_EQ(ReadRevisionNote(Note())->atlas_id, store_->identity().atlas_id);
+  EXPECT_EQ(ReadRevisionNote(Note())->epoch, 1U);
+}
+
+TEST_F(MissingCommitsTest, AKillLosesNothing) {
+  Open();
+  PutMany(0, 5);
+  const Files killed = Look();
+  PutThere(killed);
+  Open();
+  ExpectNothingMissing();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 5U);
+  EXPECT_EQ(store_->identity().epoch, 1U);
+}
+
+TEST_F(MissingCommitsTest, ALogThatIsGone) {
+  Open();
+  PutMany(0, 2);
+  Open();
+  PutMany(2, 3);
+  const NotedRevision lost = *ReadRevisionNote(Note());
+  Files killed = Look();
+  killed.erase("atlas.db-wal");
+  PutThere(killed);
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 2U);
+  ExpectNoticed(lost);
+}
+
+TEST_F(MissingCommitsTest, ALogThatWasCutAnywhere) {
+  Open();
+  PutMany(0, 6);
+  const NotedRevision lost = *ReadRevisionNote(Note());
+  const Files killed = Look();
+  const std::size_t frames = (killed.at("atlas.db-wal").size() - kLogHeader) / kFrame;
+  std::size_t noticed = 0;
+  for (std::size_t left = 0; left <= frames; ++left) {
+    SCOPED_TRACE(left);
+    for (const std::size_t more : {std::size_t{0}, kFrame / 2}) {
+      Files cut = killed;
+      cut["atlas.db-wal"].resize(
+          std::min(kLogHeader + left * kFrame + more, cut["atlas.db-wal"].size()));
+      PutThere(cut);
+      Open();
+      const bool is_whole = store_->ReadCounts()->keyframes == 6;
+      EXPECT_EQ(told_.empty(), is_whole);
+      EXPECT_EQ(Losses(), is_whole ? 0U : 1U);
+      EXPECT_EQ(store_->CheckRevision(lost.revision).ok(), is_whole);
+      noticed += is_whole ? 0 : 1;
+    }
+  }
+  EXPECT_GE(noticed, 12U);
+}
+
+TEST_F(MissingCommitsTest, AnOlderCopyOfTheDatabase) {
+  Open();
+  PutMany(0, 2);
+  store_.reset();
+  const Bytes older = ReadFile(Database());
+  Open();
+  PutMany(2, 3);
+  const NotedRevision lost = *ReadRevisionNote(Note());
+  store_.reset();
+  WriteFile(Database(), older);
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 2U);
+  ExpectNoticed(lost);
+}
+
+TEST_F(MissingCommitsTest, AnOlderCopyFromBeforeARestore) {
+  Fill(3);
+  ASSERT_TRUE(WriteBackup());
+  ASSERT_TRUE(Restore());
+  OpenRestored();
+  store_.reset();
+  const Bytes first = ReadFile(Database());
+  fs::remove(backup());
+  Open();
+  ASSERT_TRUE(WriteBackup());
+  store_.reset();
+  ASSERT_TRUE(Restore(true));
+  Open();
+  PutMany(10, 3);
+  const NotedRevision lost = *ReadRevisionNote(Note());
+  ASSERT_EQ(LineOf(lost.revision), 2U);
+  store_.reset();
+  WriteFile(Database(), first);
+  Open();
+  ExpectNoticed(lost);
+  EXPECT_EQ(LineOf(store_->revision()), 3U);
+}
+
+TEST_F(MissingCommitsTest, ARestoreIsFine) {
+  Fill(3);
+  ASSERT_TRUE(WriteBackup());
+  ASSERT_TRUE(Restore());
+  OpenRestored();
+  PutMany(10, 5);
+  const NotedRevision replaced = *ReadRevisionNote(Note());
+  store_.reset();
+  const auto again = Restore(true);
+  ASSERT_TRUE(again) << again.error().message();
+  EXPECT_FALSE(fs::exists(Note())) << "it is of the atlas that was replaced";
+  EXPECT_EQ(ReadRevisionNote(NoteOf(again->kept))->revision, replaced.revision);
+  Open();
+  ExpectNothingMissing();
+  EXPECT_GT(LineOf(store_->revision()), LineOf(replaced.revision))
+      << "a number that the first one gave is given again";
+  // Who wants the replaced one back gives it its name, with its note or without.
+  for (const bool has_note : {false, true}) {
+    store_.reset();
+    fs::remove(Note());
+    fs::copy_file(again->kept, Database(), fs::copy_options::overwrite_existing);
+    if (has_note) {
+      fs::copy_file(NoteOf(again->kept), Note());
+    }
+    Open();
+    ExpectNothingMissing();
+    EXPECT_EQ(store_->identity().epoch, replaced.epoch);
+  }
+}
+
+// Behind a power cut, say.
+TEST_F(MissingCommitsTest, ANoteThatIsOldOrNotWholeSaysNothing) {
+  Open();
+  PutMany(0, 2);
+  const Bytes old = ReadFile(Note());
+  PutMany(2, 3);
+  store_.reset();
+  Files closed = Look();
+  const Bytes note = closed["atlas.db-revision"];
+  const auto expect_silence = [&](const Bytes& bytes) {
+    closed["atlas.db-revision"] = bytes;
+    PutThere(closed);
+    Open();
+    ExpectNothingMissing();
+    EXPECT_EQ(ReadFile(Note()), note) << "and is written anew";
+  };
+  expect_silence(old);
+  expect_silence({});
+  expect_silence(Bytes(note.size(), 0));
+  expect_silence(Bytes(note.begin(), note.begin() + 20));
+  for (std::size_t byte = 0; byte < note.size(); ++byte) {
+    Bytes turned = note;
+    turned[byte] ^= 1U << (byte % 8);
+    expect_silence(turned);
+  }
+}
+
+TEST_F(MissingCommitsTest, ANoteOfAnotherAtlasSaysNothing) {
+  Open();
+  PutMany(0, 5);
+  const Bytes note = ReadFile(Note());
+  store_.reset();
+  fs::remove_all(options_.directory);
+  options_.new_atlas_id = {9, 9, 9};
+  Open();
+  store_.reset();
+  WriteFile(Note(), note);
+  Open();
+  ExpectNothingMissing();
+  EXPECT_EQ(ReadRevisionNote(Note())->atlas_id, store_->identity().atlas_id);
+}
+
+TEST_F(MissingCommitsTest, NoNewAtlasTakesThePlaceOfOneThatIsGone) {
+  Open();
+  PutMany(0, 2);
+  store_.reset();
+  const Bytes atlas = ReadFile(Database());
+  fs::remove(Database());
+  EXPECT_EQ(OpenCode(), StatusCode::kConflict);
+  EXPECT_FALSE(fs::exists(Database()));
+  WriteFile(Database(), atlas);
+  Open();
+  ExpectNothingMissing();
+  store_.reset();
+  fs::remove(Database());
+  fs::remove(Note());
+  Open();
+  EXPECT_EQ(store_->revision(), 0U);
+}
+
+// As a kill in the middle of copying the log leaves the database, whose log went then.
+TEST_F(MissingCommitsTest, WhatIsLeftIsNoAtlas) {
+  Open();
+  PutMany(0, 3);
+  const std::size_t counters =
+      kPage * static_cast<std::size_t>(
+                  Connection({Database(), DatabaseOptions::Mode::kReadOnly})
+                      .Ask("SELECT rootpage - 1 FROM sqlite_master WHERE name = 'counters'"));
+  store_.reset();
+  const Files before = Look();
+  Open();
+  PutMany(3, 3);
+  store_.reset();
+  Files mixed = Look();
+  std::copy_n(before.at("atlas.db").begin() + static_cast<std::ptrdiff_t>(counters), kPage,
+              mixed.at("atlas.db").begin() + static_cast<std::ptrdiff_t>(counters));
+  PutThere(mixed);
+  const auto refused = OpenSqliteStore(options_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code(), StatusCode::kInvalidData);
+  EXPECT_NE(refused.error().message().find("what is left is no atlas"), std::string::npos)
+      << refused.error().message();
+  EXPECT_EQ(Look(), mixed) << "nothing was changed";
+}
+
+}  // namespace
+}  // namespace atlas
