@@ -1,7 +1,8 @@
 #include "client/merge/merge_run.h"
 
-#include <sstream>
 #include <utility>
+
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -49,10 +50,9 @@ MergePicture MergeRun::Picture() const {
   std::vector<std::vector<Pose>> after;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     after.push_back(PosesAfter(sessions[i], plan.sessions[i]));
-    std::ostringstream name;
-    name << sessions[i].key << (plan.sessions[i].is_joined ? "" : ", stays as it is");
-    picture.sessions.push_back(
-        {name.str(), PlacesOf(StoredPoses(sessions[i])), PlacesOf(after.back())});
+    const char* const fate = plan.sessions[i].is_joined ? "" : ", stays as it is";
+    picture.sessions.push_back({StrCat(sessions[i].key, fate), PlacesOf(StoredPoses(sessions[i])),
+                                PlacesOf(after.back())});
   }
   for (const FoundClosure& closure : plan.closures) {
     const std::size_t a = At(sessions, closure.a).middle();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <sstream>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -11,12 +10,6 @@ namespace atlas {
 namespace {
 
 constexpr double kMicrometre = 1e-6;
-
-std::string NameOf(const SessionKey& key) {
-  std::ostringstream name;
-  name << key;
-  return name.str();
-}
 
 // Empty: it is merged.
 std::string WhyNot(const SessionSummary& session, const std::vector<SessionKey>& wanted) {
@@ -33,7 +26,7 @@ Status CheckWanted(const std::vector<SessionKey>& wanted,
   for (const SessionKey& key : wanted) {
     const bool is_there = std::any_of(sessions.begin(), sessions.end(),
                                       [&](const auto& session) { return session.key == key; });
-    if (!is_there) return {StatusCode::kNotFound, StrCat("there is no session ", NameOf(key))};
+    if (!is_there) return {StatusCode::kNotFound, StrCat("there is no session ", key)};
   }
   return {};
 }
