@@ -71,6 +71,8 @@ Result<MergeRun> RunMerge(SessionSource& source,
                           const std::vector<SessionKey>& wanted,
                           const MergeOptions& options,
                           const MergeProgress& progress) {
+  // Before much is read.
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
   Result<KeyframeSpool> spool = KeyframeSpool::Create();
   if (!spool) return Error(spool.error());
   auto read = ReadForMerge(source, wanted, *spool, [&](std::size_t done, std::size_t all) {

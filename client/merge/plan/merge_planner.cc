@@ -255,6 +255,7 @@ Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const MapProfile& profile,
                             const MergeOptions& options,
                             const MergeProgress& progress) {
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
   return Planner(sessions, readers, profile, options, progress).Plan();
 }
 
