@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "core/keyframe/keyframe_codec.h"
 
 namespace atlas {
 namespace {
@@ -42,6 +43,14 @@ std::optional<KeyframePrior> PriorOf(const SessionKeyframe& keyframe) {
                        1e-3 * prior.radius_mm};
 }
 
+// Empty: it can be merged.
+std::string DamageOf(const SessionKeyframe& keyframe, const MapProfile& profile) {
+  if (!keyframe.damage.empty()) return keyframe.damage;
+  const auto header = CheckKeyframe(keyframe.blob);
+  if (!header) return header.error().message();
+  return CheckKeyframeProfile(*header, profile).message();
+}
+
 class Reading {
  public:
   Reading(SessionSource& source, KeyframeSpool& spool) : source_(source), spool_(spool) {}
@@ -55,9 +64,9 @@ class Reading {
     const auto reading =
         source_.ReadKeyframes(summary.key, [&](SessionKeyframe keyframe) -> Status {
           ATLAS_RETURN_IF_ERROR(on_keyframe());
-          if (!keyframe.damage.empty()) {
+          if (const std::string damage = DamageOf(keyframe, source_.profile()); !damage.empty()) {
             read_.left_out.push_back(
-                {summary.key, StrCat("keyframe ", keyframe.sequence, ": ", keyframe.damage)});
+                {summary.key, StrCat("keyframe ", keyframe.sequence, ": ", damage)});
             return {};
           }
           const auto number = spool_.Add(keyframe.blob);
