@@ -80,6 +80,8 @@ Status MergeService::Round(AtlasClient& client) {
   if (const auto keys = tried_.WorthTrying(*known); !keys.empty()) {
     done_with_.reset();
     ATLAS_RETURN_IF_ERROR(merge_.Run(keys, *known, revision));
+    // By what it knew: the next round knows more.
+    if (!tried_.WorthTrying(*known).empty()) return {};
   }
   done_with_ = std::move(settled);
   done_revision_ = revision;

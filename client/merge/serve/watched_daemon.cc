@@ -32,7 +32,7 @@ WatchedDaemon::WatchedDaemon(LinkOptions link, const MergeServiceEnvironment& en
 
 Result<AtlasClient*> WatchedDaemon::Wait(std::optional<Clock::time_point> latest) {
   while (refusal_.ok() && !environment_.is_stopping()) {
-    const auto client = link_.Client(kSlice);
+    auto client = link_.Client(kSlice);
     if (client) {
       refusal_ = CheckTakesMerges((*client)->atlas());
       if (!refusal_.ok()) break;

@@ -85,7 +85,7 @@ class Reading {
       return {};
     }
     read_.sessions.push_back(std::move(session));
-    read_.readers.push_back(
+    read_.readers.emplace_back(
         [this_spool = &spool_, numbers](std::size_t i) { return this_spool->Read((*numbers)[i]); });
     return {};
   }

@@ -5,6 +5,8 @@ Usage: merge_serve_test.py BIN_DIR DRIVES sessions|limits|daemon."""
 
 import json
 import pathlib
+import re
+import shutil
 import signal
 import sys
 import tempfile
@@ -124,6 +126,57 @@ def daemon_case(report, bin_dir, drives, data):
         daemons.daemon.stop()
 
 
+def other_atlas_cases(report, bin_dir, drives, work):
+    """A backup that is restored is looked at anew; another atlas at the same place takes people."""
+    (work / "backups").mkdir()
+    flags = (*COARSE, "--backup-folder", work / "backups")
+    daemon = Daemon(bin_dir, work / "one", *flags)
+    merges = Merges(report, bin_dir, daemon.server, drives)
+    try:
+        merges.ingest("first")
+        merges.staged("garage")
+        with Service(merges, "--max-move", "5") as service:  # the map itself is not merged yet
+            report.equal("before", service.wait_for("nothing", "applied")["sessions"], ["garage/day"])
+            merges.run("backup", "monday")
+            daemon.stop()
+            merges.call("restore", next((work / "backups").iterdir()), "--to", work / "one/atlas.db")
+            daemon = Daemon(bin_dir, work / "one", *flags, listen=merges.server)
+            report.equal("a restored backup", service.wait_for("nothing", "applied")["sessions"], ["garage/day"])
+            daemon.stop()
+            daemon = Daemon(bin_dir, work / "two", *flags, listen=merges.server)
+            report.equal("another atlas", service.end(), 4)
+            report.check("another atlas: why", "another atlas" in str(service.events[-1]), service.events[-1])
+    finally:
+        daemon.stop()
+
+
+def unit_case(merges, work, unit):
+    """The command line of the unit, as systemd would make it."""
+    line = re.search(r"^ExecStart=\S+ (.*)$", unit.read_text(encoding="utf-8"), re.M).group(1)
+    words = line.replace("${STATE_DIRECTORY}", str(work / "state")).replace("$ATLAS_MERGE_FLAGS", "--settle 0").split()
+    merges.staged("first")
+    done = merges.merge(*words, "--once")
+    merges.report.equal(f"the unit: exit code ({done.stderr})", done.returncode, 0)
+    merges.report.equal("the unit: who is in the map", merges.states(), {"first": "live"})
+    merges.report.equal("the unit: reports", reports_of(work / "state/reports"), ["batch-1.json", "batch-1.png"])
+    merges.report.equal("the unit: by whom", {event["author"] for event in merges.run("log")["events"]}, {"atlas-merge"})
+
+
+def no_report_case(merges, reports):
+    """A report that cannot be written keeps no session from the map."""
+    merges.staged("first", "second")
+    with Service(merges, "--reports", reports) as service:
+        service.wait_for("begun")
+        service.process.send_signal(signal.SIGSTOP)
+        shutil.rmtree(reports)
+        service.process.send_signal(signal.SIGCONT)
+        merges.report.check("no report: it says so", service.wait_for("no_report", "put_off")["event"] == "no_report",
+                            service.events)
+        applied = service.wait_for("applied")
+        merges.report.equal("no report", (applied["published"], "report" in applied),
+                            (["first/day", "second/day"], False))
+
+
 def stopped_case(merges):
     """SIGTERM at work: at once, in good order, and nothing was done."""
     report = merges.report
@@ -202,11 +255,15 @@ def main():
         elif group == "limits":
             beside_a_daemon(limits_case, work / "reports")
             beside_a_daemon(map_limit_case)
+            beside_a_daemon(no_report_case, work / "gone")
         else:
             beside_a_daemon(refused_cases, work)
             beside_a_daemon(stopped_case)
             daemon_case(report, bin_dir, drives, work / "daemon")
             role_cases(report, bin_dir, drives, work / "roles")
+            other_atlas_cases(report, bin_dir, drives, work)
+            unit = pathlib.Path(__file__).resolve().parents[3] / "deploy/atlas-merge.service"
+            beside_a_daemon(unit_case, work, unit)
     print(f"{report.checks} checks, {report.failed} failed")
     return 1 if report.failed else 0
 

@@ -22,6 +22,7 @@ DRIVES = {"first": ("street", "--seed", "0", "--range", "30:100", "--drift", "5"
           "third": ("street", "--seed", "4", "--range", "30:100", "--drift", "7"),
           "garage": ("garage", "--range", "70:100", "--drift", "3")}
 PATIENCE_S = 120
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # in the background it is ignored, and by whatever is started there
 
 
 def simulate(bin_dir, folder):

@@ -57,8 +57,9 @@ class MergeServeCommand : public Command {
            events.Note(event);
          }});
     Status status = service.Run();
-    if (stop.HasCome())
+    if (stop.HasCome()) {
       log.Line(ServeLogLevel::kInfo, "stopped by a signal", {{"event", "stopped"}});
+    }
     return status;
   }
 
