@@ -114,7 +114,7 @@ class Service:
     """`atlas-merge serve`, and the events of its log."""
 
     def __init__(self, merges, *flags):
-        command = merges.command("serve", "--json", "--settle", "0.4", "--every", "0.1",
+        command = merges.command("serve", "--json", "--settle", "1", "--every", "0.1",
                                  "--server", merges.server, *flags)
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self.events = []
