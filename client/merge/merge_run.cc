@@ -1,7 +1,8 @@
 #include "client/merge/merge_run.h"
 
-#include <sstream>
 #include <utility>
+
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -47,10 +48,9 @@ std::vector<Pose> MergeRun::PosesAfter(std::size_t session) const {
 MergePicture MergeRun::Picture() const {
   MergePicture picture;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
-    std::ostringstream name;
-    name << sessions[i].key << (plan.sessions[i].is_joined ? "" : ", stays as it is");
-    picture.sessions.push_back(
-        {name.str(), PlacesOf(StoredPoses(sessions[i])), PlacesOf(PosesAfter(i))});
+    const char* const fate = plan.sessions[i].is_joined ? "" : ", stays as it is";
+    picture.sessions.push_back({StrCat(sessions[i].key, fate), PlacesOf(StoredPoses(sessions[i])),
+                                PlacesOf(PosesAfter(i))});
   }
   for (const FoundClosure& closure : plan.closures) {
     const std::size_t a = At(sessions, closure.a).middle();
@@ -71,6 +71,8 @@ Result<MergeRun> RunMerge(SessionSource& source,
                           MergeWork& work,
                           const MergeProgress& progress,
                           const MoreClosures& more_closures) {
+  // Before much is read.
+  if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
   Result<KeyframeSpool> created = KeyframeSpool::Create();
   if (!created) return Error(created.error());
   auto spool = std::make_shared<KeyframeSpool>(*std::move(created));

@@ -72,6 +72,10 @@ struct MergeOptions {
   double min_move_rad = 0.02 * std::numbers::pi / 180.0;
 
   std::size_t workers = 2;  // threads, at least 1
+
+  // kInvalidArgument names one that is no number or out of its range, of these and of those of the
+  // rooms below that a merge itself divides by or counts with.
+  Status Validate() const;
 };
 
 }  // namespace atlas

@@ -257,6 +257,7 @@ Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const MergeContext& context,
                             const MergeProgress& progress,
                             const MoreClosures& more_closures) {
+  if (Status status = context.options.Validate(); !status.ok()) return Error(std::move(status));
   return Planner(sessions, readers, context, progress, more_closures).Plan();
 }
 

@@ -59,8 +59,8 @@ using MoreClosures = std::function<std::vector<FoundClosure>(const std::vector<F
 // Fills the sessions' submaps. `readers`: of each session's blobs, one a session, which are read
 // once more for each of `options.refinements`: submaps are fused again by poses that are nearly
 // right, for within a submap, too, odometry drifts. `progress` may be empty.
-// Errors are those of BuildSubmaps and of `progress`, kInvalidArgument for a prior without a
-// radius, and kInternal where no poses are found.
+// Errors are those of BuildSubmaps, of `progress` and of the options' Validate, kInvalidArgument
+// for a prior without a radius, and kInternal where no poses are found.
 Result<MergePlan> PlanMerge(std::vector<MergeSession>& sessions,
                             const std::vector<BlobReader>& readers,
                             const MergeContext& context,

@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <memory>
-#include <sstream>
 #include <utility>
 
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
+#include "core/keyframe/keyframe_codec.h"
 
 namespace atlas {
 namespace {
 
 constexpr double kMicrometre = 1e-6;
-
-std::string NameOf(const SessionKey& key) {
-  std::ostringstream name;
-  name << key;
-  return name.str();
-}
 
 // Empty: it is merged.
 std::string WhyNot(const SessionSummary& session, const std::vector<SessionKey>& wanted) {
@@ -34,7 +28,7 @@ Status CheckWanted(const std::vector<SessionKey>& wanted,
   for (const SessionKey& key : wanted) {
     const bool is_there = std::any_of(sessions.begin(), sessions.end(),
                                       [&](const auto& session) { return session.key == key; });
-    if (!is_there) return {StatusCode::kNotFound, StrCat("there is no session ", NameOf(key))};
+    if (!is_there) return {StatusCode::kNotFound, StrCat("there is no session ", key)};
   }
   return {};
 }
@@ -50,6 +44,14 @@ std::optional<KeyframePrior> PriorOf(const SessionKeyframe& keyframe) {
                        1e-3 * prior.radius_mm};
 }
 
+// Empty: it can be merged.
+std::string DamageOf(const SessionKeyframe& keyframe, const MapProfile& profile) {
+  if (!keyframe.damage.empty()) return keyframe.damage;
+  const auto header = CheckKeyframe(keyframe.blob);
+  if (!header) return header.error().message();
+  return CheckKeyframeProfile(*header, profile).message();
+}
+
 class Reading {
  public:
   Reading(SessionSource& source, KeyframeSpool& spool) : source_(source), spool_(spool) {}
@@ -63,9 +65,9 @@ class Reading {
     const auto reading =
         source_.ReadKeyframes(summary.key, [&](SessionKeyframe keyframe) -> Status {
           ATLAS_RETURN_IF_ERROR(on_keyframe());
-          if (!keyframe.damage.empty()) {
+          if (const std::string damage = DamageOf(keyframe, source_.profile()); !damage.empty()) {
             read_.left_out.push_back(
-                {summary.key, StrCat("keyframe ", keyframe.sequence, ": ", keyframe.damage)});
+                {summary.key, StrCat("keyframe ", keyframe.sequence, ": ", damage)});
             return {};
           }
           const auto number = spool_.Add(keyframe.blob);
@@ -84,7 +86,7 @@ class Reading {
       return {};
     }
     read_.sessions.push_back(std::move(session));
-    read_.readers.push_back(
+    read_.readers.emplace_back(
         [this_spool = &spool_, numbers](std::size_t i) { return this_spool->Read((*numbers)[i]); });
     return {};
   }

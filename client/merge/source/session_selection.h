@@ -32,8 +32,8 @@ struct ReadSessions {
 
 // Those in the map and those that are staged, or of these alone `wanted` and what is in the map.
 // Sessions that are quarantined, retracted, damaged or without a keyframe are left out, and damaged
-// keyframes. kNotFound: one that is wanted is not there. Else errors are those of the source, the
-// spool and `progress`, which is told of keyframes.
+// keyframes, or what is none of the source's profile. kNotFound: one that is wanted is not there.
+// Else errors are those of the source, the spool and `progress`, which is told of keyframes.
 Result<ReadSessions> ReadForMerge(
     SessionSource& source,
     const std::vector<SessionKey>& wanted,

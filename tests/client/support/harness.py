@@ -49,11 +49,11 @@ class Report:
 
 
 class Daemon:
-    """`atlasd` on a free port; leaves nothing running however the block ends."""
+    """`atlasd` on a free port, or on one of its own; leaves nothing running however the block ends."""
 
-    def __init__(self, bin_dir, data, *flags, **popen):
+    def __init__(self, bin_dir, data, *flags, listen="127.0.0.1:0", **popen):
         self.process = subprocess.Popen(
-            [bin_dir / "atlasd", "--data", str(data), "--listen", "127.0.0.1:0", "--log-level", "error",
+            [bin_dir / "atlasd", "--data", str(data), "--listen", listen, "--log-level", "error",
              *flags], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **popen)
         line = self.process.stdout.readline().split()
         self.server = line[1] if line[:1] == ["listening"] else None

@@ -9,6 +9,7 @@
 namespace atlas {
 
 std::unique_ptr<Command> MakeMergeRunCommand();
+std::unique_ptr<Command> MakeMergeServeCommand();
 
 // All of them.
 std::vector<std::unique_ptr<Command>> MakeMergeCommands();

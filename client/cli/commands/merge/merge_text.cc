@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -17,12 +16,6 @@ namespace atlas {
 namespace {
 
 constexpr double kDegree = 180.0 / std::numbers::pi;
-
-std::string NameOf(const SessionKey& key) {
-  std::ostringstream name;
-  name << key;
-  return name.str();
-}
 
 double Rms(const std::vector<double>& values) {
   double sum = 0.0;
@@ -39,34 +32,7 @@ std::string FateOf(const MergeSession& session, const SessionOutcome& outcome) {
   return outcome.moved.empty() ? "stays" : "moved";
 }
 
-}  // namespace
-
-void PrintMerge(const MergeRun& run, std::ostream& out) {
-  TextTable table(
-      {"session", "", ">keyframes", ">moved", ">rms m", ">max m", ">submaps", ">met", ">closures"});
-  for (std::size_t i = 0; i < run.sessions.size(); ++i) {
-    const SessionOutcome& outcome = run.plan.sessions[i];
-    table.Row({NameOf(run.sessions[i].key), FateOf(run.sessions[i], outcome),
-               std::to_string(run.sessions[i].keyframes.size()),
-               std::to_string(outcome.moved.size()), FixedText(outcome.rms_move_m, 3),
-               FixedText(outcome.max_move_m, 3), std::to_string(outcome.submaps),
-               std::to_string(outcome.submaps_met), std::to_string(outcome.closures)});
-  }
-  table.Print(out);
-  for (std::size_t i = 0; i < run.sessions.size(); ++i) {
-    if (run.plan.sessions[i].is_joined) continue;
-    out << NameOf(run.sessions[i].key) << ": " << run.plan.sessions[i].why_not << '\n';
-  }
-  for (const LeftOut& left_out : run.left_out) {
-    out << NameOf(left_out.key) << ": left out, " << left_out.why << '\n';
-  }
-  out << run.plan.closures.size() << " closures, off by "
-      << FixedText(Rms(run.plan.closure_off_m), 3) << " m and "
-      << FixedText(kDegree * Rms(run.plan.closure_off_rad), 3) << " deg; " << run.plan.rejected
-      << " rejected; " << run.plan.tiles.size() << " tiles to be fused again\n";
-}
-
-boost::json::object MergeJson(const MergeRun& run) {
+boost::json::array SessionsJson(const MergeRun& run) {
   boost::json::array sessions;
   for (std::size_t i = 0; i < run.sessions.size(); ++i) {
     const SessionOutcome& outcome = run.plan.sessions[i];
@@ -85,6 +51,10 @@ boost::json::object MergeJson(const MergeRun& run) {
     if (!outcome.is_joined) session["why_not"] = outcome.why_not;
     sessions.push_back(std::move(session));
   }
+  return sessions;
+}
+
+boost::json::array ClosuresJson(const MergeRun& run) {
   boost::json::array closures;
   for (std::size_t i = 0; i < run.plan.closures.size(); ++i) {
     const FoundClosure& closure = run.plan.closures[i];
@@ -101,21 +71,64 @@ boost::json::object MergeJson(const MergeRun& run) {
                         {"off_m", Rounded(run.plan.closure_off_m[i], 4)},
                         {"off_deg", Rounded(kDegree * run.plan.closure_off_rad[i], 4)}});
   }
+  return closures;
+}
+
+boost::json::array LeftOutJson(const MergeRun& run) {
   boost::json::array left_out;
   for (const LeftOut& one : run.left_out) {
     left_out.push_back(
         {{"vehicle", one.key.vehicle}, {"session", one.key.session}, {"why", one.why}});
   }
-  return {{"revision", run.revision},
-          {"sessions", std::move(sessions)},
-          {"left_out", std::move(left_out)},
-          {"closures", std::move(closures)},
-          {"rejected", run.plan.rejected},
-          {"closure_rms_m", Rounded(Rms(run.plan.closure_off_m), 4)},
-          {"closure_rms_deg", Rounded(kDegree * Rms(run.plan.closure_off_rad), 4)},
-          {"keyframes_moved", run.Corrections().size()},
-          {"published", run.Published().size()},
-          {"tiles", run.plan.tiles.size()}};
+  return left_out;
+}
+
+}  // namespace
+
+void PrintMerge(const MergeRun& run, std::ostream& out) {
+  TextTable table(
+      {"session", "", ">keyframes", ">moved", ">rms m", ">max m", ">submaps", ">met", ">closures"});
+  for (std::size_t i = 0; i < run.sessions.size(); ++i) {
+    const SessionOutcome& outcome = run.plan.sessions[i];
+    table.Row({StrCat(run.sessions[i].key), FateOf(run.sessions[i], outcome),
+               std::to_string(run.sessions[i].keyframes.size()),
+               std::to_string(outcome.moved.size()), FixedText(outcome.rms_move_m, 3),
+               FixedText(outcome.max_move_m, 3), std::to_string(outcome.submaps),
+               std::to_string(outcome.submaps_met), std::to_string(outcome.closures)});
+  }
+  table.Print(out);
+  for (std::size_t i = 0; i < run.sessions.size(); ++i) {
+    if (run.plan.sessions[i].is_joined) continue;
+    out << run.sessions[i].key << ": " << run.plan.sessions[i].why_not << '\n';
+  }
+  for (const LeftOut& left_out : run.left_out) {
+    out << left_out.key << ": left out, " << left_out.why << '\n';
+  }
+  out << run.plan.closures.size() << " closures, off by "
+      << FixedText(Rms(run.plan.closure_off_m), 3) << " m and "
+      << FixedText(kDegree * Rms(run.plan.closure_off_rad), 3) << " deg; " << run.plan.rejected
+      << " rejected; " << run.plan.tiles.size() << " tiles to be fused again\n";
+}
+
+boost::json::object MergeJson(const MergeRun& run, const std::optional<PoseBatchSummary>& batch) {
+  boost::json::object json{{"revision", run.revision},
+                           {"sessions", SessionsJson(run)},
+                           {"left_out", LeftOutJson(run)},
+                           {"closures", ClosuresJson(run)},
+                           {"rejected", run.plan.rejected},
+                           {"closure_rms_m", Rounded(Rms(run.plan.closure_off_m), 4)},
+                           {"closure_rms_deg", Rounded(kDegree * Rms(run.plan.closure_off_rad), 4)},
+                           {"keyframes_moved", run.Corrections().size()},
+                           {"published", run.Published().size()},
+                           {"tiles", run.plan.tiles.size()},
+                           {"applied", batch.has_value()}};
+  if (batch) {
+    json["batch"] = batch->batch;
+    json["updated"] = batch->updated;
+    json["tiles_marked"] = batch->tiles_marked;
+    json["revision_after"] = batch->revision;
+  }
+  return json;
 }
 
 }  // namespace atlas

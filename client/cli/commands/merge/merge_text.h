@@ -1,6 +1,7 @@
 // What a merge found, as text and as JSON.
 #pragma once
 
+#include <optional>
 #include <ostream>
 
 #include <boost/json/object.hpp>
@@ -10,6 +11,7 @@
 namespace atlas {
 
 void PrintMerge(const MergeRun& run, std::ostream& out);
-boost::json::object MergeJson(const MergeRun& run);
+// Without a batch nothing was applied.
+boost::json::object MergeJson(const MergeRun& run, const std::optional<PoseBatchSummary>& batch);
 
 }  // namespace atlas

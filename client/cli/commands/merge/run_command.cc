@@ -161,15 +161,7 @@ class MergeRunCommand : public Command {
                     bool is_applied,
                     const CommandContext& context) {
     if (context.is_json) {
-      boost::json::object json = MergeJson(run);
-      json["applied"] = batch.has_value();
-      if (batch) {
-        json["batch"] = batch->batch;
-        json["updated"] = batch->updated;
-        json["tiles_marked"] = batch->tiles_marked;
-        json["revision_after"] = batch->revision;
-      }
-      context.PrintJson(json);
+      context.PrintJson(MergeJson(run, batch));
       return;
     }
     PrintMerge(run, context.out);

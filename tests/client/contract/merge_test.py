@@ -1,0 +1,217 @@
+#!/usr/bin/python3
+"""`atlas-merge run` as scripts and people know it: what it prints, what it leaves, how it ends.
+
+Usage: merge_test.py BIN_DIR DRIVES tell|change."""
+
+import hashlib
+import json
+import pathlib
+import signal
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
+from harness import Daemon, Report  # noqa: E402
+from merge_harness import COARSE, Merges, Watched  # noqa: E402
+
+KEYS = {"revision", "sessions", "left_out", "closures", "rejected", "closure_rms_m", "closure_rms_deg",
+        "keyframes_moved", "published", "tiles", "applied"}
+APPLIED_KEYS = KEYS | {"batch", "updated", "tiles_marked", "revision_after"}
+SESSION_KEYS = {"vehicle", "session", "was_staged", "joined", "held", "keyframes", "moved", "rms_move_m", "max_move_m",
+                "submaps", "submaps_met", "closures"}
+
+
+def nothing_cases(merges):
+    """Where there is nothing to merge nothing happens, and that is fine."""
+    report = merges.report
+    empty = merges.merged("an empty daemon")
+    report.equal("an empty daemon", (empty["sessions"], empty["applied"]), ([], False))
+    report.check("an empty daemon, for people", "nothing to do" in merges.merge("run").stdout)
+    merges.ingest("garage")  # in the map at once
+    alone = merges.merged("one in the map")  # it is as good as it can be made
+    report.equal("one in the map", ([one["joined"] for one in alone["sessions"]], alone["published"]), ([True], 0))
+    again = merges.merged("one in the map, twice")
+    report.equal("one in the map, twice", (again["applied"], again["keyframes_moved"]), (False, 0))
+    report.equal("a retracted session is left out", merges.call("session", "retract", "garage/day").returncode, 0)
+    left = merges.merged("one retracted")
+    report.equal("one retracted", (left["sessions"], [one["why"] for one in left["left_out"]]), ([], ["retracted"]))
+    report.equal("one retracted: restored", merges.call("session", "restore", "garage/day").returncode, 0)
+
+
+def dry_run_cases(merges, work):
+    """All that a run tells beforehand, and nothing done."""
+    report = merges.report
+    picture, corrections = work / "m.png", work / "m.poses"
+    before = merges.state()
+    dry = merges.merged("a dry run", "--dry-run", "--picture", picture, "--corrections", corrections)
+    report.equal("a dry run: keys", set(dry), KEYS)
+    by_vehicle = {one["vehicle"]: one for one in dry["sessions"]}
+    report.equal("a dry run: a session's keys", set(by_vehicle["first"]), SESSION_KEYS)
+    report.equal("a dry run: who stays out is told why", set(by_vehicle["garage"]), SESSION_KEYS | {"why_not"})
+    report.equal("a dry run: who belongs together", {name: one["joined"] for name, one in by_vehicle.items()},
+                 {"first": True, "second": True, "garage": False})
+    report.equal("a dry run: published would be", (dry["published"], dry["applied"]), (2, False))
+    report.check("a dry run: closures", len(dry["closures"]) >= 3 and
+                 set(dry["closures"][0]) == {"a", "b", "fit", "off_m", "off_deg"}, dry["closures"])
+    report.equal("a dry run: the picture", picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+    lines = corrections.read_text(encoding="ascii").splitlines()
+    report.equal("a dry run: corrections", len([line for line in lines if line and line[0] != "#"]),
+                 dry["keyframes_moved"])
+    report.equal("a dry run: the atlas", merges.state(), before)
+    one = merges.merged("one session", "--dry-run", "--session", "second/day")
+    report.equal("one session", ([s["vehicle"] for s in one["sessions"]], sorted(o["vehicle"] for o in one["left_out"])),
+                 (["second"], ["first", "garage"]))
+    return dry
+
+
+def backup_cases(merges, folder, dry):
+    """From a copy of the atlas, without a daemon: the same, and nothing to apply it to."""
+    merges.run("backup", "monday")
+    backup = next(path for path in folder.iterdir() if path.is_file())
+    content = hashlib.sha256(backup.read_bytes()).hexdigest()
+    from_file = merges.merged("a backup", "--atlas", backup, server=False)
+    for found in (from_file, dry):
+        found.pop("revision", None)
+    merges.report.equal("a backup", from_file, dry)
+    merges.report.equal("a backup: unchanged", hashlib.sha256(backup.read_bytes()).hexdigest(), content)
+    other = folder.parent / "no.db"
+    other.write_bytes(b"no atlas" * 1000)
+    for name, file, code in (("no backup there", folder / "tuesday", "not_found"), ("no atlas", other, "invalid_data")):
+        merges.merge_refused(name, ["run", "--atlas", file], code, server=False)
+    merges.merge_refused("a file and a daemon", ["run", "--atlas", backup], "invalid_argument", "--server")
+
+
+def refused_cases(merges, work):
+    merges.merge_refused("an unknown session", ["run", "--session", "nobody/day"], "not_found", "nobody/day")
+    for flags in (["--session", "first"], ["--session"], ["more"], ["--workers", "3"], ["--author", "a b"]):
+        merges.merge_refused(f"run {flags}", ["run", *flags], "invalid_argument")
+    (work / "folder").mkdir()
+    for flag in ("--picture", "--corrections"):
+        merges.merge_refused(f"{flag} in no folder", ["run", flag, work / "none/x"], "not_found", "none/x")
+        merges.merge_refused(f"{flag} with a folder's name", ["run", flag, work / "folder"], "conflict", "folder")
+        if merges.unprivileged is None:
+            merges.report.skip(f"{flag} where nobody may write", "nobody may not run what is built")
+        else:
+            (work / "locked").mkdir(mode=0o755, exist_ok=True)
+            merges.merge_refused(f"{flag} where nobody may write", ["run", flag, work / "locked/x"],
+                                 "permission_denied", **merges.unprivileged)
+    gone = Merges(merges.report, merges.bin_dir, "127.0.0.1:1", merges.drives)
+    done = gone.merge("run", "--json")
+    merges.report.equal("no daemon: exit code", done.returncode, 5)
+    merges.typed("no daemon", done.stderr, "unavailable", "127.0.0.1:1")
+
+
+def help_cases(merges):
+    for line in ([], ["run"], ["serve"]):
+        done = merges.merge(*line, "--help", server=False)
+        merges.report.check(f"{line} --help", done.returncode == 0 and "Usage: atlas-merge" in done.stdout and
+                            not done.stderr, done)
+    version = merges.merge("--version", server=False)
+    merges.report.check("--version", version.returncode == 0 and version.stdout.startswith("atlas-merge "), version)
+    for line in ([], ["merge"], ["status"]):
+        merges.merge_refused(f"no such command: {line}", line, "invalid_argument")
+
+
+def interrupted_case(merges):
+    """A signal during the search ends it, as the system says so, and nothing was applied."""
+    before = merges.state()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        watched = Watched(merges, "run")
+        merges.report.check(f"signal {number}: it searches", watched.wait_for("search"), watched.shown)
+        watched.process.send_signal(number)
+        code, out = watched.end()
+        merges.report.equal(f"signal {number}: its end", (code, out), (-number, ""))
+    merges.report.equal("interrupted: the atlas", merges.state(), before)
+
+
+def conflict_case(merges):
+    """A keyframe that comes to a session while it is merged: merged again, with it."""
+    before = merges.run("sessions")["sessions"]
+    report = merges.report
+    watched = Watched(merges, "run", "--json")
+    report.check("a conflict: it searches", watched.wait_for("search"), watched.shown)
+    watched.process.send_signal(signal.SIGSTOP)
+    merges.ingest("second", "--staged")  # the rest of it
+    watched.process.send_signal(signal.SIGCONT)
+    code, out = watched.end()
+    report.equal("a conflict: exit code", code, 0)
+    report.check("a conflict: it says so", b"merged again" in watched.shown, watched.shown[-500:])
+    done = json.loads(out)
+    report.equal("a conflict: keys", set(done), APPLIED_KEYS)
+    keyframes = {one["vehicle"]: one["keyframes"] for one in done["sessions"]}
+    report.check("a conflict: the later keyframes are in it",
+                 keyframes["second"] > next(one["keyframes"] for one in before if one["vehicle"] == "second"), keyframes)
+    report.equal("a conflict: who is in the map", merges.states(),
+                 {"first": "live", "second": "live", "garage": "staged"})
+    return done["batch"]
+
+
+def twice_case(merges, batch):
+    """What was merged stays; undone, it is merged again."""
+    report = merges.report
+    merges.run("wait")
+    before = merges.state()
+    again = merges.merged("a second run")
+    report.equal("a second run", (again["applied"], again["keyframes_moved"], again["published"]), (False, 0, 0))
+    report.equal("a second run: the atlas", merges.state(), before)
+    merges.run("poses", "undo", batch)
+    report.equal("undone", merges.states(), {"first": "staged", "second": "staged", "garage": "staged"})
+    done = merges.merge("run", "--author", "alice")
+    report.check("for people", done.returncode == 0 and "published" in done.stdout and
+                 f"undone by: atlas poses undo {batch + 2}" in done.stdout, done)
+    by = [event["author"] for event in merges.run("log")["events"] if event["kind"] == "poses"]
+    report.check("by whom", "alice" in by, by)
+
+
+def role_cases(report, bin_dir, drives, work):
+    """Readers and vehicles do not merge; who merges needs no other right."""
+    with Daemon(bin_dir, work / "roles", *COARSE) as daemon:
+        Merges(report, bin_dir, daemon.server, drives).staged("first", "second")
+    for role, code in (("reader", 1), ("vehicle", 1), ("merge", 0)):
+        with Daemon(bin_dir, work / "roles", *COARSE, "--anonymous", role) as daemon:
+            done = Merges(report, bin_dir, daemon.server, drives).merge("run", "--json")
+        report.equal(f"as {role} ({done.stderr[:200]})", done.returncode, code)
+        if code != 0:
+            report.equal(f"as {role}: why", json.loads(done.stderr)["error"]["code"], "permission_denied")
+
+
+def tell(report, bin_dir, drives, work):
+    """What a run says, and refuses."""
+    with Daemon(bin_dir, work / "nothing", *COARSE) as daemon:
+        nothing_cases(Merges(report, bin_dir, daemon.server, drives))
+    (work / "backups").mkdir()
+    with Daemon(bin_dir, work / "atlas", *COARSE, "--backup-folder", work / "backups") as daemon:
+        merges = Merges(report, bin_dir, daemon.server, drives)
+        merges.staged("first", "second", "garage")
+        backup_cases(merges, work / "backups", dry_run_cases(merges, work))
+        refused_cases(merges, work)
+        help_cases(merges)
+
+
+def change(report, bin_dir, drives, work):
+    """What a run does, and what keeps it from it."""
+    with Daemon(bin_dir, work / "atlas", *COARSE) as daemon:
+        merges = Merges(report, bin_dir, daemon.server, drives)
+        merges.staged("first", "garage")
+        merges.ingest("second", "--staged", "--range", "0:55")
+        interrupted_case(merges)
+        twice_case(merges, conflict_case(merges))
+    role_cases(report, bin_dir, drives, work)
+
+
+GROUPS = {"tell": tell, "change": change}
+
+
+def main():
+    bin_dir, drives = (pathlib.Path(arg) for arg in sys.argv[1:3])
+    report = Report()
+    with tempfile.TemporaryDirectory() as name:
+        work = pathlib.Path(name)
+        work.chmod(0o755)  # commands that run as nobody reach it
+        GROUPS[sys.argv[3]](report, bin_dir, drives, work)
+    print(f"{report.checks} checks, {report.failed} failed")
+    return 1 if report.failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

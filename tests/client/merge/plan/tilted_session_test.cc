@@ -1,0 +1,83 @@
+// A session that would have to be tilted too far against how its grids were levelled: left where it
+// is, with why, and no matter to the others.
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "client/merge/plan/merge_planner.h"
+#include "core/base/hash.h"
+#include "core/keyframe/keyframe_codec.h"
+#include "tests/client/merge/plan/blind_session.h"
+#include "tests/core/support/keyframe_worlds.h"
+
+namespace atlas {
+namespace {
+
+using testing::At;
+using testing::BlindSession;
+using testing::Staged;
+using testing::Straight;
+
+Bytes BlobTiltedBy(double tilt_rad) {
+  Keyframe keyframe = testing::BlankKeyframe(MapProfile(), 4);
+  const double one = 1 << QuantizedPose::kQuaternionBits;
+  keyframe.level_quaternion = {static_cast<std::int32_t>(std::lround(one * std::cos(tilt_rad / 2))),
+                               static_cast<std::int32_t>(std::lround(one * std::sin(tilt_rad / 2))),
+                               0, 0};
+  return EncodeKeyframe(keyframe);
+}
+
+MergeSession LevelSession(const std::string& name, double x_m, std::size_t keyframes) {
+  MergeSession session = BlindSession(name, Straight(At(x_m), keyframes));
+  for (MergeKeyframe& keyframe : session.keyframes) keyframe.blob_hash = Hash64(BlobTiltedBy(0.0));
+  return Staged(std::move(session));
+}
+
+// Blobs that are level the first time that they are read, and tilted by three degrees afterwards:
+// as if what was found had tilted the session by as much.
+BlobReader LevelOnce(std::size_t keyframes) {
+  return [keyframes, read = std::make_shared<std::size_t>(0)](std::size_t) -> Result<Bytes> {
+    return BlobTiltedBy((*read)++ < keyframes ? 0.0 : 3.0 * std::numbers::pi / 180.0);
+  };
+}
+BlobReader Level() {
+  return [](std::size_t) -> Result<Bytes> {
+    return BlobTiltedBy(0.0);
+  };
+}
+
+TEST(TiltedSessionTest, ItIsLeftOutWithWhyAndTouchesNothing) {
+  for (const int refinements : {0, 2}) {
+    MergeOptions options;
+    options.refinements = refinements;
+    std::vector<MergeSession> sessions{LevelSession("car", 0.0, 31)};
+    const std::size_t keyframes = sessions[0].keyframes.size();
+    MergeWork work = MergeWork::Temporary().value();
+    const auto plan =
+        PlanMerge(sessions, {LevelOnce(keyframes)}, {MapProfile(), options, work}, nullptr);
+    ASSERT_TRUE(plan.has_value()) << plan.error().message();
+    EXPECT_FALSE(plan->sessions[0].is_joined);
+    EXPECT_TRUE(plan->sessions[0].moved.empty());
+    EXPECT_NE(plan->sessions[0].why_not.find("keyframe 0"), std::string::npos)
+        << plan->sessions[0].why_not;
+    EXPECT_TRUE(plan->tiles.empty());
+  }
+}
+
+TEST(TiltedSessionTest, OthersAreMergedAsEver) {
+  std::vector<MergeSession> sessions{LevelSession("level", 0.0, 41),
+                                     LevelSession("tilted", 99.0, 31)};
+  MergeWork work = MergeWork::Temporary().value();
+  const auto plan =
+      PlanMerge(sessions, {Level(), LevelOnce(31)}, {MapProfile(), MergeOptions(), work}, nullptr);
+  ASSERT_TRUE(plan.has_value()) << plan.error().message();
+  EXPECT_TRUE(plan->sessions[0].is_joined) << "the larger one becomes the map";
+  EXPECT_FALSE(plan->sessions[1].is_joined);
+  EXPECT_FALSE(plan->tiles.empty());
+}
+
+}  // namespace
+}  // namespace atlas
