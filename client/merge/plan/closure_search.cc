@@ -54,8 +54,9 @@ ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
 
 Result<std::vector<FoundClosure>> ClosureSearch::SearchAnywhere(const Progress& progress) {
   std::vector<Task> tasks = LookAlike();
-  for (Task& near : LieNear(StoredPoses(sessions_), std::vector<std::size_t>(sessions_.size(), 0),
-                            {options_.near_m, options_.near_height_m, 1}, options_.reach)) {
+  for (Task& near :
+       LieNear(StoredPoses(sessions_), std::vector<std::size_t>(sessions_.size(), 0),
+               {options_.near_m, options_.near_height_m, 1, all_.size()}, options_.reach)) {
     // What is in the map is where it should be, or is found as others are.
     if (!sessions_[near.a.session].is_staged && !sessions_[near.b.session].is_staged) {
       near.reach.reset();
@@ -78,9 +79,10 @@ Result<std::vector<FoundClosure>> ClosureSearch::SearchNear(const SubmapPoses& T
   for (const FoundClosure& closure : known) {
     looked_at_.emplace(closure.a, closure.b);
   }
-  std::vector<Task> tasks = LieNear(
-      T_world_submap, part_of,
-      {options_.guided_m, options_.guided_height_m, options_.guided_neighbours}, std::nullopt);
+  std::vector<Task> tasks = LieNear(T_world_submap, part_of,
+                                    {options_.guided_m, options_.guided_height_m,
+                                     options_.guided_neighbours, options_.guided_most},
+                                    std::nullopt);
   std::erase_if(tasks,
                 [&](const Task& task) { return !looked_at_.emplace(task.a, task.b).second; });
   return Run(std::move(tasks), progress);
@@ -172,34 +174,47 @@ std::vector<ClosureSearch::Task> ClosureSearch::LieNear(
     const std::vector<std::size_t>& part_of,
     const Near& near,
     const std::optional<SearchReach>& reach) const {
-  struct Neighbour {
-    double distance_m;
-    SubmapRef ref;
-  };
   std::vector<Task> tasks;
   for (const SubmapRef& one : all_) {
     const Pose& here = T_world_submap[one.session][one.submap];
+    std::vector<Neighbour> neighbours;
     for (std::size_t session = 0; session <= one.session; ++session) {
       if (part_of[session] != part_of[one.session]) continue;
-      std::vector<Neighbour> neighbours;
-      for (std::size_t i = 0; i < sessions_[session].submaps.size(); ++i) {
-        const SubmapRef other{session, i};
-        if (!(other < one) || !MayMeet(other, one)) continue;
-        const Eigen::Vector3d away = T_world_submap[session][i].translation() - here.translation();
-        if (away.head<2>().norm() > near.distance_m || std::abs(away.z()) > near.height_m) continue;
-        neighbours.push_back({away.norm(), other});
-      }
-      std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
-        return std::tie(a.distance_m, a.ref) < std::tie(b.distance_m, b.ref);
-      });
-      neighbours.resize(std::min(neighbours.size(), near.neighbours));
-      for (const Neighbour& other : neighbours) {
-        const Pose& there = T_world_submap[other.ref.session][other.ref.submap];
-        tasks.push_back(TaskOf(other.ref, one, there.inverse() * here, reach));
-      }
+      const auto more = NeighboursIn(session, one, T_world_submap, near);
+      neighbours.insert(neighbours.end(), more.begin(), more.end());
+    }
+    std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
+      return std::tie(a.rank, a.distance_m, a.ref) < std::tie(b.rank, b.distance_m, b.ref);
+    });
+    neighbours.resize(std::min(neighbours.size(), near.most));
+    for (const Neighbour& other : neighbours) {
+      const Pose& there = T_world_submap[other.ref.session][other.ref.submap];
+      tasks.push_back(TaskOf(other.ref, one, there.inverse() * here, reach));
     }
   }
   return tasks;
+}
+
+// Submaps of a session before `one` that are near it, the nearest first.
+std::vector<ClosureSearch::Neighbour> ClosureSearch::NeighboursIn(std::size_t session,
+                                                                  const SubmapRef& one,
+                                                                  const SubmapPoses& T_world_submap,
+                                                                  const Near& near) const {
+  const Eigen::Vector3d here = T_world_submap[one.session][one.submap].translation();
+  std::vector<Neighbour> neighbours;
+  for (std::size_t i = 0; i < sessions_[session].submaps.size(); ++i) {
+    const SubmapRef other{session, i};
+    if (!(other < one) || !MayMeet(other, one)) continue;
+    const Eigen::Vector3d away = T_world_submap[session][i].translation() - here;
+    if (away.head<2>().norm() > near.distance_m || std::abs(away.z()) > near.height_m) continue;
+    neighbours.push_back({0, away.norm(), other});
+  }
+  std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.distance_m, a.ref) < std::tie(b.distance_m, b.ref);
+  });
+  neighbours.resize(std::min(neighbours.size(), near.neighbours));
+  for (std::size_t rank = 0; rank < neighbours.size(); ++rank) neighbours[rank].rank = rank;
+  return neighbours;
 }
 
 bool ClosureSearch::IsExpected(const Task& task, const SubmapMatch& match) const {

@@ -64,7 +64,14 @@ class ClosureSearch {
   struct Near {
     double distance_m;
     double height_m;
-    std::size_t neighbours;  // of each session
+    std::size_t neighbours;  // of each session,
+    std::size_t most;        // of all
+  };
+
+  struct Neighbour {
+    std::size_t rank;  // in its session
+    double distance_m;
+    SubmapRef ref;
   };
 
   bool MayMeet(const SubmapRef& a, const SubmapRef& b) const;
@@ -76,6 +83,10 @@ class ClosureSearch {
   Status KeepSearched();
   static void DropAskedTwice(std::vector<Task>& tasks);
   std::vector<Task> LookAlike() const;
+  std::vector<Neighbour> NeighboursIn(std::size_t session,
+                                      const SubmapRef& one,
+                                      const SubmapPoses& T_world_submap,
+                                      const Near& near) const;
   std::vector<Task> LieNear(const SubmapPoses& T_world_submap,
                             const std::vector<std::size_t>& part_of,
                             const Near& near,

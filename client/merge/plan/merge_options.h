@@ -52,7 +52,8 @@ struct MergeOptions {
   // From the poses that were found all pairs are looked at that lie this near by them.
   double guided_m = 8.0;
   double guided_height_m = 1.0;
-  std::size_t guided_neighbours = 2;  // in each session
+  std::size_t guided_neighbours = 2;  // in each session,
+  std::size_t guided_most = 12;       // and of all earlier ones together, one of each first
   double max_surprise_m = 1.0;        // of a match from where it was expected
   double max_surprise_rad = 3.0 * std::numbers::pi / 180.0;
   int guided_rounds = 3;
