@@ -1,5 +1,6 @@
 #include "client/cli/command_line/stop_signal.h"
 
+#include <array>
 #include <csignal>
 #include <thread>
 
@@ -17,7 +18,29 @@ void SendToProcess(int number) {
   ASSERT_EQ(kill(getpid(), number), 0);
 }
 
-class StopSignalTest : public testing::TestWithParam<int> {};
+// As from a terminal: what is started in the background ignores SIGINT.
+class Heeded {
+ public:
+  Heeded() {
+    for (std::size_t i = 0; i < kBoth.size(); ++i) before_[i] = std::signal(kBoth[i], SIG_DFL);
+  }
+  ~Heeded() {
+    for (std::size_t i = 0; i < kBoth.size(); ++i) std::signal(kBoth[i], before_[i]);
+  }
+  Heeded(const Heeded&) = delete;
+  Heeded& operator=(const Heeded&) = delete;
+  Heeded(Heeded&&) = delete;
+  Heeded& operator=(Heeded&&) = delete;
+
+ private:
+  static constexpr std::array kBoth{SIGINT, SIGTERM};
+  std::array<void (*)(int), 2> before_{};
+};
+
+class StopSignalTest : public testing::TestWithParam<int> {
+ private:
+  Heeded heeded_;
+};
 
 TEST_P(StopSignalTest, ItIsSeenFromAnyThreadAndStays) {
   StopSignal stop;
@@ -58,6 +81,7 @@ TEST(StopSignalOnceTest, WhatIsIgnoredStaysIgnored) {
 }
 
 TEST(StopSignalOnceTest, WhoeverIsToldTwiceEndsWellNevertheless) {
+  const Heeded heeded;
   StopSignal stop;
   SendToProcess(SIGTERM);
   EXPECT_TRUE(stop.HasCome());
@@ -66,6 +90,7 @@ TEST(StopSignalOnceTest, WhoeverIsToldTwiceEndsWellNevertheless) {
 }  // and this process is still there
 
 TEST(StopSignalDeathTest, AfterwardsASignalEndsTheProcessAgain) {
+  const Heeded heeded;
   { const StopSignal stop; }
   EXPECT_EXIT(std::raise(SIGTERM), testing::KilledBySignal(SIGTERM), "");
 }
