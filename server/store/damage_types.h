@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry/pose.h"
 #include "core/geometry/tile_id.h"
 
 namespace atlas {
@@ -21,10 +22,13 @@ struct DamagedKeyframe {
 struct KeyframeRepair {
   std::int64_t id = 0;
   std::string author;
-  // The level-0 tiles at its pose, where that can be read: in the place of a list that is damaged.
+  // The level-0 tiles at `pose`, where that can be read: in the place of a list that is damaged.
   std::optional<std::vector<TileId>> footprint;
   // What cannot be restored is deleted: it was never uploaded then.
   bool gives_up = false;
+  // At which it was when its footprint was told. If it is corrected before it is repaired, nothing
+  // is done: it stays kDamaged, and is to be asked for again.
+  QuantizedPose pose = {};
 };
 
 // The last two before keyframes are repaired and after it.

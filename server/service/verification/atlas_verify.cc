@@ -13,6 +13,7 @@ namespace atlas {
 namespace {
 
 constexpr std::uint32_t kPage = 1'024;
+constexpr int kAttempts = 10;  // at a keyframe that is corrected all the time
 
 Status CheckTileBlob(const StoredTile& tile, const MapProfile& profile) {
   const auto payload = TilePayloadFromBlob(tile.blob);
@@ -73,13 +74,17 @@ Status AtlasVerifier::RepairTables(TableRepair what) {
   return {};
 }
 
-std::optional<std::vector<TileId>> AtlasVerifier::FootprintOf(std::int64_t id) {
-  const auto stored = store_.ReadKeyframeRecord(id);
-  if (!stored) {
-    return std::nullopt;
+// kDamaged: it was corrected meanwhile.
+Result<RepairOutcome> AtlasVerifier::RepairOnce(std::int64_t id) {
+  KeyframeRepair repair{id, options_.request.author, std::nullopt, true};
+  if (const auto stored = store_.ReadKeyframeRecord(id)) {
+    repair.pose = stored->pose;
+    if (auto placed = CheckPose(*stored, stored->pose, store_.identity().profile)) {
+      repair.footprint = std::move(placed->footprint);
+    }
   }
-  auto placed = CheckPose(*stored, stored->pose, store_.identity().profile);
-  return placed ? std::optional(std::move(placed->footprint)) : std::nullopt;
+  return Await<RepairOutcome>(
+      [&](auto done) { store_.RepairKeyframe(std::move(repair), std::move(done)); });
 }
 
 Status AtlasVerifier::HandleKeyframe(std::int64_t id, const Status& damage) {
@@ -91,9 +96,10 @@ Status AtlasVerifier::HandleKeyframe(std::int64_t id, const Status& damage) {
         Await<std::uint32_t>([&](auto done) { store_.NoteDamage({id}, std::move(done)); });
     return noted ? Status() : Unnoted(noted.error());
   }
-  const auto outcome = Await<RepairOutcome>([&](auto done) {
-    store_.RepairKeyframe({id, options_.request.author, FootprintOf(id), true}, std::move(done));
-  });
+  Result<RepairOutcome> outcome = RepairOutcome::kDamaged;
+  for (int i = 0; outcome && *outcome == RepairOutcome::kDamaged && i < kAttempts; ++i) {
+    outcome = RepairOnce(id);
+  }
   if (!outcome) {
     return outcome.error();
   }

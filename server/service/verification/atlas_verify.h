@@ -66,8 +66,7 @@ class AtlasVerifier {
   Status HandleKeyframe(std::int64_t id, const Status& damage);
   Status HandleTile(const TileId& id);
   Status HandlePlaceOf(const TileId& id);
-  // Where it lies, if its row and its pose can be read.
-  std::optional<std::vector<TileId>> FootprintOf(std::int64_t id);
+  Result<RepairOutcome> RepairOnce(std::int64_t id);
   Status CheckTile(const TileId& id);
   Status CompareTile(const TileId& id, const std::optional<StoredTile>& stored);
   Status CheckParentExists(const TileId& id);

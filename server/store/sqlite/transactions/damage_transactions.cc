@@ -102,6 +102,12 @@ std::uint64_t FirstRevision(Connection& connection, std::int64_t id) {
   return first;
 }
 
+// Since its footprint was told. One whose pose cannot be read is none: it is restored first.
+bool IsMoved(Connection& connection, const KeyframeRepair& repair) {
+  const auto pose = ReadPose(connection, repair.id);
+  return pose && *pose != repair.pose;
+}
+
 void GiveUp(Connection& connection, const KeyframeRepair& repair, const Status& why) {
   const std::string name = NameOf(connection, repair.id);
   std::set<TileId> tiles;
@@ -258,6 +264,9 @@ Result<RepairOutcome> RepairKeyframeInStore(Connection& connection, const Keyfra
   if (damage.ok() || IsGone(connection, repair.id)) {
     return DeleteDamagedKeyframe(connection, repair.id) ? RepairOutcome::kRestored
                                                         : RepairOutcome::kIntact;
+  }
+  if (repair.footprint && IsMoved(connection, repair)) {
+    return RepairOutcome::kDamaged;
   }
   RestoreFromOthers(connection, repair.id);
   if (!check().ok() && repair.footprint) {
