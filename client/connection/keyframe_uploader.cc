@@ -16,6 +16,15 @@ constexpr auto kNoEnd = std::chrono::steady_clock::time_point::max();
 // Of a daemon that is busy and does not say for how long.
 constexpr std::chrono::milliseconds kLeastPause{50};
 
+wire::PositionPrior PriorToWire(const KnownPosition& prior) {
+  wire::PositionPrior message;
+  message.set_x_um(prior.x_um);
+  message.set_y_um(prior.y_um);
+  message.set_z_um(prior.z_um);
+  message.set_radius_mm(prior.radius_mm);
+  return message;
+}
+
 wire::Envelope UploadRequest(const KeyframeUpload& upload) {
   wire::Envelope request;
   wire::UploadKeyframe& message = *request.mutable_upload_keyframe();
@@ -24,6 +33,7 @@ wire::Envelope UploadRequest(const KeyframeUpload& upload) {
   *message.mutable_pose() = PoseToWire(upload.T_world_sensor);
   message.set_blob(BytesToWire(upload.blob));
   message.set_staged(upload.is_staged);
+  if (upload.prior) *message.mutable_prior() = PriorToWire(*upload.prior);
   return request;
 }
 

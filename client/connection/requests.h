@@ -31,6 +31,16 @@ struct AtlasIdentity {
   std::optional<std::uint32_t> last_sequence = std::nullopt;
 };
 
+// Where the sensor was in the world (the atlas's frame), known from elsewhere (GNSS).
+struct KnownPosition {
+  std::int64_t x_um = 0;
+  std::int64_t y_um = 0;
+  std::int64_t z_um = 0;
+  std::uint32_t radius_mm = 0;  // one standard deviation along each axis; 0: nobody knows
+
+  friend bool operator==(const KnownPosition&, const KnownPosition&) = default;
+};
+
 struct KeyframeUpload {
   KeyframeKey key;
   std::int64_t time_ms = 0;
@@ -39,6 +49,8 @@ struct KeyframeUpload {
   // The session that it begins is staged: kept, and not in the map until it is published. Taken by
   // daemons of protocol 1.10 and later alone: others are not sent it (kUnsupported).
   bool is_staged = false;
+  // Of a keyframe that is there already it changes nothing: the first one stays.
+  std::optional<KnownPosition> prior = std::nullopt;
 };
 
 // What is known of a stored keyframe, but its blob.
@@ -46,16 +58,6 @@ struct KeyframeSummary {
   std::uint32_t sequence = 0;
   std::int64_t time_ms = 0;
   QuantizedPose T_world_sensor;  // as it is now
-};
-
-// A position known from elsewhere (GNSS): the sensor was within the radius of it.
-struct KnownPosition {
-  std::int64_t x_um = 0;
-  std::int64_t y_um = 0;
-  std::int64_t z_um = 0;
-  std::uint32_t radius_mm = 0;
-
-  friend bool operator==(const KnownPosition&, const KnownPosition&) = default;
 };
 
 // A stored keyframe as it was uploaded, where it is now.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "client/connection/requests.h"
 #include "core/base/bytes.h"
@@ -15,13 +16,15 @@ struct SpooledKeyframe {
   QuantizedPose T_world_sensor;
   Bytes blob;
   bool is_staged = false;
+  std::optional<KnownPosition> prior = std::nullopt;
 
-  KeyframeUpload ToUpload() const { return {key, time_ms, T_world_sensor, blob, is_staged}; }
+  KeyframeUpload ToUpload() const { return {key, time_ms, T_world_sensor, blob, is_staged, prior}; }
 };
 
 // No spooled keyframe takes more.
 inline constexpr std::uint64_t kMaxSpooledBytes = (std::uint64_t{16} << 20) + 1024;
 
+// Without a prior as programs read it that know of none.
 Bytes EncodeSpooled(const KeyframeUpload& upload);
 // kInvalidData: truncated, damaged or something else.
 Result<SpooledKeyframe> DecodeSpooled(ByteSpan file);

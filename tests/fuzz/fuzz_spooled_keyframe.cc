@@ -13,6 +13,12 @@ std::vector<Bytes> Seeds() {
   for (const Bytes& blob : KeyframeSeeds(testing::GoldenProfile())) {
     seeds.push_back(EncodeSpooled({{{"bus", "day-2"}, 7}, 1'700'000'000'000, {}, blob}));
     seeds.push_back(EncodeSpooled({{{"bus", "day-2"}, 8}, 1'700'000'000'000, {}, blob, true}));
+    seeds.push_back(EncodeSpooled({{{"bus", "day-2"}, 9},
+                                   1'700'000'000'000,
+                                   {},
+                                   blob,
+                                   true,
+                                   KnownPosition{-1'000'000, 2, 1LL << 40, 500}}));
   }
   seeds.push_back(EncodeSpooled({{{"b", "d"}, 0}, 0, {}, {}}));
   return seeds;
@@ -25,7 +31,9 @@ bool Run(ByteSpan file) {
   }
   Require(keyframe->key.Validate().ok(), "a spooled keyframe has a name");
   const auto again = DecodeSpooled(EncodeSpooled(keyframe->ToUpload()));
-  Require(again && again->key == keyframe->key && again->blob == keyframe->blob, "it reads back");
+  Require(again && again->key == keyframe->key && again->blob == keyframe->blob &&
+              again->prior == keyframe->prior,
+          "it reads back");
   return true;
 }
 

@@ -28,6 +28,35 @@ KeyframeUpload Upload(std::uint32_t sequence, const Bytes& blob) {
   return upload;
 }
 
+TEST(KeyframeUploaderTest, APositionThatIsKnownGoesAlong) {
+  std::vector<wire::UploadKeyframe> came;
+  TestPeer peer([&](PeerSocket& socket) {
+    AnswerHello(socket, {});
+    for (int i = 0; i < 2; ++i) {
+      const auto request = socket.ReadRequest();
+      came.push_back(request->upload_keyframe());
+      Acknowledge(socket, request->request_id(), false);
+    }
+  });
+  auto client = AtlasClient::Connect(peer.options());
+  ASSERT_TRUE(client);
+  KeyframeUploader uploader(*client);
+  const Bytes blob(10, 1);
+  KeyframeUpload upload = Upload(0, blob);
+  ASSERT_TRUE(uploader.Upload(upload).ok());
+  upload.key.sequence = 1;
+  upload.prior = KnownPosition{-5, std::int64_t{1} << 40U, 7, 2'500};
+  ASSERT_TRUE(uploader.Upload(upload).ok());
+  ASSERT_TRUE(uploader.Finish().ok());
+  ASSERT_EQ(came.size(), 2U);
+  EXPECT_FALSE(came[0].has_prior());
+  ASSERT_TRUE(came[1].has_prior());
+  EXPECT_EQ(came[1].prior().x_um(), -5);
+  EXPECT_EQ(came[1].prior().y_um(), std::int64_t{1} << 40U);
+  EXPECT_EQ(came[1].prior().z_um(), 7);
+  EXPECT_EQ(came[1].prior().radius_mm(), 2'500U);
+}
+
 TEST(KeyframeUploaderTest, KeepsTheWindowAndCountsEverything) {
   constexpr std::size_t kWindow = 4;
   constexpr std::uint32_t kUploads = 25;

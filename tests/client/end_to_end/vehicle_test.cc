@@ -126,6 +126,50 @@ TEST_F(VehicleTest, TheHandshakeSaysHowFarASessionIsThere) {
   EXPECT_EQ(last_sequence("tuesday"), std::nullopt);
 }
 
+// By way of the disk; what is there keeps the first one, whatever comes later.
+TEST_F(VehicleTest, APositionGoesWithItsKeyframeAndStays) {
+  DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon, {"--vehicle", "car", "--session", "monday", "--range", "0:2"}).exit_code,
+            0);
+  AtlasClient client = Connect(daemon);
+  const auto read = [&client](const std::string& session) {
+    std::vector<SessionKeyframe> keyframes;
+    const auto reading = client.ReadKeyframes({"car", session}, std::nullopt, [&](auto keyframe) {
+      keyframes.push_back(std::move(keyframe));
+      return Status();
+    });
+    EXPECT_TRUE(reading) << reading.error().message();
+    return keyframes;
+  };
+  const std::vector<SessionKeyframe> monday = read("monday");
+  ASSERT_EQ(monday.size(), 2U);
+  const SpoolOptions options{.folder = shared_root / "spool_of_positions"};
+  const KnownPosition first{-3, std::int64_t{1} << 40U, 7, 500};
+  std::optional<KnownPosition> prior = first;
+  for (const bool is_duplicate : {false, true}) {
+    {
+      UploadSpool spool = *UploadSpool::Open(options);
+      for (const SessionKeyframe& keyframe : monday) {
+        KeyframeUpload upload{{{"car", "tuesday"}, keyframe.sequence},
+                              keyframe.time_ms,
+                              keyframe.T_world_sensor,
+                              keyframe.blob};
+        upload.prior = keyframe.sequence == monday.front().sequence ? prior : std::nullopt;
+        ASSERT_TRUE(spool.Put(upload).ok());
+      }
+    }
+    UploadSpool spool = *UploadSpool::Open(options);
+    const auto report = spool.Send(client);
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->acknowledged, 2U) << is_duplicate;
+    const std::vector<SessionKeyframe> tuesday = read("tuesday");
+    ASSERT_EQ(tuesday.size(), 2U);
+    EXPECT_EQ(tuesday[0].prior, first);
+    EXPECT_EQ(tuesday[1].prior, std::nullopt);
+    prior = KnownPosition{1, 2, 3, 4};
+  }
+}
+
 TEST_F(VehicleTest, WhatTheDaemonRefusesForGoodIsSetAside) {
   DaemonProcess daemon(NewData(), kSmall);
   UploadSpool spool = *UploadSpool::Open({.folder = shared_root / "spool"});

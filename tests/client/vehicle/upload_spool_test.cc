@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "client/vehicle/spooled_keyframe.h"
+#include "client/vehicle/stored_file.h"
 #include "tests/client/vehicle/spool_peer.h"
 
 namespace atlas {
@@ -257,6 +258,55 @@ TEST(SpooledKeyframeTest, SaysWhetherItsSessionIsStaged) {
   EXPECT_FALSE(DecodeSpooled(live)->ToUpload().is_staged);
   EXPECT_TRUE(DecodeSpooled(staged)->ToUpload().is_staged);
   EXPECT_EQ(DecodeSpooled(staged)->blob, blob);
+}
+
+TEST(SpooledKeyframeTest, KeepsThePositionThatIsKnown) {
+  const Bytes blob{1, 2, 3};
+  KeyframeUpload upload;
+  upload.key = {{"car", "monday"}, 4};
+  upload.blob = blob;
+  for (const bool is_staged : {false, true}) {
+    upload.is_staged = is_staged;
+    upload.prior = std::nullopt;
+    const Bytes without = EncodeSpooled(upload);
+    EXPECT_EQ(DecodeSpooled(without)->prior, std::nullopt);
+    upload.prior = KnownPosition{-7, std::int64_t{1} << 40U, 5, 2'500};
+    const Bytes with = EncodeSpooled(upload);
+    EXPECT_EQ(with[4], without[4] + 2) << "a version of its own: others would lose it";
+    EXPECT_EQ(with.size(), without.size() + 28);
+    const auto read = DecodeSpooled(with);
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_EQ(read->ToUpload().prior, upload.prior);
+    EXPECT_EQ(read->is_staged, is_staged);
+    EXPECT_EQ(read->blob, blob);
+  }
+}
+
+// As it was written before there were positions.
+TEST(SpooledKeyframeTest, AnOldFileIsRead) {
+  const Bytes content{0x52, 0x41, 0x56, 0x4B, 2, 3, 'c', 'a', 'r', 1, 'd', 9, 0, 0, 0};
+  Bytes file = content;
+  file.resize(file.size() + 8 + 3 * 8 + 4 * 4);
+  file[content.size()] = 17;  // ms
+  file.insert(file.end(), {2, 0, 0, 0, 0xAA, 0xBB});
+  const auto read = DecodeSpooled(WithChecksum(std::move(file)));
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(read->key, (KeyframeKey{{"car", "d"}, 9}));
+  EXPECT_EQ(read->time_ms, 17);
+  EXPECT_TRUE(read->is_staged);
+  EXPECT_EQ(read->prior, std::nullopt);
+  EXPECT_EQ(read->blob, (Bytes{0xAA, 0xBB}));
+}
+
+TEST(SpooledKeyframeTest, WhatALaterProgramWroteIsNotGuessedAt) {
+  KeyframeUpload upload;
+  upload.key = {{"car", "monday"}, 4};
+  Bytes file = EncodeSpooled(upload);
+  file[4] = 5;
+  file.resize(file.size() - 8);
+  const auto read = DecodeSpooled(WithChecksum(std::move(file)));
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code(), StatusCode::kInvalidData);
 }
 
 }  // namespace
