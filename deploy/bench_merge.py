@@ -135,7 +135,7 @@ def show_localization(emit, bin_dir, merge, later):
 
 
 def layers_at(atlas, poses):
-    return [len(atlas.run("point", f"{pose[0, 3]:.3f}", f"{pose[1, 3]:.3f}")["surfaces"]) for pose in poses]
+    return [len(atlas.run("point", f"{pose[0, 3]:.3f}", f"{pose[1, 3]:.3f}")["layers"]) for pose in poses]
 
 
 def show_layers(emit, bin_dir, merge):

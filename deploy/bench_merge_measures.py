@@ -10,7 +10,7 @@ import os
 
 import numpy
 
-NEAR_M, DECK_M, WRONG_M, WRONG_DEG, ALONG = 5.0, 1.0, 0.5, 3.0, 8
+NEAR_M, DECK_M, WRONG_M, WRONG_DEG, ALONG, MAPPED_M = 5.0, 1.0, 0.5, 3.0, 8, 10.0
 
 
 def matrices(lines):
@@ -148,13 +148,20 @@ def overlaps(visits, closures):
 
 
 def laid_into(visits, truth):
-    """True poses of another drive as the map of the visits has them: by the keyframe that is nearest."""
+    """True poses of another drive as the map of the visits has them: by the mean of the keyframes within 10 m, which are
+    what the map there was fused of."""
     owners = [(visit, k) for visit in visits for k in visit.stored]
     nearby = numpy.array([visit.truth[k] for visit, k in owners])
     laid = []
     for pose in truth:
-        visit, k = owners[int(distances(pose, nearby).argmin())]
-        laid.append(visit.poses[k] @ numpy.linalg.inv(visit.truth[k]) @ pose)
+        away = distances(pose, nearby)
+        chosen = numpy.flatnonzero(away <= max(MAPPED_M, away.min()))
+        moved = numpy.array([owners[i][0].poses[owners[i][1]] @ numpy.linalg.inv(nearby[i]) @ pose for i in chosen])
+        mean = numpy.eye(4)
+        u, _, v = numpy.linalg.svd(moved[:, :3, :3].sum(0))  # the rotation nearest to all of them
+        mean[:3, :3] = u @ v
+        mean[:3, 3] = moved[:, :3, 3].mean(0)
+        laid.append(mean)
     return numpy.array(laid)
 
 

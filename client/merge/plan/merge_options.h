@@ -49,6 +49,10 @@ struct MergeOptions {
   std::size_t min_closures = 3;
   double min_margin = 1.3;
 
+  // A closure that is off by more when everything has its place is wrong.
+  double contradicted_m = 1.0;
+  double contradicted_rad = 3.0 * std::numbers::pi / 180.0;
+
   // From the poses that were found all pairs are looked at that lie this near by them.
   double guided_m = 8.0;
   double guided_height_m = 1.0;

@@ -130,14 +130,31 @@ class Planner {
     return {};
   }
 
-  // Which closures are believed, who hangs together, and where everything is.
+  // Which closures are believed, who hangs together, and where everything is. Closures that all
+  // others contradict once everything has its place were wrong, however well they agree with each
+  // other: without them again.
   Status Settle(std::vector<FoundClosure> found, const SubmapPoses* start) {
+    constexpr int kAttempts = 3;
     if (more_closures_) {
       const std::vector<FoundClosure> more = more_closures_(found, ways_);
       found.insert(found.end(), more.begin(), more.end());
     }
-    choice_ = ChooseClosures(found, ways_, options_);
-    plan_.rejected += choice_.rejected.size();
+    for (int attempt = 1;; ++attempt) {
+      choice_ = ChooseClosures(found, ways_, options_);
+      plan_.rejected += choice_.rejected.size();
+      ATLAS_RETURN_IF_ERROR(Place(start));
+      const std::size_t believed = choice_.believed.size();
+      found = std::move(choice_.believed);
+      std::erase_if(found, [this](const FoundClosure& closure) { return IsContradicted(closure); });
+      const bool is_settled = found.size() == believed || attempt == kAttempts;
+      plan_.rejected += believed - found.size();
+      choice_.believed = found;
+      if (is_settled) return {};
+    }
+  }
+
+  // Where everything is by what is believed.
+  Status Place(const SubmapPoses* start) {
     parts_ = PutTogether(sessions_, ways_, choice_);
     is_held_ = HeldSessions(sessions_, links_, choice_.believed, options_);
     SubmapPoses begin = start != nullptr ? *start : parts_.T_world_submap;
@@ -151,6 +168,18 @@ class Planner {
     if (!poses) return poses.error();
     poses_ = *std::move(poses);
     return {};
+  }
+
+  // How far both its submaps are from where it has them to each other.
+  Pose OffOf(const FoundClosure& closure) const {
+    const Pose T_a_b = poses_.T_world_submap[closure.a.session][closure.a.submap].inverse() *
+                       poses_.T_world_submap[closure.b.session][closure.b.submap];
+    return closure.match.T_a_b.inverse() * T_a_b;
+  }
+  bool IsContradicted(const FoundClosure& closure) const {
+    const Pose off = OffOf(closure);
+    return off.translation().norm() > options_.contradicted_m ||
+           Eigen::AngleAxisd(off.linear()).angle() > options_.contradicted_rad;
   }
 
   // The part that the map is, or becomes.
@@ -224,9 +253,7 @@ class Planner {
       ++plan_.sessions[closure.a.session].closures;
       if (closure.a.session != closure.b.session) ++plan_.sessions[closure.b.session].closures;
       met.insert({closure.a, closure.b});
-      const Pose found = poses_.T_world_submap[closure.a.session][closure.a.submap].inverse() *
-                         poses_.T_world_submap[closure.b.session][closure.b.submap];
-      const Pose off = closure.match.T_a_b.inverse() * found;
+      const Pose off = OffOf(closure);
       plan_.closure_off_m.push_back(off.translation().norm());
       plan_.closure_off_rad.push_back(Eigen::AngleAxisd(off.linear()).angle());
     }

@@ -68,8 +68,9 @@ Result<TransferReport> TransferSessions(
     const std::function<Status(std::size_t done, std::size_t all)>& progress) {
   if (!(from.profile() == to.profile())) {
     return Error(StatusCode::kInvalidArgument,
-                 StrCat(from.name(), " has another map profile than the daemon: its keyframes "
-                                     "cannot be fused there"));
+                 StrCat(from.name(),
+                        " has another map profile than the daemon: its keyframes "
+                        "cannot be fused there"));
   }
   const auto sessions = from.ListSessions();
   if (!sessions) return Error(sessions.error());

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """`atlas-merge run` as scripts and people know it: what it prints, what it leaves, how it ends.
 
-Usage: merge_test.py BIN_DIR DRIVES tell|change."""
+Usage: merge_test.py BIN_DIR DRIVES tell|change|bring."""
 
 import hashlib
 import json
@@ -199,7 +199,66 @@ def change(report, bin_dir, drives, work):
     role_cases(report, bin_dir, drives, work)
 
 
-GROUPS = {"tell": tell, "change": change}
+def from_cases(merges, other, file):
+    """Sessions of another atlas, by its file and by its daemon: brought once, and merged."""
+    report = merges.report
+    merges.merge_refused("--from and --dry-run", ["run", "--from", file, "--dry-run"], "invalid_argument", "--from")
+    merges.merge_refused("--from nothing", ["run", "--from", file.parent / "none"], "not_found", "none")
+    merges.merge_refused("--from no daemon", ["run", "--from", "127.0.0.1:1"], "unavailable")
+    done = merges.merge("run", "--from", file, "--json")
+    report.equal(f"--from a file: exit code ({done.stderr})", done.returncode, 0)
+    report.equal("--from a file: who is in the map", merges.states(), {"first": "live", "second": "live"})
+    report.check("--from a file: what came", "1 sessions" in done.stderr and "0 were there already" in done.stderr,
+                 done.stderr)
+    before = merges.state()
+    again = merges.merge("run", "--from", other.server, "--json")
+    report.equal(f"--from a daemon: exit code ({again.stderr})", again.returncode, 0)
+    report.check("--from a daemon: all was there", "0 were there already" not in again.stderr, again.stderr)
+    report.equal("--from a daemon: nothing is done", (json.loads(again.stdout)["applied"], merges.state()),
+                 (False, before))
+    report.equal("--from a daemon: where it is from it stays", other.states(), {"second": "live"})
+
+
+def kept_cases(merges, work):
+    """What was found is kept, and what changed is told."""
+    report = merges.report
+    folder, changes = work / "kept", work / "changes.csv"
+    flags = ("--dry-run", "--work", folder, "--changes", changes, "--changes-picture", work / "changes.png")
+    first = merges.merged("with a folder", *flags)
+    files = sorted(folder.iterdir())
+    report.check("with a folder: it has submaps and a log", {path.suffix for path in files} >= {".submap", ".log"}, files)
+    again = merges.merged("with a folder, again", *flags)
+    report.equal("with a folder, again: the same", again, first)
+    report.equal("with a folder, again: nothing new", sorted(folder.iterdir()), files)
+    for path in folder.glob("*.submap"):
+        path.unlink()
+    report.equal("without its submaps: the same", merges.merged("without its submaps", *flags), first)
+    report.check("changes: a list", changes.read_text(encoding="ascii").startswith("kind,vehicle,session,"), changes)
+    report.equal("changes: a picture", (work / "changes.png").read_bytes()[:4], b"\x89PNG")
+    merges.merge_refused("--changes elsewhere", ["run", "--changes", work / "changes.txt"], "invalid_argument", ".csv")
+    merges.merge_refused("--work in a file", ["run", "--work", changes], "conflict")
+
+
+def bring(report, bin_dir, drives, work):
+    """What comes from elsewhere, and what stays for the next time."""
+    with Daemon(bin_dir, work / "atlas", *COARSE) as daemon, Daemon(bin_dir, work / "other", *COARSE) as source:
+        merges = Merges(report, bin_dir, daemon.server, drives)
+        other = Merges(report, bin_dir, source.server, drives)
+        merges.staged("first")
+        other.ingest("second")
+        other.run("wait")
+        from_cases(merges, other, work / "other/atlas.db")
+    with Daemon(bin_dir, work / "kept_atlas", *COARSE) as daemon:
+        merges = Merges(report, bin_dir, daemon.server, drives)
+        merges.staged("first", "second")
+        kept_cases(merges, work)
+    with Daemon(bin_dir, work / "fine") as daemon:
+        merges = Merges(report, bin_dir, daemon.server, drives)
+        merges.merge_refused("--from another profile", ["run", "--from", work / "other/atlas.db"], "invalid_argument",
+                             "profile")
+
+
+GROUPS = {"tell": tell, "change": change, "bring": bring}
 
 
 def main():

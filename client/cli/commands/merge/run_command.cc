@@ -1,4 +1,5 @@
 // `atlas-merge run`: finds where sessions belong and hands the daemon one batch of corrections.
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,8 @@
 #include "client/cli/output/progress_bar.h"
 #include "client/merge/change_report.h"
 #include "client/merge/merge_run.h"
+#include "client/merge/source/session_transfer.h"
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -55,6 +58,10 @@ class MergeRunCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     arguments.Repeated("--session", "VEHICLE/SESSION", wanted_,
                        "A staged session to merge; may be repeated [all that are staged]");
+    arguments.Repeated(
+        "--from", "FILE", from_,
+        "Bring the sessions of another atlas first, staged: its file, or HOST:PORT of "
+        "its daemon; may be repeated");
     arguments.Flag("--dry-run", is_dry_run_,
                    "Print what would be done, and do nothing; so it is with --atlas, too");
     arguments.Optional("--picture", "FILE.png", picture_, "Draw the ways before and after");
@@ -81,6 +88,10 @@ class MergeRunCommand : public Command {
       const auto format = ChangeFormatOf(*changes_);
       if (!format) return format.error();
     }
+    if (!from_.empty() && (is_dry_run_ || context.atlas_file)) {
+      return {StatusCode::kInvalidArgument,
+              "--from brings sessions to a daemon, which neither --dry-run nor --atlas does"};
+    }
     if (context.atlas_file) {
       Result<AtlasFile> file = AtlasFile::Open(*context.atlas_file);
       if (!file) return file.error();
@@ -89,11 +100,51 @@ class MergeRunCommand : public Command {
     }
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
+    for (const std::string& from : from_) {
+      ATLAS_RETURN_IF_ERROR(Bring(from, *client, context));
+    }
     DaemonSessions source(*client);
     return Merge(source, &*client, *author, context);
   }
 
  private:
+  // Without --from a merge that is ended has changed nothing; with it, what came stays staged.
+  static Status Bring(const std::string& from, AtlasClient& client, CommandContext& context) {
+    if (std::filesystem::exists(from)) {
+      Result<AtlasFile> file = AtlasFile::Open(from);
+      if (!file) return file.error();
+      FileSessions source(*std::move(file), from);
+      return Bring(source, client, context);
+    }
+    Result<Endpoint> endpoint = Endpoint::Parse(from);
+    if (!endpoint) {
+      return {StatusCode::kNotFound,
+              StrCat("--from ", from, ": there is no such file, and it is no HOST:PORT")};
+    }
+    ConnectionOptions options = context.connection;
+    options.endpoint = *std::move(endpoint);
+    Result<AtlasClient> other = AtlasClient::Connect(options);
+    if (!other) return other.error();
+    DaemonSessions source(*other);
+    return Bring(source, client, context);
+  }
+  static Status Bring(SessionSource& source, AtlasClient& client, CommandContext& context) {
+    Progress progress(context);
+    const auto report = TransferSessions(source, client, [&](std::size_t done, std::size_t all) {
+      return progress("bringing", done, all);
+    });
+    progress.Wipe();
+    if (!report) return report.error();
+    for (const LeftOut& one : report->left_out) {
+      context.err << "note: " << source.name() << ": " << one.key << " is not brought: " << one.why
+                  << '\n';
+    }
+    context.err << "note: " << source.name() << ": " << report->sessions << " sessions, "
+                << report->keyframes << " keyframes, of which " << report->duplicates
+                << " were there already\n";
+    return {};
+  }
+
   // `client` is null where there is nobody to hand it to.
   Status Merge(SessionSource& source,
                AtlasClient* client,
@@ -175,6 +226,7 @@ class MergeRunCommand : public Command {
   }
 
   std::vector<SessionKey> wanted_;
+  std::vector<std::string> from_;
   bool is_dry_run_ = false;
   std::optional<std::string> picture_;
   std::optional<std::string> corrections_;
