@@ -109,9 +109,8 @@ class SqliteStore final : public AtlasStore {
   }
   void UndoPoses(PoseUndo undo, Done<PoseBatchResult> done) override {
     WriteQueue::Operation operation = MakeWrite<PoseBatchResult>(
-        std::move(done), [u = std::move(undo)](Connection& connection) {
-          return UndoPosesInStore(connection, u);
-        });
+        std::move(done),
+        [u = std::move(undo)](Connection& connection) { return UndoPosesInStore(connection, u); });
     operation.is_alone = true;
     writes_.Submit(std::move(operation));
   }
