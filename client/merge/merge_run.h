@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "client/connection/atlas_client.h"
+#include "client/merge/memory/merge_work.h"
 #include "client/merge/plan/merge_options.h"
 #include "client/merge/plan/merge_planner.h"
 #include "client/merge/report/merge_picture.h"
 #include "client/merge/source/keyframe_spool.h"
 #include "client/merge/source/session_selection.h"
 #include "client/merge/source/session_source.h"
-#include "client/merge/work/merge_work.h"
 #include "core/base/status.h"
 
 namespace atlas {

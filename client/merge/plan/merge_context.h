@@ -1,8 +1,8 @@
 // What all steps of a merge share.
 #pragma once
 
+#include "client/merge/memory/merge_work.h"
 #include "client/merge/plan/merge_options.h"
-#include "client/merge/work/merge_work.h"
 #include "core/geometry/map_profile.h"
 
 namespace atlas {

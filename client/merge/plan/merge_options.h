@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "client/merge/graph/pose_graph.h"
-#include "client/merge/work/merge_work.h"
+#include "client/merge/memory/merge_work.h"
 #include "core/alignment/closure_sets.h"
 #include "core/alignment/place_search.h"
 #include "core/alignment/session_cut.h"

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "client/merge/work/merge_work.h"
+#include "client/merge/memory/merge_work.h"
 #include "core/alignment/closure_sets.h"
 #include "core/alignment/session_cut.h"
 #include "core/geometry/keyframe_key.h"

@@ -97,36 +97,30 @@ class SqliteStore final : public AtlasStore {
         });
   }
   void UpdatePoses(PoseBatch batch, Done<PoseBatchResult> done) override {
-    // Many poses in a savepoint take time by their square: with each statement of its own journal
-    // SQLite walks over all that the savepoint keeps.
-    const bool is_large = batch.poses.size() > kFewPoses || !batch.published.empty();
-    WriteQueue::Operation operation = MakeWrite<PoseBatchResult>(
-        std::move(done), [this, b = std::move(batch)](Connection& connection) {
-          return UpdatePosesInStore(connection, identity_, b);
-        });
-    operation.is_alone = is_large;
-    writes_.Submit(std::move(operation));
+    // In a savepoint many poses would take time by their square (decision 0701).
+    const bool is_alone = batch.poses.size() > kFewPoses || !batch.published.empty();
+    Write<PoseBatchResult>(std::move(done),
+                           [this, b = std::move(batch)](Connection& connection) {
+                             return UpdatePosesInStore(connection, identity_, b);
+                           },
+                           {.is_alone = is_alone});
   }
   void UndoPoses(PoseUndo undo, Done<PoseBatchResult> done) override {
-    WriteQueue::Operation operation = MakeWrite<PoseBatchResult>(
+    Write<PoseBatchResult>(
         std::move(done),
-        [u = std::move(undo)](Connection& connection) { return UndoPosesInStore(connection, u); });
-    operation.is_alone = true;
-    writes_.Submit(std::move(operation));
+        [u = std::move(undo)](Connection& connection) { return UndoPosesInStore(connection, u); },
+        {.is_alone = true});
   }
   void ChangeSession(SessionChange change, Done<SessionChangeResult> done) override {
     const bool is_purge = change.action == SessionAction::kPurge;
-    WriteQueue::Operation operation = MakeWrite<SessionChangeResult>(
-        std::move(done), [c = std::move(change)](Connection& connection) {
-          return ChangeSessionInStore(connection, c);
-        });
-    operation.is_alone = is_purge;
-    if (is_purge) {
-      operation.settle = [this] {
-        log_.EmptySoon();
-      };
-    }
-    writes_.Submit(std::move(operation));
+    const std::function<void()> empty_soon = [this] {
+      log_.EmptySoon();
+    };
+    Write<SessionChangeResult>(std::move(done),
+                               [c = std::move(change)](Connection& connection) {
+                                 return ChangeSessionInStore(connection, c);
+                               },
+                               {.is_alone = is_purge, .settle = is_purge ? empty_soon : nullptr});
   }
   void Compact(Compaction compaction, Done<CompactionResult> done) override {
     Write<CompactionResult>(std::move(done), [c = std::move(compaction)](Connection& connection) {
@@ -142,14 +136,13 @@ class SqliteStore final : public AtlasStore {
   void FinishTile(FinishedTile tile, Done<FinishResult> done) override {
     const std::uint8_t levels = identity_.profile.levels;
     const TileId id = tile.claim.id;
-    WriteQueue::Operation operation = MakeWrite<FinishResult>(
-        std::move(done), [levels, t = std::move(tile)](Connection& connection) {
-          return FinishTileInStore(connection, t, levels);
-        });
-    operation.settle = [this, id] {
-      tiles_.Forget(id);
-    };
-    writes_.Submit(std::move(operation));
+    Write<FinishResult>(std::move(done),
+                        [levels, t = std::move(tile)](Connection& connection) {
+                          return FinishTileInStore(connection, t, levels);
+                        },
+                        {.settle = [this, id] {
+                          tiles_.Forget(id);
+                        }});
   }
   void ReleaseClaim(TileClaim claim, std::int64_t retry_at_ms, Done<bool> done) override {
     Write<bool>(std::move(done), [retry_at_ms, c = std::move(claim)](Connection& connection) {
@@ -224,73 +217,73 @@ class SqliteStore final : public AtlasStore {
   void Flush() override { writes_.Flush(); }
 
   Status CheckUnchanged(const std::set<SessionKey>& sessions, std::uint64_t revision) override {
-    return Check(&atlas::CheckUnchanged, identity_, sessions, revision);
+    return readers_.Check(&atlas::CheckUnchanged, identity_, sessions, revision);
   }
   Result<BatchToUndo> ReadBatchToUndo(std::uint64_t batch) override {
-    return Read(&atlas::ReadBatchToUndo, batch);
+    return readers_.Read(&atlas::ReadBatchToUndo, batch);
   }
   Result<FoundKeyframes> FindKeyframes(std::span<const KeyframeKey> keys) override {
-    return Read(&FindKeyframeRecords, keys);
+    return readers_.Read(&FindKeyframeRecords, keys);
   }
   Result<KeyframePage> ListKeyframes(const SessionKey& session,
                                      std::optional<std::uint32_t> after_sequence,
                                      std::uint32_t limit) override {
-    return Read(&ReadKeyframePage, session, after_sequence, limit);
+    return readers_.Read(&ReadKeyframePage, session, after_sequence, limit);
   }
   Result<KeyframeContents> ReadKeyframes(const SessionKey& session,
                                          std::optional<std::uint32_t> after_sequence,
                                          std::size_t max_bytes) override {
-    return Read(&ReadKeyframeContents, session, after_sequence, max_bytes);
+    return readers_.Read(&ReadKeyframeContents, session, after_sequence, max_bytes);
   }
   Result<TileSources> GatherTile(const TileId& id, std::uint64_t since) override {
-    return Read(&GatherTileSources, id, since);
+    return readers_.Read(&GatherTileSources, id, since);
   }
   Result<TileSources> GatherTileAt(const TileId& id, std::uint64_t revision) override {
-    return Read(&GatherTileSourcesAt, id, revision);
+    return readers_.Read(&GatherTileSourcesAt, id, revision);
   }
   Status CheckRevision(std::uint64_t revision) override {
     ATLAS_RETURN_IF_ERROR(identity_.CheckNotLost(revision));
-    return Check(&CheckRevisionKept, revision);
+    return readers_.Check(&CheckRevisionKept, revision);
   }
-  Result<Bytes> ReadKeyframeBlob(std::int64_t id) override { return Read(&ReadBlob, id); }
+  Result<Bytes> ReadKeyframeBlob(std::int64_t id) override { return readers_.Read(&ReadBlob, id); }
   Result<KeyframeRecord> ReadKeyframeRecord(std::int64_t id) override {
-    return Read(&atlas::ReadKeyframeRecord, id);
+    return readers_.Read(&atlas::ReadKeyframeRecord, id);
   }
   Result<std::vector<std::int64_t>> ListKeyframesOfTile(const TileId& id) override {
-    return Read(&atlas::ListKeyframesOfTile, id);
+    return readers_.Read(&atlas::ListKeyframesOfTile, id);
   }
   Result<std::vector<DamagedKeyframe>> ListDamagedKeyframes() override {
-    return Read(&ReadDamagedKeyframes);
+    return readers_.Read(&ReadDamagedKeyframes);
   }
   Result<std::vector<std::int64_t>> ListKeyframeIds(std::int64_t after_id,
                                                     std::uint32_t limit) override {
-    return Read(&ListKeyframeRows, after_id, limit);
+    return readers_.Read(&ListKeyframeRows, after_id, limit);
   }
   Result<StoredKeyframe> ReadKeyframe(std::int64_t id) override {
-    return Read(&VerifyStoredKeyframe, id);
+    return readers_.Read(&VerifyStoredKeyframe, id);
   }
 
   Result<std::optional<StoredTile>> ReadTile(const TileId& id) override {
-    return Read(&ReadTileRow, id);
+    return readers_.Read(&ReadTileRow, id);
   }
   Result<TileBlock> ReadTileBlock(std::uint64_t block) override;
   TileBlock FindTileBlock(std::uint64_t block) override { return tiles_.Find(block); }
   Status ScanTiles(const TileRect& rect,
                    const std::function<void(const TileSummary&)>& visit) override;
   Result<std::vector<TileSummary>> ListTiles(std::int64_t after_key, std::uint32_t limit) override {
-    return Read(&ListTileRows, after_key, limit);
+    return readers_.Read(&ListTileRows, after_key, limit);
   }
   Result<std::vector<TileId>> ListFootprintTiles(std::uint8_t level,
                                                  std::int64_t after_key,
                                                  std::uint32_t limit) override {
-    return Read(&ListFootprintRows, level, after_key, limit);
+    return readers_.Read(&ListFootprintRows, level, after_key, limit);
   }
   Status ScanFootprintTiles(const TileRect& rect,
                             const std::function<void(const TileId&)>& visit) override {
-    return Check(&ScanFootprintRows, rect, visit);
+    return readers_.Check(&ScanFootprintRows, rect, visit);
   }
 
-  Result<DirtyState> ReadDirtyState() override { return Read(&ReadDirty); }
+  Result<DirtyState> ReadDirtyState() override { return readers_.Read(&ReadDirty); }
   Result<StoreCounts> ReadCounts() override {
     return readers_.Run<StoreCounts>([this](Connection& connection) {
       StoreCounts counts = ReadStoreCounts(connection);
@@ -300,52 +293,42 @@ class SqliteStore final : public AtlasStore {
   }
   Result<std::vector<SessionRecord>> ListSessions(const SessionKey& after,
                                                   std::uint32_t limit) override {
-    return Read(&ReadSessions, after, limit);
+    return readers_.Read(&ReadSessions, after, limit);
   }
   Result<SessionPage> ListChangedSessions(const SessionKey& after, std::uint32_t limit) override {
-    return Read(&ReadChangedSessions, after, limit);
+    return readers_.Read(&ReadChangedSessions, after, limit);
   }
   Result<std::optional<SessionRecord>> FindSession(const SessionKey& key) override {
-    return Read(&FindSessionRecord, key);
+    return readers_.Read(&FindSessionRecord, key);
   }
-  Status CheckSession(const SessionKey& key) override { return Check(&CheckSessionHistory, key); }
-  Status CheckCompactions() override { return Check(&CheckCompactionRows); }
+  Status CheckSession(const SessionKey& key) override {
+    return readers_.Check(&CheckSessionHistory, key);
+  }
+  Status CheckCompactions() override { return readers_.Check(&CheckCompactionRows); }
   Result<std::vector<Event>> ListEvents(std::uint64_t after_id, std::uint32_t limit) override {
-    return Read(&ReadEvents, after_id, limit);
+    return readers_.Read(&ReadEvents, after_id, limit);
   }
-  Status CheckCounters() override { return Check(&atlas::CheckCounters); }
+  Status CheckCounters() override { return readers_.Check(&atlas::CheckCounters); }
 
   Status CheckIndexes(const std::function<Status()>& check_stop) override {
-    return CheckStructure([this](const StructureCheck& check) { return ReadStatus(check); },
-                          check_stop);
+    return CheckStructure(
+        [this](const StructureCheck& check) { return readers_.ReadStatus(check); }, check_stop);
   }
 
  private:
-  // Runs `read` with these arguments in one snapshot.
-  template <typename T, typename... Parameters, typename... Arguments>
-  Result<T> Read(Result<T> (*read)(Connection&, Parameters...), const Arguments&... arguments) {
-    return readers_.Run<T>([&](Connection& connection) { return read(connection, arguments...); });
-  }
-  template <typename T, typename... Parameters, typename... Arguments>
-  Result<T> Read(T (*read)(Connection&, Parameters...), const Arguments&... arguments) {
-    return readers_.Run<T>(
-        [&](Connection& connection) { return Result<T>(read(connection, arguments...)); });
-  }
-  template <typename... Parameters, typename... Arguments>
-  Status Check(Status (*check)(Connection&, Parameters...), const Arguments&... arguments) {
-    return ReadStatus([&](Connection& connection) { return check(connection, arguments...); });
-  }
-  // The same of whatever returns a Status.
-  template <typename Reading>
-  Status ReadStatus(Reading&& read) {
-    const auto result = readers_.Run<bool>([&](Connection& connection) -> Result<bool> {
-      Status status = read(connection);
-      return status.ok() ? Result<bool>(true) : Error(std::move(status));
-    });
-    return result ? Status() : result.error();
-  }
-
+  // As WriteQueue::Operation has them.
+  struct Manner {
+    bool is_alone = false;
+    std::function<void()> settle = nullptr;
+  };
   // Queues `work`, which returns a Result<T>; `done` gets it once it is on disk.
+  template <typename T, typename Work>
+  void Write(Done<T> done, Work work, Manner manner) {
+    WriteQueue::Operation operation = MakeWrite<T>(std::move(done), std::move(work));
+    operation.is_alone = manner.is_alone;
+    operation.settle = std::move(manner.settle);
+    writes_.Submit(std::move(operation));
+  }
   template <typename T, typename Work>
   void Write(Done<T> done, Work work) {
     writes_.Submit(MakeWrite<T>(std::move(done), std::move(work)));
@@ -379,7 +362,7 @@ Result<TileBlock> SqliteStore::ReadTileBlock(std::uint64_t block) {
 
 Status SqliteStore::ScanTiles(const TileRect& rect,
                               const std::function<void(const TileSummary&)>& visit) {
-  return ReadStatus([&](Connection& connection) {
+  return readers_.ReadStatus([&](Connection& connection) {
     ScanTileRows(connection, rect, visit);
     return Status();
   });

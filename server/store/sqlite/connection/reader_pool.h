@@ -21,8 +21,8 @@ class ReaderPool {
       : options_(std::move(options)), max_connections_(max_connections) {}
 
   // Runs `read(Connection&)`, which returns a Result<T>, in one snapshot.
-  template <typename T, typename Read>
-  Result<T> Run(Read&& read) {
+  template <typename T, typename Reading>
+  Result<T> Run(Reading&& read) {
     try {
       const Lease lease(*this);
       const Snapshot snapshot(lease.connection());
@@ -30,6 +30,30 @@ class ReaderPool {
     } catch (const std::exception& error) {
       return Error(StatusFromException(error));
     }
+  }
+
+  // Runs `read` with these arguments in one snapshot.
+  template <typename T, typename... Parameters, typename... Arguments>
+  Result<T> Read(Result<T> (*read)(Connection&, Parameters...), const Arguments&... arguments) {
+    return Run<T>([&](Connection& connection) { return read(connection, arguments...); });
+  }
+  template <typename T, typename... Parameters, typename... Arguments>
+  Result<T> Read(T (*read)(Connection&, Parameters...), const Arguments&... arguments) {
+    return Run<T>(
+        [&](Connection& connection) { return Result<T>(read(connection, arguments...)); });
+  }
+  template <typename... Parameters, typename... Arguments>
+  Status Check(Status (*check)(Connection&, Parameters...), const Arguments&... arguments) {
+    return ReadStatus([&](Connection& connection) { return check(connection, arguments...); });
+  }
+  // The same of whatever returns a Status.
+  template <typename Reading>
+  Status ReadStatus(Reading&& read) {
+    const auto result = Run<bool>([&](Connection& connection) -> Result<bool> {
+      Status status = read(connection);
+      return status.ok() ? Result<bool>(true) : Error(std::move(status));
+    });
+    return result ? Status() : result.error();
   }
 
  private:

@@ -96,8 +96,20 @@ TEST(MergeOptionsTest, NumbersAreNumbers) {
        [](MergeOptions& o, double v) {
          o.cut.length_m = v;
        }},
-      {"graph.tilt_sigma_rad", [](MergeOptions& o, double v) {
+      {"graph.tilt_sigma_rad",
+       [](MergeOptions& o, double v) {
          o.graph.tilt_sigma_rad = v;
+       }},
+      {"contradicted_m",
+       [](MergeOptions& o, double v) {
+         o.contradicted_m = v;
+       }},
+      {"known_shape.rad",
+       [](MergeOptions& o, double v) {
+         o.known_shape.rad = v;
+       }},
+      {"refined_shape.metres", [](MergeOptions& o, double v) {
+         o.refined_shape.metres = v;
        }}};
   for (const auto& [name, change] : changes) {
     ExpectRefused(name, change, -0.01);

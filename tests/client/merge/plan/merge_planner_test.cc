@@ -177,6 +177,31 @@ TEST_F(MergePlannerTest, WrongClosuresAreNotBelieved) {
   merge.ExpectTogether(0, 1);
 }
 
+// Three places of one session that seem to be three others of it, as its own odometry has these to
+// each other: they agree, and all else contradicts them.
+TEST_F(MergePlannerTest, ARowOfWrongClosuresIsContradicted) {
+  Merge merge(merge_->work());
+  merge.Add(*first_, false);
+  merge.Add(*second_, true);
+  merge.MustPlan(nullptr,
+                 [&](const std::vector<FoundClosure>& found, const std::vector<SessionWay>& ways) {
+                   const std::vector<Pose>& way = ways[0].T_session_submap;
+                   std::vector<FoundClosure> row;
+                   for (const std::size_t i : {0U, 1U, 2U}) {
+                     row.push_back({{0, i}, {0, i + 4}, found.front().match});
+                     row.back().match.T_a_b = (way[0].inverse() * way[i]).inverse() * At(2.0, 1.0) *
+                                              (way[4].inverse() * way[i + 4]);
+                   }
+                   return row;
+                 });
+  for (const FoundClosure& closure : merge.plan().closures) {
+    EXPECT_NE(closure.a.session, closure.b.session);
+  }
+  EXPECT_GE(merge.plan().rejected, 3U);
+  merge.ExpectTrueClosures();
+  merge.ExpectTogether(0, 1);
+}
+
 // Beyond what registrations that begin elsewhere end apart.
 TEST_F(MergePlannerTest, TheOrderOfSessionsDoesNotMatter) {
   Merge other;

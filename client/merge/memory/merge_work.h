@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "client/merge/work/work_record.h"
+#include "client/merge/memory/work_record.h"
 #include "core/alignment/submap.h"
 #include "core/base/status.h"
 #include "core/geometry/pose.h"

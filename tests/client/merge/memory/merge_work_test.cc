@@ -1,6 +1,6 @@
 // What was found is found again in the next run, by those who ask nearly the same, and by nobody
 // else; whatever becomes of the folder, nothing else than what was kept comes out of it.
-#include "client/merge/work/merge_work.h"
+#include "client/merge/memory/merge_work.h"
 
 #include <chrono>
 #include <filesystem>
@@ -226,6 +226,20 @@ TEST_F(MergeWorkTest, ItTakesNoMoreThanItMay) {
   Open(1, fs::file_size(files[0]) + 1);
   EXPECT_EQ(Files().size(), 1U);
   EXPECT_TRUE(work_->FindSubmap(6, shape_, kTolerance).has_value());
+}
+
+TEST_F(MergeWorkTest, WhatOthersHaveThereStays) {
+  fs::create_directories(folder_.path() / "work");
+  const fs::path partial = folder_.path() / "work/film.partial";
+  const fs::path text = folder_.path() / "work/letter.txt";
+  const fs::path left = folder_.path() / "work/1-2.submap.partial";
+  for (const fs::path& file : {partial, text, left}) {
+    ASSERT_TRUE(StoreFile(file, Bytes(3), Durability::kWhole).ok());
+  }
+  Open();
+  EXPECT_TRUE(fs::exists(partial));
+  EXPECT_TRUE(fs::exists(text));
+  EXPECT_FALSE(fs::exists(left)) << "of a write that never ended";
 }
 
 TEST_F(MergeWorkTest, OneProgramAtATimeWorksInIt) {

@@ -1,6 +1,6 @@
 // Records come back in their order; of what a write that never ended left nothing does, and the
 // next ones follow what was whole.
-#include "client/merge/work/work_log.h"
+#include "client/merge/memory/work_log.h"
 
 #include <filesystem>
 #include <optional>

@@ -1,4 +1,4 @@
-#include "client/merge/work/merge_work.h"
+#include "client/merge/memory/merge_work.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include <system_error>
 #include <utility>
 
-#include "client/merge/work/work_log.h"
+#include "client/merge/memory/work_log.h"
 #include "client/vehicle/folder_lock.h"
 #include "client/vehicle/stored_file.h"
 #include "core/base/disk_error.h"
@@ -88,6 +88,12 @@ std::uint64_t ShapeOf(std::span<const Pose> T_submap_member) {
   return hash.value();
 }
 
+// Or what is left of the writing of one.
+bool IsSubmapFile(const fs::path& path) {
+  return path.extension() == kSuffix ||
+         (path.extension() == kPartialSuffix && path.stem().extension() == kSuffix);
+}
+
 Result<fs::path> MakeTemporaryFolder() {
   std::error_code error;
   std::string name = (fs::temp_directory_path(error) / "atlas-merge.XXXXXX").string();
@@ -152,9 +158,7 @@ Result<std::set<fs::path>> MergeWork::Folder::Tidy(const std::set<fs::path>& kno
   fs::directory_iterator entry(path, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     std::error_code gone;
-    if (entry->path().extension() != kSuffix && entry->path().extension() != kPartialSuffix) {
-      continue;
-    }
+    if (!IsSubmapFile(entry->path())) continue;
     files.push_back({entry->last_write_time(gone), entry->path(), entry->file_size(gone)});
   }
   if (error) return Error(DiskError("cannot read", path, error.value()));

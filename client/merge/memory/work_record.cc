@@ -1,4 +1,4 @@
-#include "client/merge/work/work_record.h"
+#include "client/merge/memory/work_record.h"
 
 #include <bit>
 

@@ -1,4 +1,4 @@
-#include "client/merge/work/work_log.h"
+#include "client/merge/memory/work_log.h"
 
 #include <cerrno>
 #include <limits>

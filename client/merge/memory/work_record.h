@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "client/merge/work/submap_name.h"
+#include "client/merge/memory/submap_name.h"
 #include "core/alignment/session_cut.h"
 #include "core/alignment/submap.h"
 #include "core/alignment/submap_match.h"
