@@ -74,7 +74,7 @@ struct NetFigures {
   std::uint64_t in_flight = 0;     // requests now
   std::uint64_t held_bytes = 0;    // of requests now
   std::uint64_t queued_bytes = 0;  // of replies now, that wait for slow readers
-  std::uint64_t part_bytes = 0;    // of these, of large requests that are not whole or not read
+  std::uint64_t part_bytes = 0;    // of held_bytes, of large requests not whole or not read
   std::uint64_t parts_closed = 0;  // large requests that had to go for others, since the start
 };
 
