@@ -22,7 +22,10 @@ Result<KeyframeSpool> KeyframeSpool::Create() {
 Result<std::size_t> KeyframeSpool::Add(ByteSpan blob) {
   std::FILE* file = file_.get();
   if (fseeko(file, end_, SEEK_SET) != 0) return Failed("cannot write");
-  if (std::fwrite(blob.data(), 1, blob.size(), file) != blob.size()) return Failed("cannot write");
+  // Not with the null pointer that an empty blob may have.
+  if (!blob.empty() && std::fwrite(blob.data(), 1, blob.size(), file) != blob.size()) {
+    return Failed("cannot write");
+  }
   places_.push_back({end_, blob.size()});
   end_ += static_cast<std::int64_t>(blob.size());
   return places_.size() - 1;
@@ -34,7 +37,9 @@ Result<Bytes> KeyframeSpool::Read(std::size_t number) {
   std::FILE* file = file_.get();
   // Seeking writes out what Add left in memory.
   if (fseeko(file, place.offset, SEEK_SET) != 0) return Failed("cannot write");
-  if (std::fread(blob.data(), 1, blob.size(), file) != blob.size()) return Failed("cannot read");
+  if (!blob.empty() && std::fread(blob.data(), 1, blob.size(), file) != blob.size()) {
+    return Failed("cannot read");
+  }
   return blob;
 }
 
