@@ -27,6 +27,9 @@ struct MergeOptions {
   double odometry_yaw_rad_a_m = 0.5 * std::numbers::pi / 180.0 / 100.0;
   double odometry_sigma_m = 0.01;  // of each step between submaps, besides
   double odometry_sigma_rad = 0.05 * std::numbers::pi / 180.0;
+  // So much of that beside a match that is believed: what drifts to one side does so at each step,
+  // and a hundred steps together bend a street that matches have straight.
+  double odometry_share = 0.1;
 
   // A match informs as this share of its features would, were they independent, and is no better
   // than these.
