@@ -28,6 +28,12 @@ bool SeesNothing(const PointCloud& cloud) {
                      [ego = EgoBox()](const auto& point) { return ego.Contains(point); });
 }
 
+KnownPosition KnownPositionOf(const KnownPlace& place) {
+  const Eigen::Vector3d um = 1e6 * place.p_world;
+  return {std::llround(um.x()), std::llround(um.y()), std::llround(um.z()),
+          static_cast<std::uint32_t>(std::llround(1e3 * place.radius_m))};
+}
+
 SurveyOptions SurveyOptionsFor(const IngestOptions& options) {
   SurveyOptions survey;
   survey.rings = options.rings;
@@ -139,6 +145,7 @@ class Ingest {
     }
     std::set<std::uint32_t> parts;
     for (const SelectedScan& scan : selected_) {
+      report_.positions += options_.positions.count(drive_.scans[scan.index].number);
       parts.insert(scan.session_part);
       ATLAS_RETURN_IF_ERROR(KeyOf(scan).Validate());  // "S.12" may be too long a name
     }
@@ -209,6 +216,8 @@ class Ingest {
     const Pose& T_drive_sensor = drive_.scans[index].T_world_sensor;
     upload.T_world_sensor = QuantizedPose::FromPose(
         is_of_map ? T_drive_sensor : frame->second.T_map_drive * T_drive_sensor);
+    const auto place = options_.positions.find(upload.key.sequence);
+    if (place != options_.positions.end()) upload.prior = KnownPositionOf(place->second);
     upload.is_staged = options_.is_staged || (!is_of_map && frame->second.is_staged);
     return uploader.Upload(upload);
   }

@@ -16,6 +16,7 @@
 #include "core/base/status.h"
 #include "core/keyframe/sensor_mount.h"
 #include "core/scan/drive_folder.h"
+#include "core/scan/position_file.h"
 
 namespace atlas {
 
@@ -30,6 +31,9 @@ struct IngestOptions {
   // The drive has a frame of its own, and is found in the atlas first. A part that is not, is
   // uploaded staged, in its own frame. None: its frame is the atlas's.
   std::optional<AnchorOptions> anchor;
+  // In the atlas's frame, also of an anchored drive and of one in a frame of its own: none is
+  // turned or moved. Of the scans that are uploaded these go along.
+  KnownPlaces positions = {};
   double start_s = 0.0;  // added to the scans' times
   double now_s = 0.0;    // since 1970: later scans than a minute from now are refused
   std::optional<std::uint64_t> shuffle_seed;
@@ -43,6 +47,7 @@ struct IngestOptions {
 struct IngestReport {
   std::uint64_t keyframes = 0;    // selected
   std::uint64_t empty_scans = 0;  // of those: without a return from beyond the vehicle
+  std::uint64_t positions = 0;    // of those: with a position from elsewhere
   LastingUploadReport upload;
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob

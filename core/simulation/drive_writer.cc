@@ -14,6 +14,7 @@
 
 #include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
+#include "core/scan/position_file.h"
 
 namespace atlas {
 namespace {
@@ -114,12 +115,18 @@ Status WriteText(const SimulatedDrive& drive,
                  const DriveWriteOptions& options,
                  const fs::path& folder) {
   std::vector<Pose> poses;
+  std::vector<double> times_s;
   std::string times;
   for (std::size_t i = options.begin; i < EndOf(drive, options); ++i) {
     poses.push_back(drive.sensor_pose(i));
-    AppendNumber(drive.time_s(i), "\n", times);
+    times_s.push_back(drive.time_s(i));
+    AppendNumber(times_s.back(), "\n", times);
   }
   ATLAS_RETURN_IF_ERROR(WriteFile(folder / "times.txt", times.data(), times.size()));
+  if (options.gnss) {
+    const std::string text = PositionFileText(MeasuredPlaces(poses, times_s, *options.gnss));
+    ATLAS_RETURN_IF_ERROR(WriteFile(folder / "positions.txt", text.data(), text.size()));
+  }
   if (options.drift) {
     ATLAS_RETURN_IF_ERROR(WritePoses(poses, folder / "truth.txt"));
     poses = Drifted(poses, *options.drift);
@@ -235,6 +242,7 @@ Status DriveWriteOptions::Validate(const SimulatedDrive& drive) const {
     return {StatusCode::kInvalidArgument,
             StrCat("scans ", begin, ":", end, ": none of the drive's ", drive.scans())};
   }
+  if (gnss) ATLAS_RETURN_IF_ERROR(gnss->Validate());
   return drift ? drift->Validate() : Status();
 }
 

@@ -1,6 +1,7 @@
 // Writes a simulated drive as a folder of scans: velodyne/NNNNNN.bin, labels/NNNNNN.label,
-// poses.txt, times.txt and boxes.txt (docs/simulation.md), and truth.txt where poses.txt has an
-// odometry's drift. The folder appears whole or not at all.
+// poses.txt, times.txt and boxes.txt (docs/simulation.md), truth.txt where poses.txt has an
+// odometry's drift, and positions.txt where a GNSS is asked for. The folder appears whole or not at
+// all.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include <optional>
 
 #include "core/base/status.h"
+#include "core/simulation/gnss_noise.h"
 #include "core/simulation/pose_drift.h"
 #include "core/simulation/simulated_drive.h"
 
@@ -22,6 +24,7 @@ struct DriveWriteOptions {
   std::size_t begin = 0;
   std::size_t end = SIZE_MAX;
   std::optional<DriftOptions> drift;  // of poses.txt, from the first scan written on
+  std::optional<GnssOptions> gnss;    // that positions.txt is of
 
   // kInvalidArgument naming the first option out of range.
   Status Validate(const SimulatedDrive& drive) const;

@@ -114,6 +114,23 @@ Status ParseValue(const std::string& text, Perturbation& value) {
   return {};
 }
 
+Status ParseValue(const std::string& text, SeededNoise& value) {
+  const std::string_view whole = text;
+  const std::size_t first = whole.find(',');
+  const std::size_t second = first == std::string::npos ? first : whole.find(',', first + 1);
+  SeededNoise noise;
+  bool is_read = ReadFinite(whole.substr(0, first), noise.sigma_m) && noise.sigma_m > 0.0;
+  if (first != std::string::npos) {
+    is_read = ReadNumber(whole.substr(first + 1, second - first - 1), noise.seed) && is_read;
+  }
+  if (second != std::string::npos) {
+    is_read = ReadFinite(whole.substr(second + 1), noise.wandering) && is_read;
+  }
+  if (!is_read) return Expected("metres above 0, or metres,seed, or metres,seed,share", text);
+  value = noise;
+  return {};
+}
+
 Status ParseValue(const std::string& text, SessionKey& value) {
   const std::size_t slash = text.find('/');
   if (slash == std::string::npos) return Expected("VEHICLE/SESSION", text);

@@ -33,6 +33,15 @@ struct Perturbation {
   friend bool operator==(const Perturbation&, const Perturbation&) = default;
 };
 
+// "SIGMA_M[,SEED[,SHARE]]": noise along each axis, and the share of its variance that wanders.
+struct SeededNoise {
+  double sigma_m = 0.0;
+  std::uint64_t seed = 1;
+  double wandering = 0.5;
+
+  friend bool operator==(const SeededNoise&, const SeededNoise&) = default;
+};
+
 // Text to value; kInvalidArgument saying what was expected. Numbers must be finite and whole text.
 Status ParseValue(const std::string& text, std::string& value);
 Status ParseValue(const std::string& text, double& value);
@@ -44,6 +53,7 @@ Status ParseValue(const std::string& text, Eigen::Vector2d& value);            /
 Status ParseValue(const std::string& text, Eigen::Vector3d& value);            // X,Y,Z
 Status ParseValue(const std::string& text, NumberRange& value);
 Status ParseValue(const std::string& text, Perturbation& value);
+Status ParseValue(const std::string& text, SeededNoise& value);
 Status ParseValue(const std::string& text, SessionKey& value);  // VEHICLE/SESSION
 
 template <typename T>

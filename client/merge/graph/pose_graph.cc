@@ -118,10 +118,11 @@ Status Check(const PoseGraph& graph) {
     }
   }
   for (const GraphPrior& prior : graph.priors) {
-    if (prior.node >= nodes || !(prior.sigma_m.array() > 0.0).all()) {
+    const bool is_known = (prior.sigma_m.array() > 0.0).all() && prior.share > 0.0;
+    if (prior.node >= nodes || !is_known) {
       return {StatusCode::kInvalidArgument,
               StrCat("pose graph: a prior of node ", prior.node, " of ", nodes, ", sigmas ",
-                     prior.sigma_m.transpose(), " m, each to be above 0")};
+                     prior.sigma_m.transpose(), " m, share ", prior.share, ", each to be above 0")};
     }
   }
   return {};
@@ -181,7 +182,7 @@ class Problem {
     for (const GraphPrior& prior : graph.priors) {
       problem_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<PriorResidual, 3, 3, 4>(new PriorResidual{prior}),
-          new ceres::CauchyLoss(options.robust_sigmas), P(prior.node), Q(prior.node));
+          NewPriorLoss(prior, options), P(prior.node), Q(prior.node));
     }
   }
 
@@ -221,6 +222,12 @@ class Problem {
  private:
   static ceres::CostFunction* NewEdgeCost(const GraphEdge& edge) {
     return new ceres::AutoDiffCostFunction<EdgeResidual, 6, 3, 4, 3, 4>(new EdgeResidual(edge));
+  }
+
+  static ceres::LossFunction* NewPriorLoss(const GraphPrior& prior,
+                                           const PoseGraphOptions& options) {
+    return new ceres::ScaledLoss(new ceres::CauchyLoss(options.robust_sigmas), prior.share,
+                                 ceres::TAKE_OWNERSHIP);
   }
 
   void AddNodes(const PoseGraphOptions& options) {

@@ -38,6 +38,9 @@ struct GraphPrior {
   Eigen::Vector3d p_submap = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
   Eigen::Vector3d sigma_m = Eigen::Vector3d::Ones();  // along the world's axes, above 0
+  // Of so many whose errors are one error each counts as this part of one; above 0. How far it is
+  // off, and so whether it may be wrong, goes by its sigmas all the same.
+  double share = 1.0;
 };
 
 struct PoseGraph {

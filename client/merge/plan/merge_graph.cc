@@ -1,6 +1,8 @@
 #include "client/merge/plan/merge_graph.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <numeric>
 
 namespace atlas {
@@ -26,42 +28,64 @@ std::vector<std::size_t> FirstNodes(const std::vector<MergeSession>& sessions) {
   return first;
 }
 
-// What its keyframes know of their place, one a submap: neighbours' errors are one error.
-void AddPrior(const MergeSession& session,
-              const MergeSubmap& submap,
-              std::size_t node,
-              PoseGraph& graph) {
-  const Pose T_submap_world = submap.T_world_submap.inverse();
-  GraphPrior prior;
-  prior.node = node;
-  double radius_m = 0.0;
-  int count = 0;
-  for (std::size_t i = submap.cut.begin; i < submap.cut.end; ++i) {
-    const MergeKeyframe& keyframe = session.keyframes[i];
-    if (!keyframe.prior) continue;
-    prior.p_submap += T_submap_world * session.T_world_sensor[i].translation();
-    prior.p_world += keyframe.prior->p_world;
-    radius_m += keyframe.prior->radius_m;
-    ++count;
+// Which part of a position each of a session's counts as: as many as are within `together_s` have
+// one error.
+class PriorShares {
+ public:
+  PriorShares(const MergeSession& session, double together_s)
+      : half_ms_(std::llround(0.5e3 * together_s)) {
+    for (const MergeKeyframe& keyframe : session.keyframes) {
+      if (keyframe.prior) times_ms_.push_back(keyframe.time_ms);
+    }
+    std::sort(times_ms_.begin(), times_ms_.end());
   }
-  if (count == 0) return;
-  prior.p_submap /= count;
-  prior.p_world /= count;
-  prior.sigma_m.setConstant(radius_m / count);
-  graph.priors.push_back(prior);
+
+  double At(std::int64_t time_ms) const {
+    const auto first = std::lower_bound(times_ms_.begin(), times_ms_.end(), time_ms - half_ms_);
+    const auto last = std::upper_bound(first, times_ms_.end(), time_ms + half_ms_);
+    return 1.0 / static_cast<double>(last - first);
+  }
+
+ private:
+  std::int64_t half_ms_;
+  std::vector<std::int64_t> times_ms_;
+};
+
+// One a keyframe, and not their mean: any of them may be wrong.
+void AddPriors(const MergeSession& session,
+               std::size_t first_node,
+               const MergeOptions& options,
+               PoseGraph& graph) {
+  const PriorShares shares(session, options.priors.together_s);
+  for (std::size_t k = 0; k < session.submaps.size(); ++k) {
+    const MergeSubmap& submap = session.submaps[k];
+    const Pose T_submap_world = submap.T_world_submap.inverse();
+    for (std::size_t i = submap.cut.begin; i < submap.cut.end; ++i) {
+      const MergeKeyframe& keyframe = session.keyframes[i];
+      if (!keyframe.prior) continue;
+      GraphPrior prior;
+      prior.node = first_node + k;
+      prior.p_submap = T_submap_world * session.T_world_sensor[i].translation();
+      prior.p_world = keyframe.prior->p_world;
+      prior.sigma_m.setConstant(keyframe.prior->radius_m);
+      prior.share = shares.At(keyframe.time_ms);
+      graph.priors.push_back(prior);
+    }
+  }
 }
 
 PoseGraph MakeGraph(const MergeEvidence& evidence,
                     const SubmapPoses& start,
-                    const std::vector<std::size_t>& first) {
+                    const std::vector<std::size_t>& first,
+                    const MergeOptions& options) {
   PoseGraph graph;
   for (const std::size_t session : InOrder(evidence.sessions)) {
     const MergeSession& own = evidence.sessions[session];
     for (std::size_t i = 0; i < own.submaps.size(); ++i) {
       graph.nodes.push_back({start[session][i], evidence.is_held[session]});
-      if (!evidence.is_held[session]) {
-        AddPrior(own, own.submaps[i], first[session] + i, graph);
-      }
+    }
+    if (evidence.uses_priors[session] && !evidence.is_held[session]) {
+      AddPriors(own, first[session], options, graph);
     }
     for (const SessionLink& link : evidence.links[session]) {
       graph.edges.push_back({first[session] + link.from, first[session] + link.to, link.T_from_to,
@@ -82,7 +106,7 @@ Result<MergedPoses> OptimizeMerge(const MergeEvidence& evidence,
                                   const SubmapPoses& start,
                                   const MergeOptions& options) {
   const std::vector<std::size_t> first = FirstNodes(evidence.sessions);
-  PoseGraph graph = MakeGraph(evidence, start, first);
+  PoseGraph graph = MakeGraph(evidence, start, first, options);
   const std::size_t links = graph.edges.size() - evidence.closures.size();
   for (std::size_t i = 0; i < evidence.closures.size(); ++i) {
     graph.edges[links + i].information = InformationOf(evidence.closures[i].match, options);

@@ -18,6 +18,8 @@ struct MergeEvidence {
   const std::vector<std::vector<SessionLink>>& links;  // by session
   const std::vector<FoundClosure>& closures;
   const std::vector<bool>& is_held;  // by session: it stays where it is
+  // By session: whether the positions that are known of it count.
+  const std::vector<bool>& uses_priors;
 };
 
 struct MergedPoses {

@@ -15,6 +15,24 @@
 
 namespace atlas {
 
+// Of positions that are known of keyframes.
+struct PriorOptions {
+  // What is wrong with a receiver's positions stays for a while: those of a session within so long
+  // of each other know as much as one of them.
+  double together_s = 30.0;
+  // A position agrees within 3 of its radii, and by what poses may be off: before they are solved
+  // for ...
+  double slack_m = 2.0;
+  // ... and where they hang on a map that stays.
+  double held_slack_m = 0.5;
+  // Which share of them has to agree, how many, and how far apart, root mean square and in radii.
+  double min_share = 0.5;
+  std::size_t min_priors = 10;
+  double min_spread = 10.0;
+  // Farther than odometry drifts: the map has another frame than the positions.
+  double max_frame_shift_m = 10.0;
+};
+
 struct MergeOptions {
   CutOptions cut;
   SubmapOptions submaps;
@@ -22,12 +40,16 @@ struct MergeOptions {
   PlaceSearchOptions places;
   ConsistencyOptions consistency;
   PoseGraphOptions graph;
+  PriorOptions priors;
 
   // Odometry, as the stored poses have it from one keyframe to the next.
   double odometry_drift = 0.01;  // of the way, one standard deviation as all of these
   double odometry_yaw_rad_a_m = 0.5 * std::numbers::pi / 180.0 / 100.0;
   double odometry_sigma_m = 0.01;  // of each step between submaps, besides
   double odometry_sigma_rad = 0.05 * std::numbers::pi / 180.0;
+  // So much of that beside a match that is believed: what drifts to one side does so at each step,
+  // and a hundred steps together bend a street that matches have straight.
+  double odometry_share = 0.1;
 
   // A match informs as this share of its features would, were they independent, and is no better
   // than these.

@@ -12,6 +12,7 @@
 #include "client/merge/plan/merge_graph.h"
 #include "client/merge/plan/parallel.h"
 #include "client/merge/plan/pose_correction.h"
+#include "client/merge/plan/prior_frame.h"
 #include "client/merge/plan/session_links.h"
 #include "client/merge/plan/session_parts.h"
 
@@ -164,7 +165,11 @@ class Planner {
         begin[i][k] = StoredPose(sessions_[i], sessions_[i].submaps[k]);
       }
     }
-    auto poses = OptimizeMerge({sessions_, links_, choice_.believed, is_held_}, begin, options_);
+    priors_ = PlaceByPriors(sessions_, parts_.part_of, is_held_, options_.priors, begin);
+    std::vector<bool> uses_priors;
+    for (const PriorUse& use : priors_) uses_priors.push_back(use.is_used);
+    auto poses = OptimizeMerge({sessions_, links_, choice_.believed, is_held_, uses_priors}, begin,
+                               options_);
     if (!poses) return poses.error();
     poses_ = *std::move(poses);
     return {};
@@ -204,8 +209,10 @@ class Planner {
       outcome.is_joined = joined.contains(parts_.part_of[i]);
       outcome.is_held = is_held_[i];
       outcome.submaps = sessions_[i].submaps.size();
+      outcome.priors = priors_[i];
+      outcome.prior_off_m = MedianOff(sessions_[i], poses_.T_world_submap[i]);
       if (outcome.is_joined && !outcome.is_held) Move(i, outcome);
-      if (!outcome.is_joined) outcome.why_not = "meets no session of the map often enough";
+      if (!outcome.is_joined) outcome.why_not = WhyNot(outcome);
       ATLAS_RETURN_IF_ERROR(LookAtEffect(i, outcome));
     }
     CountClosures();
@@ -213,6 +220,12 @@ class Planner {
     plan_.meetings = choice_.meetings;
     plan_.links = links_;
     return {};
+  }
+
+  // Positions are too coarse for it to be laid on the map by them.
+  static std::string WhyNot(const SessionOutcome& outcome) {
+    std::string why = "meets no session of the map often enough";
+    return outcome.priors.count == 0 ? why : why + ", and positions alone place no session";
   }
 
   void Move(std::size_t session, SessionOutcome& outcome) const {
@@ -273,6 +286,7 @@ class Planner {
   ClosureChoice choice_;
   SessionParts parts_;
   std::vector<bool> is_held_;
+  std::vector<PriorUse> priors_;
   MergedPoses poses_;
   MergePlan plan_;
 };

@@ -13,6 +13,7 @@
 #include "client/merge/plan/merge_context.h"
 #include "client/merge/plan/merge_effect.h"
 #include "client/merge/plan/merge_session.h"
+#include "client/merge/plan/prior_frame.h"
 #include "client/merge/plan/session_links.h"
 #include "client/merge/plan/submap_builder.h"
 #include "core/base/status.h"
@@ -36,6 +37,8 @@ struct SessionOutcome {
   std::size_t submaps = 0;
   double max_move_m = 0.0;  // of its keyframes, those that move too little to be moved counted
   double rms_move_m = 0.0;
+  PriorUse priors;           // the positions that are known of it
+  double prior_off_m = 0.0;  // of half of them from the keyframes, at most, as they are in the end
   std::vector<MovedKeyframe> moved;  // none of a session that is not joined
 };
 

@@ -77,6 +77,7 @@ Result<std::vector<SessionLink>> LinkSession(std::size_t session,
       if (!match) return Error(match.error());
       if (IsBelieved(*match, options.match) &&
           IsNear(match->T_a_b, Between(own, from, to), options)) {
+        if (to == from + 1) links.back().information *= options.odometry_share;
         links.push_back({from, to, match->T_a_b, InformationOf(*match, options), true});
       }
     }

@@ -28,7 +28,8 @@ PoseInformation6 InformationOf(const SubmapMatch& match, const MergeOptions& opt
 
 // From each submap of session `session` of `sessions` to the next by the stored poses, and again by
 // a match that begins at `T_world_submap`, where its submaps are thought to be, if that is believed
-// and near what the stored poses say. None over a jump. Errors are those of the submaps' tiles.
+// and near what the stored poses say; those count as a share then. None over a jump. Errors are
+// those of the submaps' tiles.
 Result<std::vector<SessionLink>> LinkSession(std::size_t session,
                                              const std::vector<MergeSession>& sessions,
                                              const std::vector<Pose>& T_world_submap,

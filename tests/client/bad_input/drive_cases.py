@@ -147,8 +147,32 @@ def label_cases(cases, drives):
         cases.refused(f"segment, {name}", ["segment", folder], "invalid_data", "000002.label")
 
 
+POSITIONS = {  # line 2 of a file of positions
+    "four numbers": "1 0 0 0.5",
+    "word for a number": "1 0 0 up 0.5",
+    "NaN": "1 0 nan 0 0.5",
+    "negative radius": "1 0 0 0 -0.5",
+    "radius of nothing": "1 0 0 0 0",
+    "negative scan": "-1 0 0 0 0.5",
+    "scan that there is not": "4711 0 0 0 0.5",
+    "scan twice": "0 0 0 0 0.5",
+}
+
+
+def position_cases(cases, drives):
+    positions = drives.folder / "positions.txt"
+    command = ["ingest", drives.good, *NEAR, "--session", "positions", "--positions", positions]
+    for name, line in POSITIONS.items():
+        positions.write_text(f"0 1 2 3 0.5\n{line}\n", encoding="ascii")
+        cases.refused(f"positions, {name}", command, "invalid_data", "positions.txt: line 2")
+    positions.write_bytes(b"")
+    cases.refused("positions, none in it", command, "invalid_data", "positions.txt")
+    positions.unlink()
+    cases.refused("positions, no file", command, "not_found", "positions.txt")
+
+
 def run(cases, source, work):
     drives = Drives(source, work)
     cases.run("ingest", drives.good, *NEAR)
-    for group in (scan_cases, pose_cases, folder_cases, permission_cases, label_cases):
+    for group in (scan_cases, pose_cases, folder_cases, permission_cases, label_cases, position_cases):
         group(cases, drives)

@@ -99,7 +99,9 @@ USAGE = {
                  ["street", "-o", "WORK/s", "--seed", "-1"], ["WORK/x.obj", "-o", "WORK/s"],
                  ["street", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt"],
                  ["street", "-o", "WORK/s", "--every", "2"], ["city", "-o", "WORK/s", "--every", "2"],
-                 ["WORK/x.obj", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt", "--every", "-1"]],
+                 ["WORK/x.obj", "-o", "WORK/s", "--trajectory", "DRIVE/poses.txt", "--every", "-1"],
+                 *(["street", "-o", "WORK/s", "--gnss", noise] for noise in (
+                     "0", "-0.5", "nan", "inf", "much", "0.5,", "0.5,-1", "0.5,x", "0.5,1,2", "0.5,1,-1", "0.5,1,0,0", "0.5,,0", "1e6", ""))],
 }
 
 

@@ -104,7 +104,9 @@ class AnchorTest : public VehicleTest {
 TEST_F(AnchorTest, ADriveOfAnotherFrameGoesWhereItWasDriven) {
   const DaemonProcess daemon(NewData(), kSmall);
   Map(daemon, shared_root / "street");
-  const CommandRun run = Anchor(daemon, shared_root / "moved");
+  const fs::path positions = shared_root / "moved_positions.txt";
+  std::ofstream(positions) << "3 10 20 30 0.5\n";
+  const CommandRun run = Anchor(daemon, shared_root / "moved", {"--positions", positions.string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto anchor = AnchorOf(run);
   EXPECT_TRUE(anchor.at("anchored").as_bool());
@@ -115,6 +117,15 @@ TEST_F(AnchorTest, ADriveOfAnotherFrameGoesWhereItWasDriven) {
   EXPECT_LT(anchor.at("rms_m").to_number<double>(), 0.05);
   ExpectAt(daemon, "continued", shared_root / "other_lane", 0.05, 0.1);
   EXPECT_EQ(StateOf(daemon, "continued"), "live");
+  // Positions are the atlas's, not the drive's: they stay.
+  std::optional<KnownPosition> prior;
+  const auto read = Connect(daemon).ReadKeyframes({"vehicle", "continued"}, std::nullopt,
+                                                  [&](const SessionKeyframe& keyframe) {
+                                                    if (keyframe.prior) prior = keyframe.prior;
+                                                    return Status();
+                                                  });
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(prior, (KnownPosition{10'000'000, 20'000'000, 30'000'000, 500}));
 }
 
 TEST_F(AnchorTest, AnInterruptedOneGoesOnInTheFrameThatItBeganIn) {

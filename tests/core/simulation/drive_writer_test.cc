@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "core/scan/position_file.h"
+
 namespace atlas {
 namespace {
 
@@ -85,6 +87,29 @@ TEST_F(DriveWriterTest, APartIsNumberedFromZeroAndMayDrift) {
     EXPECT_NE(drifted, line);
   }
   EXPECT_FALSE(std::getline(truth, true_line));
+}
+
+// Of the true poses, numbered as the scans are.
+TEST_F(DriveWriterTest, PositionsAreOfTheTruth) {
+  DriveWriteOptions options;
+  options.begin = 1;
+  options.drift.emplace();
+  options.gnss.emplace().sigma_m = 0.001;
+  const SimulatedDrive drive = ShortDrive();
+  ASSERT_TRUE(WriteDrive(drive, folder_ / "part", {}, options).ok());
+  const auto folder = OpenDriveFolder(folder_ / "part");
+  ASSERT_TRUE(folder) << folder.error().message();
+  const auto places = ReadPositions(folder_ / "part/positions.txt", *folder);
+  ASSERT_TRUE(places) << places.error().message();
+  ASSERT_EQ(places->size(), 3U);
+  for (const auto& [number, place] : *places) {
+    EXPECT_LT((place.p_world - drive.sensor_pose(number + 1).translation()).norm(), 0.01);
+    EXPECT_EQ(place.radius_m, 0.001);
+  }
+  options.gnss->sigma_m = 0.0;
+  EXPECT_EQ(WriteDrive(drive, folder_ / "none", {}, options).code(), StatusCode::kInvalidArgument);
+  ASSERT_TRUE(WriteDrive(drive, folder_ / "without", {}).ok());
+  EXPECT_FALSE(fs::exists(folder_ / "without/positions.txt"));
 }
 
 TEST_F(DriveWriterTest, APartThatIsNoneIsRefused) {

@@ -23,7 +23,7 @@ double FrontendMsPerScan(const IngestReport& report) {
              : 1e3 * report.frontend_s / static_cast<double>(report.upload.totals.sent);
 }
 
-boost::json::object ReportJson(const IngestReport& report, double wall_s) {
+boost::json::object ReportJson(const IngestReport& report, bool has_positions, double wall_s) {
   boost::json::object json = {{"keyframes", report.keyframes},
                               {"empty_scans", report.empty_scans},
                               {"acked", report.upload.totals.acked},
@@ -38,18 +38,22 @@ boost::json::object ReportJson(const IngestReport& report, double wall_s) {
                               {"sessions", report.sessions},
                               {"impossible_steps", report.impossible_steps.size()},
                               {"wall_s", Rounded(wall_s, 3)}};
+  if (has_positions) json["positions"] = report.positions;
   if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
   if (!report.anchors.empty()) json["anchors"] = AnchorsJson(report.anchors);
   return json;
 }
 
-void PrintReport(const IngestReport& report, double wall_s, std::ostream& out) {
+void PrintReport(const IngestReport& report, bool has_positions, double wall_s, std::ostream& out) {
   FactList facts;
   facts.Add("keyframes", StrCat(report.keyframes, " along ", FixedText(report.metres, 1), " m, ",
                                 report.sessions, " session(s)"));
   if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
   for (const SessionAnchor& anchor : report.anchors) {
     facts.Add("anchor", AnchorText(anchor));
+  }
+  if (has_positions) {
+    facts.Add("positions", StrCat("of ", report.positions, " keyframes"));
   }
   facts.Add("acknowledged", StrCat(report.upload.totals.acked, ", of them ",
                                    report.upload.totals.duplicates, " were there already"));
@@ -97,6 +101,9 @@ class IngestCommand : public Command {
         "The drive has a frame of its own: find it in the map first; staged if it is not");
     arguments.Optional("--prior", "X,Y", prior_m_, "With --anchor: where it begins, in the atlas");
     arguments.Optional("--prior-radius", "M", prior_radius_m_, "How far off that is at most");
+    arguments.Optional("--positions", "FILE", positions_,
+                       "Where the sensor was at scans, by GNSS, in the atlas's frame: lines SCAN X "
+                       "Y Z RADIUS, metres");
     arguments.Optional("--start", "T", options_.start_s,
                        "Seconds added to the scans' times [0]: who drives later has the last word");
   }
@@ -106,6 +113,11 @@ class IngestCommand : public Command {
     const auto start = std::chrono::steady_clock::now();
     const Result<DriveFolder> drive = OpenDriveFolder(drive_.directory());
     if (!drive) return drive.error();
+    if (positions_) {
+      Result<KnownPlaces> positions = ReadPositions(*positions_, *drive);
+      if (!positions) return positions.error();
+      options_.positions = *std::move(positions);
+    }
     const Result<IngestReport> report = Ingest(*drive, context);
     if (!report) return report.error();
     if (report->keyframes == 0) {
@@ -116,6 +128,7 @@ class IngestCommand : public Command {
       context.err << "note: no return from beyond the vehicle in " << report->empty_scans << " of "
                   << report->keyframes << " scans\n";
     }
+    PrintPositionNotes(*report, context.err);
     if (!report->impossible_steps.empty()) {
       context.err << "note: " << report->impossible_steps.size() << " steps look impossible ("
                   << report->impossible_steps.front()
@@ -125,16 +138,28 @@ class IngestCommand : public Command {
     PrintSessionNotes(report->upload, context.err);
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     if (context.is_json) {
-      boost::json::object json = ReportJson(*report, wall.count());
+      boost::json::object json = ReportJson(*report, positions_.has_value(), wall.count());
       json["session_states"] = SessionStatesJson(report->upload);
       context.PrintJson(json);
     } else {
-      PrintReport(*report, wall.count(), context.out);
+      PrintReport(*report, positions_.has_value(), wall.count(), context.out);
     }
     return CheckAnchored(report->anchors);
   }
 
  private:
+  void PrintPositionNotes(const IngestReport& report, std::ostream& err) const {
+    if (!positions_) return;
+    if (report.positions == 0 && report.keyframes > 0) {
+      err << "note: none of the " << report.keyframes << " keyframes has a position in "
+          << *positions_ << '\n';
+    }
+    if (report.upload.totals.duplicates + report.upload.sent_before > 0) {
+      err << "note: keyframes that were there already keep the positions that they came with, if "
+             "any\n";
+    }
+  }
+
   Status CompleteOptions() {
     const Result<ScanParity> parity = drive_.parity();
     if (!parity) return parity.error();
@@ -192,6 +217,7 @@ class IngestCommand : public Command {
   bool is_anchored_ = false;
   std::optional<Eigen::Vector2d> prior_m_;
   std::optional<double> prior_radius_m_;
+  std::optional<std::string> positions_;
   NumberRange range_;
   std::uint32_t batch_ = 64;
   IngestOptions options_ = DefaultOptions();

@@ -1,6 +1,7 @@
 // `atlas simulate`: a drive through a world that is built in or a mesh, as a folder of scans.
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "client/cli/command_line/interruption.h"
@@ -37,6 +38,10 @@ class SimulateCommand : public Command {
     arguments.Optional("--drift", "K", drift_seed_,
                        "Poses as an odometry has them: 1 % and 0.5 deg a 100 m off, by seed K; the "
                        "true ones are in truth.txt [0: true poses]");
+    arguments.Optional(
+        "--gnss", "SIGMA_M[,SEED[,SHARE]]", gnss_,
+        "Write positions.txt, too: where the sensor truly was, with noise of so "
+        "much along each axis [SEED 1]; SHARE of its variance stays for half a minute [0.5]");
     arguments.Required("-o,--output", "DIR", directory_, "Folder to write; new or empty");
   }
 
@@ -47,6 +52,11 @@ class SimulateCommand : public Command {
     options.begin = range_.begin;
     options.end = range_.end;
     if (drift_seed_ != 0) options.drift.emplace().seed = drift_seed_;
+    if (gnss_) {
+      options.gnss.emplace().sigma_m = gnss_->sigma_m;
+      options.gnss->seed = gnss_->seed;
+      options.gnss->wandering = gnss_->wandering;
+    }
     ATLAS_RETURN_IF_ERROR(options.Validate(*drive));
     const std::size_t scans = std::min(drive->scans(), options.end) - options.begin;
     {
@@ -73,6 +83,7 @@ class SimulateCommand : public Command {
   std::string directory_;
   NumberRange range_;
   std::uint64_t drift_seed_ = 0;
+  std::optional<SeededNoise> gnss_;
 };
 
 }  // namespace

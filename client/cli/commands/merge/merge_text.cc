@@ -32,6 +32,24 @@ std::string FateOf(const MergeSession& session, const SessionOutcome& outcome) {
   return outcome.moved.empty() ? "stays" : "moved";
 }
 
+std::string PriorText(const SessionOutcome& outcome) {
+  const PriorUse& priors = outcome.priors;
+  const std::string count = StrCat(priors.count, " positions");
+  if (!priors.is_used) return StrCat(count, " were not used: ", priors.why_not);
+  return StrCat(count, ", off by ", FixedText(outcome.prior_off_m, 3), " m (median)",
+                outcome.is_held ? "; it stays" : "");
+}
+
+boost::json::object PriorJson(const SessionOutcome& outcome) {
+  boost::json::object json{{"count", outcome.priors.count}, {"used", outcome.priors.is_used}};
+  if (outcome.priors.is_used) {
+    json["median_off_m"] = Rounded(outcome.prior_off_m, 4);
+  } else {
+    json["why_not"] = outcome.priors.why_not;
+  }
+  return json;
+}
+
 boost::json::array SessionsJson(const MergeRun& run) {
   boost::json::array sessions;
   for (std::size_t i = 0; i < run.sessions.size(); ++i) {
@@ -49,6 +67,7 @@ boost::json::array SessionsJson(const MergeRun& run) {
                                 {"submaps_met", outcome.submaps_met},
                                 {"closures", outcome.closures}};
     if (!outcome.is_joined) session["why_not"] = outcome.why_not;
+    if (outcome.priors.count > 0) session["positions"] = PriorJson(outcome);
     sessions.push_back(std::move(session));
   }
   return sessions;
@@ -100,6 +119,10 @@ void PrintMerge(const MergeRun& run, std::ostream& out) {
   for (std::size_t i = 0; i < run.sessions.size(); ++i) {
     if (run.plan.sessions[i].is_joined) continue;
     out << run.sessions[i].key << ": " << run.plan.sessions[i].why_not << '\n';
+  }
+  for (std::size_t i = 0; i < run.sessions.size(); ++i) {
+    if (run.plan.sessions[i].priors.count == 0) continue;
+    out << run.sessions[i].key << ": " << PriorText(run.plan.sessions[i]) << '\n';
   }
   for (const LeftOut& left_out : run.left_out) {
     out << left_out.key << ": left out, " << left_out.why << '\n';

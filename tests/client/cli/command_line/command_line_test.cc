@@ -266,6 +266,16 @@ TEST(CommandLineTest, AnAtlasFileAndADaemonExcludeEachOther) {
   EXPECT_EQ(before.code, ExitCode::kUsage);
 }
 
+TEST(CommandLineTest, NoiseMayHaveASeed) {
+  SeededNoise noise;
+  ASSERT_TRUE(ParseValue("0.5", noise).ok());
+  EXPECT_EQ(noise, (SeededNoise{0.5, 1}));
+  ASSERT_TRUE(ParseValue("2,18446744073709551615", noise).ok());
+  EXPECT_EQ(noise, (SeededNoise{2.0, UINT64_MAX}));
+  ASSERT_TRUE(ParseValue("2,3,0", noise).ok());
+  EXPECT_EQ(noise, (SeededNoise{2.0, 3, 0.0}));
+}
+
 TEST(CommandLineTest, CommandsOfTwoWords) {
   EXPECT_EQ(RunWith({"poses", "apply", "1", "-2"}).recorded.runs, 1);
 }

@@ -218,6 +218,27 @@ TEST(PoseGraphTest, APriorCountsAsItsAxesAreKnown) {
   EXPECT_NEAR(result->T_world_submap[1].translation().z(), 0.0, 1e-3);
 }
 
+// Four of one error know as much as one of them, and where they are too far off by their sigmas.
+TEST(PoseGraphTest, PriorsOfOneErrorShareIt) {
+  for (const double off_m : {0.2, 2.0}) {
+    double alone_m = 0.0;
+    for (const std::size_t count : {1U, 4U}) {
+      PoseGraph graph = Nodes({At(0.0), At(1.0)}, 0);
+      graph.edges.push_back({0, 1, At(1.0), Sigmas(0.1, 0.001), false});
+      for (std::size_t i = 0; i < count; ++i) {
+        graph.priors.push_back({1, Eigen::Vector3d::Zero(), Eigen::Vector3d(1.0, off_m, 0.0),
+                                Eigen::Vector3d::Constant(0.1), 1.0 / static_cast<double>(count)});
+      }
+      const auto result = Optimize(graph, {});
+      ASSERT_TRUE(result.has_value());
+      const double moved_m = result->T_world_submap[1].translation().y();
+      if (count == 1) alone_m = moved_m;
+      EXPECT_NEAR(moved_m, alone_m, 1e-6);
+    }
+    EXPECT_EQ(alone_m > 0.05, off_m < 1.0) << alone_m;
+  }
+}
+
 TEST(PoseGraphTest, APriorFarFromTheOthersDoesNotPull) {
   PoseGraph graph = Nodes({At(0.0), At(10.0), At(20.0), At(30.0)}, kNone);
   for (const std::size_t i : {0U, 1U, 2U}) {
@@ -352,6 +373,15 @@ TEST_F(PoseGraphRefusalTest, APriorThatKnowsItsPlaceExactlyOrNotAtAll) {
       graph_.priors = {prior};
       ExpectRefused();
     }
+  }
+}
+
+TEST_F(PoseGraphRefusalTest, APriorThatIsNoPartOfOne) {
+  for (const double share : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    GraphPrior prior{1};
+    prior.share = share;
+    graph_.priors = {prior};
+    ExpectRefused();
   }
 }
 

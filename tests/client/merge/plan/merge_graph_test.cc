@@ -20,7 +20,8 @@ class MergeGraphTest : public ::testing::Test {
   MergeGraphTest()
       : sessions_{BlindSession("one", Straight(At(0.0), 30)),
                   BlindSession("two", Straight(At(0.0, 4.0), 50))},
-        is_held_(2, false) {
+        is_held_(2, false),
+        uses_priors_(2, true) {
     const MapProfile profile;
     MatchWorker worker(sessions_, {profile, options_, testing::SharedWork()});
     for (const std::size_t i : {0U, 1U}) {
@@ -40,7 +41,8 @@ class MergeGraphTest : public ::testing::Test {
   }
 
   MergedPoses Solve() const {
-    return OptimizeMerge({sessions_, links_, closures_, is_held_}, StoredPoses(sessions_), options_)
+    return OptimizeMerge({sessions_, links_, closures_, is_held_, uses_priors_},
+                         StoredPoses(sessions_), options_)
         .value();
   }
 
@@ -52,6 +54,7 @@ class MergeGraphTest : public ::testing::Test {
   std::vector<std::vector<SessionLink>> links_;
   std::vector<FoundClosure> closures_;
   std::vector<bool> is_held_;
+  std::vector<bool> uses_priors_;
   MergeOptions options_;
 };
 
@@ -138,7 +141,7 @@ TEST_F(MergeGraphTest, PriorsMoveASessionAsOne) {
 }
 
 // Ten keyframes of a submap that err together know no more than one of them: as much as the match.
-TEST_F(MergeGraphTest, APriorOfASubmapIsAsGoodAsItsKeyframesAre) {
+TEST_F(MergeGraphTest, PriorsOfOneMomentAreAsGoodAsOneOfThem) {
   sessions_[1] = BlindSession("two", Straight(At(0.0), 10));
   links_[1].clear();
   is_held_[0] = true;
@@ -152,6 +155,46 @@ TEST_F(MergeGraphTest, APriorOfASubmapIsAsGoodAsItsKeyframesAre) {
   EXPECT_NEAR(LeftOf(Solve(), 1, 0), 0.05, 0.005);
 }
 
+// What errs for half a minute is known once in half a minute.
+TEST_F(MergeGraphTest, PriorsCountByTheTimeThatTheyTook) {
+  for (const std::int64_t apart_ms : {250, 60'000}) {
+    sessions_[1] = BlindSession("two", Straight(At(0.0), 10));
+    links_[1].clear();
+    is_held_[0] = true;
+    closures_ = {testing::FoundAsStored(sessions_, {0, 0}, {1, 0})};
+    std::int64_t time_ms = 0;
+    for (MergeKeyframe& keyframe : sessions_[1].keyframes) {
+      keyframe.time_ms = time_ms += apart_ms;
+      keyframe.prior = KeyframePrior{
+          keyframe.T_world_sensor.ToPose().translation() + Eigen::Vector3d(0.0, 0.11, 0.0),
+          options_.match_sigma_m};
+    }
+    options_.graph.robust_sigmas = 1e6;
+    EXPECT_NEAR(LeftOf(Solve(), 1, 0), apart_ms < 1'000 ? 0.055 : 0.1, 0.005);
+  }
+}
+
+// Each of them by itself, not the mean of a submap's.
+TEST_F(MergeGraphTest, APriorFarOffPullsNobody) {
+  for (std::size_t i = 0; i < sessions_[1].keyframes.size(); ++i) {
+    MergeKeyframe& keyframe = sessions_[1].keyframes[i];
+    const Eigen::Vector3d off(0.0, i % 10 == 4 ? 20.0 : -1.0, 0.0);  // in every submap one
+    keyframe.prior = KeyframePrior{keyframe.T_world_sensor.ToPose().translation() + off, 0.3};
+  }
+  const MergedPoses merged = Solve();
+  for (std::size_t i = 0; i < sessions_[1].submaps.size(); ++i) {
+    EXPECT_NEAR(LeftOf(merged, 1, i), 3.0, 0.03) << i;
+  }
+}
+
+TEST_F(MergeGraphTest, PriorsThatAreNotUsedSayNothing) {
+  for (MergeKeyframe& keyframe : sessions_[1].keyframes) {
+    keyframe.prior = KeyframePrior{Eigen::Vector3d(0.0, 70.0, 0.0), 0.1};
+  }
+  uses_priors_[1] = false;
+  EXPECT_NEAR(LeftOf(Solve(), 1, 0), 4.0, 1e-9);
+}
+
 TEST_F(MergeGraphTest, PriorsOfAHeldSessionSayNothing) {
   for (MergeKeyframe& keyframe : sessions_[1].keyframes) {
     keyframe.prior = KeyframePrior{Eigen::Vector3d(0.0, 70.0, 0.0), 0.0};  // no sigma at all
@@ -162,8 +205,8 @@ TEST_F(MergeGraphTest, PriorsOfAHeldSessionSayNothing) {
 
 TEST_F(MergeGraphTest, APriorWithoutARadiusIsRefused) {
   sessions_[1].keyframes[0].prior = KeyframePrior{Eigen::Vector3d::Zero(), 0.0};
-  const auto merged =
-      OptimizeMerge({sessions_, links_, closures_, is_held_}, StoredPoses(sessions_), options_);
+  const auto merged = OptimizeMerge({sessions_, links_, closures_, is_held_, uses_priors_},
+                                    StoredPoses(sessions_), options_);
   ASSERT_FALSE(merged.has_value());
   EXPECT_EQ(merged.error().code(), StatusCode::kInvalidArgument);
 }

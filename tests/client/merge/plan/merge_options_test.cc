@@ -43,6 +43,8 @@ TEST(MergeOptionsTest, CountsAreAtLeastOne) {
   ExpectRefused(
       "cut.max_keyframes", [](MergeOptions& o, double) { o.cut.max_keyframes = 0; }, 0.0);
   ExpectRefused(
+      "priors.min_priors", [](MergeOptions& o, double) { o.priors.min_priors = 0; }, 0.0);
+  ExpectRefused(
       "graph.threads", [](MergeOptions& o, double) { o.graph.threads = 0; }, 0.0);
   ExpectRefused(
       "refinements", [](MergeOptions& o, double) { o.refinements = -1; }, 0.0);
@@ -103,6 +105,18 @@ TEST(MergeOptionsTest, NumbersAreNumbers) {
       {"contradicted_m",
        [](MergeOptions& o, double v) {
          o.contradicted_m = v;
+       }},
+      {"odometry_share",
+       [](MergeOptions& o, double v) {
+         o.odometry_share = v;
+       }},
+      {"priors.together_s",
+       [](MergeOptions& o, double v) {
+         o.priors.together_s = v;
+       }},
+      {"priors.max_frame_shift_m",
+       [](MergeOptions& o, double v) {
+         o.priors.max_frame_shift_m = v;
        }},
       {"known_shape.rad",
        [](MergeOptions& o, double v) {

@@ -123,7 +123,15 @@ TEST(SessionLinksTest, OnAStreetMatchesAreBetterThanOdometry) {
                   .ok());
   std::array<double, 2> squares_m2{};  // of odometry, of matches
   std::array<std::size_t, 2> links{};
-  for (const SessionLink& link : Links(sessions)) {
+  const std::vector<SessionLink> found = Links(sessions);
+  for (std::size_t i = 1; i < found.size(); ++i) {
+    if (!found[i].is_matched) continue;
+    ASSERT_FALSE(found[i - 1].is_matched);
+    const double way_m = found[i - 1].T_from_to.translation().norm();
+    EXPECT_NEAR(found[i - 1].information(1, 1), 0.1 * std::pow(0.01 + 0.01 * way_m, -2), 1e-3)
+        << "beside a match that is believed";
+  }
+  for (const SessionLink& link : found) {
     const Pose should =
         street.TruthOf(sessions[0], link.from).inverse() * street.TruthOf(sessions[0], link.to);
     const double off_m = DistanceBetween(link.T_from_to, should);
