@@ -184,7 +184,7 @@ def draw_curbs(rows, path):
 
 PARTS = ("tracking",)  # of localization: by name alone
 # With the client in Python, whose messages the build makes, or with numpy.
-LATE = ("soak", "restart", "purge", "merge")
+LATE = ("soak", "restart", "purge", "merge", "merge_priors")
 
 
 def bench_late(name, bin_dir):
