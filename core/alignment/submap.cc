@@ -67,9 +67,12 @@ Result<Submap> Submap::Fuse(std::span<const SubmapMember> members,
                                             static_cast<double>(keyframe.placement.y_um));
     submap.radius_m_ = std::max(submap.radius_m_, away_m + grid.radius_cells * grid.cell_size_m());
   }
+  MapProfile rules = profile;
+  rules.sigma_interpolated_mm = options.interpolated_mm;
+  rules.sigma_extrapolated_mm = std::max(options.interpolated_mm, profile.sigma_extrapolated_mm);
   Tiles tiles;
   for (const TileId& id : ids) {
-    Tile tile = FuseTile(id, *placed, profile);
+    Tile tile = FuseTile(id, *placed, rules);
     if (tile.is_empty()) continue;
     submap.blobs_.push_back(EncodeTile(tile, profile).blob);
     tiles.push_back(std::make_shared<const Tile>(std::move(tile)));

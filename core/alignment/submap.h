@@ -25,8 +25,12 @@ namespace atlas {
 
 struct SubmapOptions {
   std::uint8_t occupied_nibble = 10;  // p >= 0.61
-  double place_spacing_m = 2.0;       // between the places that are described
-  double block_m = 0.4;               // of the blocks that they are described by
+  // A ground that was interpolated is known so much less well, one standard deviation, than one
+  // that was measured. Interpolated across a kerb it rises where the road is level, and from each
+  // place elsewhere: in an atlas all places are together, of two submaps each has its own.
+  std::uint16_t interpolated_mm = 5'000;
+  double place_spacing_m = 2.0;  // between the places that are described
+  double block_m = 0.4;          // of the blocks that they are described by
   FeatureOptions features;
 };
 

@@ -1,6 +1,7 @@
 #include "core/alignment/submap_match.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <numbers>
@@ -21,6 +22,17 @@ std::vector<Eigen::Vector3f> Chosen(const std::vector<Eigen::Vector3f>& points,
   std::vector<Eigen::Vector3f> chosen;
   std::copy_if(points.begin(), points.end(), std::back_inserter(chosen), is_wanted);
   return chosen;
+}
+
+template <std::size_t kCount>
+std::array<Eigen::Vector2f, kCount> Directions() {
+  std::array<Eigen::Vector2f, kCount> directions;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    const float angle =
+        2.0F * std::numbers::pi_v<float> * static_cast<float>(k) / static_cast<float>(kCount);
+    directions[k] = {std::cos(angle), std::sin(angle)};
+  }
+  return directions;
 }
 
 // `seen` in `map`, as far as it could be seen by who made the map.
@@ -76,6 +88,12 @@ Result<SubmapWindow> SubmapWindow::Make(const Submap& submap,
     return !window.IsFlat(p, options);
   };
   window.upright_ = {Chosen(all.columns, is_upright), all.ground, Chosen(all.returns, is_upright)};
+  for (const Eigen::Vector3f& p : window.upright_.columns) {
+    window.columns_facing_.push_back(window.FacingOf(p, options));
+  }
+  for (const Eigen::Vector3f& p : window.upright_.returns) {
+    window.returns_facing_.push_back(window.FacingOf(p, options));
+  }
   return window;
 }
 
@@ -90,33 +108,51 @@ ScanFeatures SubmapWindow::SeenFrom(const std::vector<Eigen::Vector3d>& places,
   for (const Eigen::Vector3d& place : places) {
     viewers.emplace_back(place.head<2>().cast<float>());
   }
-  const auto is_seen = [&](const Eigen::Vector3f& p) {
-    return !IsTurnedAway(p, viewers, options);
+  const auto seen = [&](const std::vector<Eigen::Vector3f>& points,
+                        const std::vector<Eigen::Vector2f>& facing) {
+    std::vector<Eigen::Vector3f> chosen;
+    chosen.reserve(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const bool is_turned_away =
+          facing[i] != Eigen::Vector2f::Zero() &&
+          std::all_of(viewers.begin(), viewers.end(), [&](const Eigen::Vector2f& viewer) {
+            const Eigen::Vector2f towards = viewer - points[i].head<2>();
+            return facing[i].dot(towards) < options.min_facing * towards.norm();
+          });
+      if (!is_turned_away) chosen.push_back(points[i]);
+    }
+    return chosen;
   };
-  return {Chosen(upright_.columns, is_seen), upright_.ground, Chosen(upright_.returns, is_seen)};
+  return {seen(upright_.columns, columns_facing_), upright_.ground,
+          seen(upright_.returns, returns_facing_)};
 }
 
 bool SubmapWindow::IsFlat(const Eigen::Vector3f& p, const MatchOptions& options) const {
-  constexpr int kAround = 8;
+  static const std::array<Eigen::Vector2f, 8> kDirections = Directions<8>();
   const Eigen::Vector3f middle = p - window_.origin().cast<float>();
   int occupied = 0;
-  for (int k = 0; k < kAround; ++k) {
-    const float angle = 2.0F * std::numbers::pi_v<float> * static_cast<float>(k) / kAround;
-    const Eigen::Vector3f direction(std::cos(angle), std::sin(angle), 0.0F);
-    occupied += window_.IsOccupied(middle + options.flat_reach_m * direction) ? 1 : 0;
+  for (const Eigen::Vector2f& direction : kDirections) {
+    Eigen::Vector3f at = middle;
+    at.head<2>() += options.flat_reach_m * direction;
+    occupied += window_.IsOccupied(at) ? 1 : 0;
   }
   return occupied >= options.flat_directions;
 }
 
-bool SubmapWindow::IsTurnedAway(const Eigen::Vector3f& p,
-                                const std::vector<Eigen::Vector2f>& viewers,
-                                const MatchOptions& options) const {
+Eigen::Vector2f SubmapWindow::FacingOf(const Eigen::Vector3f& p,
+                                       const MatchOptions& options) const {
+  constexpr std::size_t kAround = 16;
+  constexpr float kClear = 1.0F;  // less tells no side
+  static const std::array<Eigen::Vector2f, kAround> kDirections = Directions<kAround>();
   const Eigen::Vector3f middle = p - window_.origin().cast<float>();
-  return std::all_of(viewers.begin(), viewers.end(), [&](const Eigen::Vector2f& viewer) {
-    Eigen::Vector3f towards = Eigen::Vector3f::Zero();
-    towards.head<2>() = options.before_m * (viewer - p.head<2>()).normalized();
-    return !window_.IsFree(middle + towards) && window_.IsFree(middle - towards);
-  });
+  Eigen::Vector2f facing = Eigen::Vector2f::Zero();
+  for (const Eigen::Vector2f& direction : kDirections) {
+    Eigen::Vector3f at = middle;
+    at.head<2>() += options.facing_reach_m * direction;
+    if (window_.IsFree(at)) facing += direction;
+  }
+  const float length = facing.norm();
+  return length < kClear ? Eigen::Vector2f::Zero() : Eigen::Vector2f(facing / length);
 }
 
 SubmapMatch MatchSubmaps(const SubmapWindow& a,

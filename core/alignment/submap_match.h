@@ -19,7 +19,7 @@
 namespace atlas {
 
 // Raised when submaps or matches come out otherwise than before: what was kept is forgotten then.
-inline constexpr std::uint64_t kAlignmentRules = 1;
+inline constexpr std::uint64_t kAlignmentRules = 2;
 
 struct MatchOptions {
   PlaceOptions window;
@@ -28,10 +28,12 @@ struct MatchOptions {
   float coarse_block_m = 0.4F;
 
   // A feature is not looked for in the other's map
-  // - if what it shows is turned away from all places where the other vehicle was: so far before it
-  //   nothing is free, and behind it something is. Who was there saw the other side, which lies as
-  //   far off as the object is thick;
-  float before_m = 0.25F;
+  // - if what it shows is turned away from all places where the other vehicle was, or nearly: it
+  //   looks to where, so far around it, something is free, and by less than this cosine to any of
+  //   them. Who was there saw the other side, which lies as far off as the object is thick, and
+  //   would be pulled onto this one;
+  float facing_reach_m = 0.25F;
+  float min_facing = 0.3F;
   // - if it is of something flat, around which, so far off, as much stands in so many of eight
   //   directions: of a ceiling each vehicle sees what is around itself, and these are not the same.
   float flat_reach_m = 0.4F;
@@ -71,12 +73,14 @@ class SubmapWindow {
 
   // Points in the submap's frame.
   bool IsFlat(const Eigen::Vector3f& p, const MatchOptions& options) const;
-  bool IsTurnedAway(const Eigen::Vector3f& p,
-                    const std::vector<Eigen::Vector2f>& viewers,
-                    const MatchOptions& options) const;
+  // Where something around it is free, as far as that is one side; else 0.
+  Eigen::Vector2f FacingOf(const Eigen::Vector3f& p, const MatchOptions& options) const;
 
   const Submap* submap_;
   ScanFeatures upright_;  // those that are not flat, and the ground
+  // As many as those, of unit length or 0.
+  std::vector<Eigen::Vector2f> columns_facing_;
+  std::vector<Eigen::Vector2f> returns_facing_;
   MapWindow window_;
   float coarse_block_m_;
   std::optional<CoarseOccupancy> coarse_;

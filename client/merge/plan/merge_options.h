@@ -76,7 +76,8 @@ struct MergeOptions {
   double contradicted_rad = 3.0 * std::numbers::pi / 180.0;
 
   // From the poses that were found all pairs are looked at that lie this near by them.
-  double guided_m = 8.0;
+  // Further than a street is wide: also those that cross each other with a junction between them.
+  double guided_m = 12.0;
   double guided_height_m = 1.0;
   std::size_t guided_neighbours = 2;  // in each session,
   std::size_t guided_most = 12;       // and of all earlier ones together, one of each first

@@ -56,12 +56,12 @@ class Reading {
  public:
   Reading(SessionSource& source, KeyframeSpool& spool) : source_(source), spool_(spool) {}
 
-  // Calls on_keyframe after each. Nothing is added where no keyframe is whole.
+  // Calls on_keyframe before each. Nothing is added where no keyframe is whole.
   Status Add(const SessionSummary& summary, const std::function<Status()>& on_keyframe) {
     MergeSession session;
     session.key = summary.key;
     session.is_staged = !summary.IsInMap();
-    auto numbers = std::make_shared<std::vector<std::size_t>>();
+    std::vector<Spooled> spooled;
     const auto reading =
         source_.ReadKeyframes(summary.key, [&](SessionKeyframe keyframe) -> Status {
           ATLAS_RETURN_IF_ERROR(on_keyframe());
@@ -72,18 +72,24 @@ class Reading {
           }
           const auto number = spool_.Add(keyframe.blob);
           if (!number) return number.error();
-          numbers->push_back(*number);
-          session.keyframes.push_back({keyframe.sequence, keyframe.time_ms, keyframe.T_world_sensor,
-                                       PriorOf(keyframe), Hash64(keyframe.blob)});
+          spooled.push_back({{keyframe.sequence, keyframe.time_ms, keyframe.T_world_sensor,
+                              PriorOf(keyframe), Hash64(keyframe.blob)},
+                             *number});
           return {};
         });
     if (!reading) return reading.error();
-    // All of it holds since the first of them.
-    read_.revision =
-        read_.revision == 0 ? reading->revision : std::min(read_.revision, reading->revision);
-    if (session.keyframes.empty()) {
+    NoteRevision(reading->revision);
+    if (spooled.empty()) {
       read_.left_out.push_back({summary.key, "no keyframe that is whole"});
       return {};
+    }
+    std::sort(spooled.begin(), spooled.end(), [](const Spooled& a, const Spooled& b) {
+      return a.keyframe.sequence < b.keyframe.sequence;
+    });
+    auto numbers = std::make_shared<std::vector<std::size_t>>();
+    for (const Spooled& one : spooled) {
+      session.keyframes.push_back(one.keyframe);
+      numbers->push_back(one.number);
     }
     read_.sessions.push_back(std::move(session));
     read_.readers.emplace_back(
@@ -98,6 +104,17 @@ class Reading {
   ReadSessions Take() { return std::move(read_); }
 
  private:
+  struct Spooled {
+    MergeKeyframe keyframe;
+    std::size_t number;
+  };
+
+  // All of it holds since the first of them; what has none is of another atlas.
+  void NoteRevision(std::uint64_t revision) {
+    if (revision == 0) return;
+    read_.revision = read_.revision == 0 ? revision : std::min(read_.revision, revision);
+  }
+
   SessionSource& source_;
   KeyframeSpool& spool_;
   ReadSessions read_;

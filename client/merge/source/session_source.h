@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/atlas_file/atlas_file.h"
@@ -22,7 +24,7 @@ class SessionSource {
   virtual std::string name() const = 0;  // for people
   virtual const MapProfile& profile() const = 0;
   virtual Result<std::vector<SessionSummary>> ListSessions() = 0;
-  // By rising sequence number, damaged ones too.
+  // In any order, damaged ones too.
   virtual Result<SessionReading> ReadKeyframes(
       const SessionKey& session, const std::function<Status(SessionKeyframe)>& on_keyframe) = 0;
 };
@@ -30,9 +32,10 @@ class SessionSource {
 // The client outlives it.
 class DaemonSessions : public SessionSource {
  public:
-  explicit DaemonSessions(AtlasClient& client) : client_(client) {}
+  explicit DaemonSessions(AtlasClient& client, std::string name = "the daemon")
+      : client_(client), name_(std::move(name)) {}
 
-  std::string name() const override { return "the daemon"; }
+  std::string name() const override { return name_; }
   const MapProfile& profile() const override { return client_.profile(); }
   Result<std::vector<SessionSummary>> ListSessions() override { return client_.ListSessions(); }
   Result<SessionReading> ReadKeyframes(
@@ -43,6 +46,17 @@ class DaemonSessions : public SessionSource {
 
  private:
   AtlasClient& client_;
+  std::string name_;
+};
+
+// With a connection of its own.
+class ConnectedSessions : public DaemonSessions {
+ public:
+  ConnectedSessions(std::unique_ptr<AtlasClient> client, std::string name)
+      : DaemonSessions(*client, std::move(name)), client_(std::move(client)) {}
+
+ private:
+  std::unique_ptr<AtlasClient> client_;
 };
 
 class FileSessions : public SessionSource {

@@ -54,34 +54,38 @@ class Transfer {
   TransferReport report_;
 };
 
-// Empty: it is brought.
-std::string WhyNot(const SessionSummary& session) {
+}  // namespace
+
+std::string WhyNotBrought(const SessionSummary& session) {
   if (session.is_damaged) return StrCat("damaged: ", session.reason);
   return session.IsInMap() || session.state == "staged" ? "" : session.state;
 }
 
-}  // namespace
+Status CheckTransfer(const SessionSource& from, const MapProfile& to) {
+  if (from.profile() == to) return {};
+  return {StatusCode::kInvalidArgument,
+          StrCat(from.name(),
+                 " has another map profile than the atlas that it is brought to: its keyframes "
+                 "cannot be fused there")};
+}
 
 Result<TransferReport> TransferSessions(
     SessionSource& from,
     AtlasClient& to,
     const std::function<Status(std::size_t done, std::size_t all)>& progress) {
-  if (!(from.profile() == to.profile())) {
-    return Error(StatusCode::kInvalidArgument,
-                 StrCat(from.name(),
-                        " has another map profile than the daemon: its keyframes "
-                        "cannot be fused there"));
+  if (Status status = CheckTransfer(from, to.profile()); !status.ok()) {
+    return Error(std::move(status));
   }
   const auto sessions = from.ListSessions();
   if (!sessions) return Error(sessions.error());
   std::size_t all = 0;
   for (const SessionSummary& session : *sessions) {
-    all += WhyNot(session).empty() ? session.keyframes : 0;
+    all += WhyNotBrought(session).empty() ? session.keyframes : 0;
   }
   std::size_t done = 0;
   Transfer transfer(from, to);
   for (const SessionSummary& session : *sessions) {
-    if (std::string why = WhyNot(session); !why.empty()) {
+    if (std::string why = WhyNotBrought(session); !why.empty()) {
       transfer.LeaveOut(session.key, std::move(why));
       continue;
     }

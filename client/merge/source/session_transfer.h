@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "client/connection/atlas_client.h"
@@ -12,6 +13,12 @@
 
 namespace atlas {
 
+// Empty: it is brought. It is not where it is quarantined, retracted or damaged.
+std::string WhyNotBrought(const SessionSummary& session);
+
+// kInvalidArgument: an atlas of that profile can take no keyframe of this source.
+Status CheckTransfer(const SessionSource& from, const MapProfile& to);
+
 struct TransferReport {
   std::size_t sessions = 0;
   std::size_t keyframes = 0;
@@ -19,12 +26,12 @@ struct TransferReport {
   std::vector<LeftOut> left_out;  // sessions and keyframes, and why
 };
 
-// Those in the map of `from` and those staged there; what is quarantined, retracted or damaged is
-// left out. Each keyframe with the pose that it has there, under the name that it has there; a
-// session that the daemon has already stays in the state that it is in. Ended at any point, what
-// came is staged, and the next time it is there already.
-// kInvalidArgument: the atlases have other map profiles. kConflict: the daemon has other keyframes
-// under these names. Else errors are those of both and of `progress`, which is told of keyframes.
+// Those in the map of `from` and those staged there, as WhyNotBrought says. Each keyframe with the
+// pose that it has there, under the name that it has there; a session that the daemon has already
+// stays in the state that it is in. Ended at any point, what came is staged, and the next time it
+// is there already. kInvalidArgument: the atlases have other map profiles. kConflict: the daemon
+// has other keyframes under these names. Else errors are those of both and of `progress`, which is
+// told of keyframes.
 Result<TransferReport> TransferSessions(
     SessionSource& from,
     AtlasClient& to,

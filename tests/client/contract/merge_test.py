@@ -202,12 +202,20 @@ def change(report, bin_dir, drives, work):
 def from_cases(merges, other, file):
     """Sessions of another atlas, by its file and by its daemon: brought once, and merged."""
     report = merges.report
-    merges.merge_refused("--from and --dry-run", ["run", "--from", file, "--dry-run"], "invalid_argument", "--from")
+    before = merges.state(), merges.states()
+    dry = [merges.merged(f"--from {place} and --dry-run", "--from", place, "--dry-run") for place in (file, other.server)]
+    report.equal("--from and --dry-run: by a file as by a daemon", dry[0], dry[1])
+    report.equal("--from and --dry-run: who would be published",
+                 {one["vehicle"]: (one["was_staged"], one["joined"]) for one in dry[0]["sessions"]},
+                 {"first": (True, True), "second": (True, True)})
+    report.equal("--from and --dry-run: the atlas", (merges.state(), merges.states()), before)
     merges.merge_refused("--from nothing", ["run", "--from", file.parent / "none"], "not_found", "none")
     merges.merge_refused("--from no daemon", ["run", "--from", "127.0.0.1:1"], "unavailable")
     done = merges.merge("run", "--from", file, "--json")
     report.equal(f"--from a file: exit code ({done.stderr})", done.returncode, 0)
     report.equal("--from a file: who is in the map", merges.states(), {"first": "live", "second": "live"})
+    closures = json.loads(done.stdout)["closures"]
+    report.equal("--from a file: as the dry run said", closures, dry[0]["closures"])
     report.check("--from a file: what came", "1 sessions" in done.stderr and "of which 0 were" in done.stderr,
                  done.stderr)
     before = merges.state()

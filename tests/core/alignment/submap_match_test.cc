@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
@@ -195,6 +196,33 @@ TEST_F(SubmapMatchTest, ASearchFindsItFromMetresOff) {
   const SubmapMatch match = first_->Match(*second_, starts.front());
   EXPECT_TRUE(first_->IsBelieved(match));
   EXPECT_LT((truth.inverse() * match.T_a_b).translation().norm(), 0.03);
+}
+
+// What each of two places alone has seen (the far side of a trunk, a road that rises to a kerb
+// which a ring hit) pulls all matches along a drive the same way: a map of them would be too short,
+// and bent.
+TEST(StreetMatchTest, ARowOfSubmapsIsNeitherShortenedNorBent) {
+  constexpr std::size_t kCount = 8;  // keyframes: 10 m
+  std::vector<PieceOfWorld> row;
+  for (std::size_t i = 0; i < 9; ++i) {
+    row.emplace_back(testing::DrivePiece{.first = 20 + kCount * i, .count = kCount}, 30 + i);
+  }
+  double along_m = 0.0;
+  double pitch_rad = 0.0;
+  for (std::size_t i = 0; i + 1 < row.size(); ++i) {
+    const Pose truth = row[i].To(row[i + 1]);
+    const SubmapMatch match = row[i].Match(row[i + 1], truth);
+    ASSERT_TRUE(row[i].IsBelieved(match)) << i;
+    const Eigen::Vector3d ahead = truth.translation().normalized();
+    const Eigen::Vector3d left = Eigen::Vector3d::UnitZ().cross(ahead).normalized();
+    along_m += (match.T_a_b.translation() - truth.translation()).dot(ahead);
+    const Eigen::AngleAxisd turn(
+        Eigen::Matrix3d(match.T_a_b.linear() * truth.linear().transpose()));
+    pitch_rad += turn.angle() * turn.axis().dot(left);
+  }
+  const double links = static_cast<double>(row.size() - 1);
+  EXPECT_LT(std::abs(along_m / links), 2e-3);
+  EXPECT_LT(std::abs(pitch_rad / links), 0.015 * kDegree);
 }
 
 // The next deck looks much the same, 3.2 m above.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -248,6 +249,37 @@ TEST_F(StreetSubmapTest, TwoTurnsOfOneFitToMillimetres) {
   const Pose off = T_a_b.inverse() * match.T_a_b;
   EXPECT_LT(off.translation().norm(), 0.005);
   EXPECT_LT(Eigen::AngleAxisd(off.linear()).angle(), 0.03 * kDegree);
+}
+
+// Right beside the one keyframe ground that was only drawn between two returns, 0.1 m too high; the
+// other one measured it from 8 m away.
+TEST_F(SubmapTest, GroundThatWasMeasuredCountsMoreThanWhatWasInterpolatedNearby) {
+  std::vector<SubmapMember> members;
+  for (const auto& [x_m, first_cell, altitude_mm, source] :
+       {std::tuple{0.0, 15, std::int16_t{-1'630}, AltitudeSource::kInterpolated},
+        std::tuple{10.0, -85, std::int16_t{-1'730}, AltitudeSource::kMeasured}}) {
+    Keyframe keyframe = testing::BlankKeyframe(profile_, 100);
+    for (std::int32_t x = first_cell; x < first_cell + 10; ++x) {
+      for (std::int32_t y = -5; y < 5; ++y) {
+        keyframe.cells[keyframe.grid.Index(x, y)] = {altitude_mm, Occupancy::kFree, source};
+      }
+    }
+    members.push_back({{{"car", "drive"}, static_cast<std::uint32_t>(members.size())},
+                       100,
+                       Upright({x_m, 0.0, 1.73}, 0.0),
+                       std::make_shared<const Keyframe>(std::move(keyframe))});
+  }
+  const Pose frame = SubmapFrame(members, 3);
+  const Submap submap = Fuse(members, 3);
+  const std::vector<Eigen::Vector3f>& ground = submap.features().ground;
+  int seen = 0;
+  for (const Eigen::Vector3f& p : ground) {
+    const Eigen::Vector3d p_world = frame * p.cast<double>();
+    if (std::abs(p_world.x() - 2.0) > 0.4) continue;
+    EXPECT_NEAR(p_world.z(), 0.0, 0.01) << p_world.transpose();
+    ++seen;
+  }
+  EXPECT_GT(seen, 0);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 // `atlas-merge run`: finds where sessions belong and hands the daemon one batch of corrections.
+#include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,13 +9,17 @@
 #include "client/cli/command_line/interruption.h"
 #include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/merge/merge_commands.h"
+#include "client/cli/commands/merge/merge_sources.h"
 #include "client/cli/commands/merge/merge_text.h"
 #include "client/cli/files/change_file.h"
 #include "client/cli/files/pose_file.h"
 #include "client/cli/files/whole_file.h"
 #include "client/cli/output/progress_bar.h"
+#include "client/cli/output/text_table.h"
 #include "client/merge/change_report.h"
 #include "client/merge/merge_run.h"
+#include "client/merge/output/new_atlas.h"
+#include "client/merge/source/joined_sessions.h"
 #include "client/merge/source/session_transfer.h"
 #include "core/base/str_cat.h"
 
@@ -62,8 +68,12 @@ class MergeRunCommand : public Command {
         "--from", "FILE", from_,
         "Bring the sessions of another atlas first, staged: its file, or HOST:PORT of "
         "its daemon; may be repeated");
+    arguments.Optional("--output", "FILE", output_,
+                       "Make a new atlas of it, and leave all others as they are: of a copy of "
+                       "--atlas, or of nothing but what is brought");
     arguments.Flag("--dry-run", is_dry_run_,
-                   "Print what would be done, and do nothing; so it is with --atlas, too");
+                   "Print what would be done, and do nothing; so it is with --atlas without "
+                   "--output, too");
     arguments.Optional("--picture", "FILE.png", picture_, "Draw the ways before and after");
     arguments.Optional("--corrections", "FILE", corrections_,
                        "Write the corrected poses as `atlas poses apply` reads them");
@@ -88,48 +98,99 @@ class MergeRunCommand : public Command {
       const auto format = ChangeFormatOf(*changes_);
       if (!format) return format.error();
     }
-    if (!from_.empty() && (is_dry_run_ || context.atlas_file)) {
-      return {StatusCode::kInvalidArgument,
-              "--from brings sessions to a daemon, which neither --dry-run nor --atlas does"};
-    }
-    if (context.atlas_file) {
-      Result<AtlasFile> file = AtlasFile::Open(*context.atlas_file);
-      if (!file) return file.error();
-      FileSessions source(*std::move(file), *context.atlas_file);
-      return Merge(source, nullptr, *author, context);
-    }
+    Progress progress(context);
+    if (output_) return MergeIntoFile(*author, progress, context);
+    if (is_dry_run_ || context.atlas_file) return LookOnly(*author, progress, context);
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
     for (const std::string& from : from_) {
-      ATLAS_RETURN_IF_ERROR(Bring(from, *client, context));
+      auto source = OpenSessions(from, context);
+      if (!source) return source.error();
+      ATLAS_RETURN_IF_ERROR(Bring(**source, *client, progress, context));
     }
     DaemonSessions source(*client);
-    return Merge(source, &*client, *author, context);
+    const auto merged = Merge(source, &*client, *author, progress, context);
+    if (!merged) return merged.error();
+    Print(*merged, {}, context);
+    return {};
   }
 
  private:
-  // Without --from a merge that is ended has changed nothing; with it, what came stays staged.
-  static Status Bring(const std::string& from, AtlasClient& client, CommandContext& context) {
-    if (std::filesystem::exists(from)) {
-      Result<AtlasFile> file = AtlasFile::Open(from);
-      if (!file) return file.error();
-      FileSessions source(*std::move(file), from);
-      return Bring(source, client, context);
-    }
-    Result<Endpoint> endpoint = Endpoint::Parse(from);
-    if (!endpoint) {
-      return {StatusCode::kNotFound,
-              StrCat("--from ", from, ": there is no such file, and it is no HOST:PORT")};
-    }
-    ConnectionOptions options = context.connection;
-    options.endpoint = *std::move(endpoint);
-    Result<AtlasClient> other = AtlasClient::Connect(options);
-    if (!other) return other.error();
-    DaemonSessions source(*other);
-    return Bring(source, client, context);
+  struct Merged {
+    MergeRun run;
+    std::optional<PoseBatchSummary> batch;  // none: nothing was applied
+    bool is_applied = false;                // as far as there was something
+  };
+
+  // Nobody is told of it: what would be brought is read from where it is.
+  Status LookOnly(const std::string& author, Progress& progress, CommandContext& context) const {
+    auto sources = OpenAll(context);
+    if (!sources) return sources.error();
+    auto joined = JoinedSessions::Make(*std::move(sources));
+    if (!joined) return joined.error();
+    const auto merged = Merge(*joined, nullptr, author, progress, context);
+    if (!merged) return merged.error();
+    Print(*merged, {}, context);
+    return {};
   }
-  static Status Bring(SessionSource& source, AtlasClient& client, CommandContext& context) {
-    Progress progress(context);
+
+  // The map that is merged into first: the file's, or the daemon's.
+  Result<std::vector<std::unique_ptr<SessionSource>>> OpenAll(CommandContext& context) const {
+    std::vector<std::unique_ptr<SessionSource>> sources;
+    if (context.atlas_file) {
+      auto file = OpenFileSessions(*context.atlas_file);
+      if (!file) return Error(file.error());
+      sources.push_back(*std::move(file));
+    } else if (!output_) {
+      Result<AtlasClient> client = context.Connect();
+      if (!client) return Error(client.error());
+      sources.push_back(std::make_unique<ConnectedSessions>(
+          std::make_unique<AtlasClient>(*std::move(client)), "the daemon"));
+    }
+    for (const std::string& from : from_) {
+      auto source = OpenSessions(from, context);
+      if (!source) return Error(source.error());
+      sources.push_back(*std::move(source));
+    }
+    return sources;
+  }
+
+  // Ended before it is whole, there is no new file.
+  Status MergeIntoFile(const std::string& author,
+                       Progress& progress,
+                       CommandContext& context) const {
+    if (is_dry_run_) {
+      return {StatusCode::kInvalidArgument, "--output makes an atlas, which --dry-run does not"};
+    }
+    auto sources = OpenAll(context);
+    if (!sources) return sources.error();
+    if (sources->empty()) {
+      return {StatusCode::kInvalidArgument,
+              "--output: there is nothing to merge; expected --atlas, --from or both"};
+    }
+    NewAtlasPlan plan{*output_, std::nullopt, sources->front()->profile()};
+    if (context.atlas_file) plan.base = *context.atlas_file;
+    auto made = NewAtlas::Begin(plan, std::ref(progress));
+    progress.Wipe();
+    if (!made) return made.error();
+    for (std::size_t i = context.atlas_file ? 1 : 0; i < sources->size(); ++i) {
+      ATLAS_RETURN_IF_ERROR(Bring(*(*sources)[i], made->client(), progress, context));
+    }
+    DaemonSessions source(made->client(), *output_);
+    const auto merged = Merge(source, &made->client(), author, progress, context);
+    if (!merged) return merged.error();
+    const auto file = made->Finish(author, std::ref(progress));
+    progress.Wipe();
+    if (!file) return file.error();
+    Print(*merged, *file, context);
+    return {};
+  }
+
+  // Without --from a merge that is ended has changed nothing; with it, what came stays staged.
+  static Status Bring(SessionSource& source,
+                      AtlasClient& client,
+                      Progress& progress,
+                      CommandContext& context) {
     const auto report = TransferSessions(source, client, [&](std::size_t done, std::size_t all) {
       return progress("bringing", done, all);
     });
@@ -146,34 +207,31 @@ class MergeRunCommand : public Command {
   }
 
   // `client` is null where there is nobody to hand it to.
-  Status Merge(SessionSource& source,
-               AtlasClient* client,
-               const std::string& author,
-               CommandContext& context) {
+  Result<Merged> Merge(SessionSource& source,
+                       AtlasClient* client,
+                       const std::string& author,
+                       Progress& progress,
+                       CommandContext& context) const {
     constexpr int kAttempts = 3;
     Result<MergeWork> work =
         work_ ? MergeWork::Open(*work_, kAlignmentRules, kMaxWorkBytes) : MergeWork::Temporary();
-    if (!work) return work.error();
-    const bool is_applied = client != nullptr && !is_dry_run_;
-    Progress progress(context);
+    if (!work) return Error(work.error());
     for (int attempt = 1;; ++attempt) {
-      const auto run = RunMerge(source, wanted_, options_, *work, std::ref(progress));
+      auto run = RunMerge(source, wanted_, options_, *work, std::ref(progress));
       progress.Wipe();
-      if (!run) return run.error();
-      ATLAS_RETURN_IF_ERROR(WriteFiles(*run));
-      ATLAS_RETURN_IF_ERROR(WriteChanges(*run, progress));
-      std::optional<PoseBatchSummary> batch;
-      if (is_applied && !run->IsNothing()) {
-        auto applied = ApplyMerge(*run, *client, author);
-        if (!applied && applied.error().code() == StatusCode::kConflict && attempt < kAttempts) {
-          context.err << "note: " << applied.error().message() << ": merged again\n";
-          continue;
-        }
-        if (!applied) return NotApplied(applied.error());
-        batch = *std::move(applied);
+      if (!run) return Error(run.error());
+      Status written = WriteFiles(*run);
+      if (written.ok()) written = WriteChanges(*run, progress);
+      if (!written.ok()) return Error(std::move(written));
+      if (client == nullptr || run->IsNothing()) {
+        return Merged{*std::move(run), std::nullopt, client != nullptr};
       }
-      Print(*run, batch, is_applied, context);
-      return {};
+      auto batch = ApplyMerge(*run, *client, author);
+      if (batch) return Merged{*std::move(run), *std::move(batch), true};
+      if (batch.error().code() != StatusCode::kConflict || attempt == kAttempts) {
+        return Error(NotApplied(batch.error()));
+      }
+      context.err << "note: " << batch.error().message() << ": merged again\n";
     }
   }
 
@@ -207,26 +265,39 @@ class MergeRunCommand : public Command {
     return WritePng(*report->picture, *changes_picture_);
   }
 
-  static void Print(const MergeRun& run,
-                    const std::optional<PoseBatchSummary>& batch,
-                    bool is_applied,
-                    const CommandContext& context) {
+  void Print(const Merged& merged,
+             const std::optional<BackupSummary>& file,
+             const CommandContext& context) const {
     if (context.is_json) {
-      context.PrintJson(MergeJson(run, batch));
+      boost::json::object json = MergeJson(merged.run, merged.batch);
+      if (file) {
+        json["output"] = {{"file", *output_},
+                          {"bytes", file->bytes},
+                          {"keyframes", file->keyframes},
+                          {"tiles", file->tiles},
+                          {"digest", HexText(file->sha256)}};
+      }
+      context.PrintJson(json);
       return;
     }
-    PrintMerge(run, context.out);
-    if (batch) {
-      context.out << "batch " << batch->batch << ": " << batch->updated << " poses corrected, "
-                  << batch->tiles_marked << " tiles marked; undone by: atlas poses undo "
-                  << batch->batch << '\n';
+    PrintMerge(merged.run, context.out);
+    if (merged.batch) {
+      const PoseBatchSummary& batch = *merged.batch;
+      context.out << "batch " << batch.batch << ": " << batch.updated << " poses corrected, "
+                  << batch.tiles_marked << " tiles marked; undone by: atlas poses undo "
+                  << batch.batch << '\n';
     } else {
-      context.out << (is_applied ? "nothing to do\n" : "nothing was changed\n");
+      context.out << (merged.is_applied ? "nothing to do\n" : "nothing was changed\n");
+    }
+    if (file) {
+      context.out << *output_ << ": " << file->keyframes << " keyframes, " << file->tiles
+                  << " tiles, " << BytesText(file->bytes) << '\n';
     }
   }
 
   std::vector<SessionKey> wanted_;
   std::vector<std::string> from_;
+  std::optional<std::string> output_;
   bool is_dry_run_ = false;
   std::optional<std::string> picture_;
   std::optional<std::string> corrections_;

@@ -34,13 +34,13 @@ class ListedSessions : public SessionSource {
       keyframe.sequence = 10 + i;
       keyframe.time_ms = 1'000 + i;
       keyframe.T_world_sensor.x_um = static_cast<std::int64_t>(1e6 * (x_m + i));
-      keyframe.blob = EncodeKeyframe(BlankKeyframe(profile_, 4));
+      keyframe.blob = EncodeKeyframe(BlankKeyframe(map_profile, 4));
     }
     return session;
   }
 
   std::string name() const override { return "a list"; }
-  const MapProfile& profile() const override { return profile_; }
+  const MapProfile& profile() const override { return map_profile; }
   Result<std::vector<SessionSummary>> ListSessions() override {
     std::vector<SessionSummary> summaries;
     for (const Session& session : sessions) summaries.push_back(session.summary);
@@ -59,9 +59,7 @@ class ListedSessions : public SessionSource {
   }
 
   std::vector<Session> sessions;
-
- private:
-  MapProfile profile_;
+  MapProfile map_profile;
 };
 
 }  // namespace atlas::testing
