@@ -54,10 +54,9 @@ def from_nothing_cases(merges, other, work):
     report.equal("a new atlas: who is in its map", states, {"first": "live", "second": "live"})
     report.equal("a new atlas: its digest", digest, told["output"]["digest"])
     report.equal("a new atlas: where it is from", (merges.state(), other.state()), before)
-    return told
 
 
-def from_copy_cases(merges, other, work, told):
+def from_copy_cases(merges, other, work):
     """Of a backup and of a daemon: what is in the map of the backup stays there."""
     report, made = merges.report, work / "made"
     merges.run("backup", "monday")
@@ -68,9 +67,8 @@ def from_copy_cases(merges, other, work, told):
     report.equal(f"of a copy: exit code ({done.stderr})", done.returncode, 0)
     report.check("of a copy: for people", f"{file}: " in done.stdout and "undone by" in done.stdout, done.stdout)
     report.equal("of a copy: the backup", hash_of(base), content)
-    states, digest = look_into(merges, file)
+    states, _ = look_into(merges, file)
     report.equal("of a copy: who is in its map", states, {"first": "live", "second": "live"})
-    report.check("of a copy: another map, by the frame of the first", digest != told["output"]["digest"], digest)
     dry = merges.merged("of a copy, a dry run", "--atlas", base, "--from", other.server, server=False)
     report.equal("of a copy, a dry run", (dry["published"], dry["applied"]), (1, False))
 
@@ -100,7 +98,8 @@ def make(report, bin_dir, drives, work):
         other.ingest("second")
         for one in (merges, other):
             one.run("wait")
-        from_copy_cases(merges, other, work, from_nothing_cases(merges, other, work))
+        from_nothing_cases(merges, other, work)
+        from_copy_cases(merges, other, work)
         interrupted_cases(merges, other, work)
 
 
