@@ -93,7 +93,8 @@ TEST(PoseCorrectionTest, DriftThatBendsIsFollowed) {
   };
   for (Pose& pose : submaps) pose.translation().y() += drift_m(pose.translation().x());
   const std::vector<Pose> corrected = CorrectedPoses(session, submaps);
-  for (std::size_t i = session.submaps.front().middle(); i <= session.submaps.back().middle(); ++i) {
+  for (std::size_t i = session.submaps.front().middle(); i <= session.submaps.back().middle();
+       ++i) {
     const auto at_m = static_cast<double>(i);
     EXPECT_LT(DistanceBetween(corrected[i], At(at_m, drift_m(at_m))), 1e-6) << i;
   }
