@@ -227,33 +227,51 @@ bool ClosureSearch::IsExpected(const Task& task, const SubmapMatch& match) const
          turned <= options_.max_surprise_rad;
 }
 
-// Pairs of one submap are done after each other: what is prepared of it serves all of them.
+// Pairs of a few submaps on end are one worker's, one submap after the other: what is prepared of
+// it serves all of its pairs, and what they are matched with is nearly the same for the next.
 Result<std::vector<FoundClosure>> ClosureSearch::Run(std::vector<Task> tasks,
                                                      const Progress& progress) {
+  constexpr std::size_t kOnEnd = 8;
   std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) {
-    return std::tie(a.a, a.b) < std::tie(b.a, b.b);
+    return std::tie(a.b, a.a) < std::tie(b.b, b.a);
   });
+  const auto is_together = [](const Task& a, const Task& b) {
+    return a.b.session == b.b.session && a.b.submap / kOnEnd == b.b.submap / kOnEnd;
+  };
+  std::vector<std::size_t> begin;  // of each part of them
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    if (i == 0 || !is_together(tasks[i - 1], tasks[i])) begin.push_back(i);
+  }
+  begin.push_back(tasks.size());
   std::vector<std::optional<FoundClosure>> found(tasks.size());
   std::mutex mutex;
   std::size_t done = 0;
-  Status status =
-      RunParallel(tasks.size(), workers_.size(), [&](std::size_t worker, std::size_t i) -> Status {
-        const Task& task = tasks[i];
-        const auto match = task.reach
-                               ? workers_[worker].Search(task.a, task.b, task.T_a_b, *task.reach)
-                               : workers_[worker].Match(task.a, task.b, task.T_a_b);
-        if (!match) return match.error();
-        if (IsBelieved(*match, options_.match) && IsExpected(task, *match)) {
-          found[i] = FoundClosure{task.a, task.b, *match};
-        }
-        const std::lock_guard lock(mutex);
-        return progress ? progress(++done, tasks.size()) : Status();
-      });
+  const auto run = [&](std::size_t worker, std::size_t i) -> Status {
+    const Task& task = tasks[i];
+    const auto match = task.reach ? workers_[worker].Search(task.a, task.b, task.T_a_b, *task.reach)
+                                  : workers_[worker].Match(task.a, task.b, task.T_a_b);
+    if (!match) return match.error();
+    if (IsBelieved(*match, options_.match) && IsExpected(task, *match)) {
+      found[i] = FoundClosure{task.a, task.b, *match};
+    }
+    const std::lock_guard lock(mutex);
+    return progress ? progress(++done, tasks.size()) : Status();
+  };
+  Status status = RunParallel(begin.size() - 1, workers_.size(),
+                              [&](std::size_t worker, std::size_t part) -> Status {
+                                for (std::size_t i = begin[part]; i < begin[part + 1]; ++i) {
+                                  ATLAS_RETURN_IF_ERROR(run(worker, i));
+                                }
+                                return {};
+                              });
   if (!status.ok()) return Error(std::move(status));
   std::vector<FoundClosure> closures;
   for (const std::optional<FoundClosure>& one : found) {
     if (one) closures.push_back(*one);
   }
+  std::stable_sort(closures.begin(), closures.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.a, a.b) < std::tie(b.a, b.b);
+  });
   return closures;
 }
 
