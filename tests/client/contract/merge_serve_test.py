@@ -118,7 +118,9 @@ def daemon_case(report, bin_dir, drives, data):
             service.process.send_signal(signal.SIGSTOP)
             daemons.restart()
             service.process.send_signal(signal.SIGCONT)
-            report.equal("it merges", service.wait_for("applied")["published"], begun["sessions"])
+            # What settled meanwhile comes along, where this machine took its time to upload it.
+            published = service.wait_for("applied")["published"]
+            report.check("it merges", set(published) >= set(begun["sessions"]), published)
             report.equal("SIGINT", service.stop(signal.SIGINT), 0)
         report.check("who is in the map", set(merges.states().values()) == {"live"} or len(begun["sessions"]) < 2,
                      merges.states())
