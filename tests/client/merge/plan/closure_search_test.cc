@@ -69,9 +69,9 @@ TEST_F(ClosureSearchTest, EachSubmapIsComparedWithTheNearestOfOtherSessions) {
 
 TEST_F(ClosureSearchTest, WhatIsFarOffIsNot) {
   Add(Straight(At(0.0), 50));
-  Add(Straight(At(0.0, 9.0), 50));
+  Add(Straight(At(0.0, 13.0), 50));
   EXPECT_EQ(Near(), 0U);
-  options_.guided_m = 9.1;
+  options_.guided_m = 13.1;
   EXPECT_GT(Near(), 0U);
 }
 

@@ -82,6 +82,7 @@ TEST_F(JoinedSessionsTest, AMergeReadsThemInOrder) {
   const Bytes missing = EncodeKeyframe(other);
   second.keyframes[1].blob = missing;
   JoinedSessions joined = Join();
+  EXPECT_EQ(StatesOf(joined), "a=staged ");
   EXPECT_EQ(NumbersOf(joined, {"a", "day"}), (std::vector<std::uint32_t>{10, 12, 13, 11}));
   KeyframeSpool spool = *KeyframeSpool::Create();
   const auto read = ReadForMerge(joined, {}, spool, nullptr);
