@@ -8,11 +8,10 @@ import json
 import pathlib
 import signal
 import sys
-import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
-from harness import Daemon, Report  # noqa: E402
-from merge_harness import COARSE, Merges, Watched  # noqa: E402
+from harness import Daemon  # noqa: E402
+from merge_harness import COARSE, Merges, Watched, run_group  # noqa: E402
 
 KEYS = {"revision", "sessions", "left_out", "closures", "rejected", "closure_rms_m", "closure_rms_deg",
         "keyframes_moved", "published", "tiles", "applied"}
@@ -269,16 +268,5 @@ def bring(report, bin_dir, drives, work):
 GROUPS = {"tell": tell, "change": change, "bring": bring}
 
 
-def main():
-    bin_dir, drives = (pathlib.Path(arg) for arg in sys.argv[1:3])
-    report = Report()
-    with tempfile.TemporaryDirectory() as name:
-        work = pathlib.Path(name)
-        work.chmod(0o755)  # commands that run as nobody reach it
-        GROUPS[sys.argv[3]](report, bin_dir, drives, work)
-    print(f"{report.checks} checks, {report.failed} failed")
-    return 1 if report.failed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_group(GROUPS))

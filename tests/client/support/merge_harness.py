@@ -10,9 +10,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 
-from harness import EXIT, Cases, Daemon
+from harness import EXIT, Cases, Daemon, Report
 
 COARSE = ("--cell-size", "0.2")  # a daemon's flag: few cells, and all that a merge needs
 NEAR = ("--max-range", "15")  # an ingest's
@@ -172,6 +173,18 @@ class Restartable:
         self.daemon.stop(signal.SIGKILL)
         self.daemon = self.start(listen=server)
         assert self.daemon.server == server, self.daemon.process.communicate()[1]
+
+
+def run_group(groups):
+    """The cases of the group that the command line asks for, BIN_DIR DRIVES GROUP; the exit code."""
+    bin_dir, drives = (pathlib.Path(arg) for arg in sys.argv[1:3])
+    report = Report()
+    with tempfile.TemporaryDirectory() as name:
+        work = pathlib.Path(name)
+        work.chmod(0o755)  # commands that run as nobody reach it
+        groups[sys.argv[3]](report, bin_dir, drives, work)
+    print(f"{report.checks} checks, {report.failed} failed")
+    return 1 if report.failed else 0
 
 
 if __name__ == "__main__":

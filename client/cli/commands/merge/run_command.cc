@@ -1,5 +1,4 @@
 // `atlas-merge run`: finds where sessions belong and hands the daemon one batch of corrections.
-#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -109,10 +108,7 @@ class MergeRunCommand : public Command {
       ATLAS_RETURN_IF_ERROR(Bring(**source, *client, progress, context));
     }
     DaemonSessions source(*client);
-    const auto merged = Merge(source, &*client, *author, progress, context);
-    if (!merged) return merged.error();
-    Print(*merged, {}, context);
-    return {};
+    return MergeAndPrint(source, &*client, *author, progress, context);
   }
 
  private:
@@ -128,10 +124,7 @@ class MergeRunCommand : public Command {
     if (!sources) return sources.error();
     auto joined = JoinedSessions::Make(*std::move(sources));
     if (!joined) return joined.error();
-    const auto merged = Merge(*joined, nullptr, author, progress, context);
-    if (!merged) return merged.error();
-    Print(*merged, {}, context);
-    return {};
+    return MergeAndPrint(*joined, nullptr, author, progress, context);
   }
 
   // The map that is merged into first: the file's, or the daemon's.
@@ -203,6 +196,17 @@ class MergeRunCommand : public Command {
     context.err << "note: " << source.name() << ": " << report->sessions << " sessions, "
                 << report->keyframes << " keyframes, of which " << report->duplicates
                 << " were there already\n";
+    return {};
+  }
+
+  Status MergeAndPrint(SessionSource& source,
+                       AtlasClient* client,
+                       const std::string& author,
+                       Progress& progress,
+                       CommandContext& context) const {
+    const auto merged = Merge(source, client, author, progress, context);
+    if (!merged) return merged.error();
+    Print(*merged, std::nullopt, context);
     return {};
   }
 
