@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 namespace atlas {
@@ -50,22 +51,48 @@ Indices Weightiest(std::span<const Closure> closures, std::size_t count) {
   return indices;
 }
 
-// Around `first`: always whoever agrees with most of those that are left.
+// Whole numbers, so that what is added and taken away again leaves nothing behind.
+using Weight = std::int64_t;
+
+std::vector<Weight> WeightsOf(std::span<const Closure> closures) {
+  constexpr double kUnits = 4'294'967'296.0;
+  std::vector<Weight> weights;
+  weights.reserve(closures.size());
+  for (const Closure& closure : closures) weights.push_back(std::llround(closure.weight * kUnits));
+  return weights;
+}
+
+Weight SumOf(const Indices& indices, const std::vector<Weight>& weights) {
+  return std::accumulate(indices.begin(), indices.end(), Weight{0},
+                         [&](Weight sum, std::size_t i) { return sum + weights[i]; });
+}
+
+// Around `first`: always whoever agrees with most of those that are left. Time by the square of
+// how many there are.
 Indices Grown(std::size_t first,
               const Indices& others,
               const Agreement& agree,
-              std::span<const Closure> closures) {
+              const std::vector<Weight>& weights) {
   Indices set{first};
   Indices candidates = agree.WithAll(others, first);
+  std::vector<Weight> support(weights);  // of a candidate its own and that of those it agrees with
+  for (const std::size_t i : candidates) {
+    support[i] += SumOf(agree.WithAll(candidates, i), weights);
+  }
   while (!candidates.empty()) {
-    const auto support = [&](std::size_t one) {
-      return closures[one].weight + WeightOf(closures, agree.WithAll(candidates, one));
-    };
-    const auto best =
-        std::max_element(candidates.begin(), candidates.end(),
-                         [&](std::size_t i, std::size_t j) { return support(i) < support(j); });
-    set.push_back(*best);
-    candidates = agree.WithAll(candidates, *best);
+    const std::size_t best =
+        *std::max_element(candidates.begin(), candidates.end(),
+                          [&](std::size_t i, std::size_t j) { return support[i] < support[j]; });
+    set.push_back(best);
+    const auto dropped =
+        std::stable_partition(candidates.begin(), candidates.end(),
+                              [&](std::size_t other) { return agree(best, other); });
+    std::for_each(dropped, candidates.end(), [&](std::size_t gone) {
+      std::for_each(candidates.begin(), dropped, [&](std::size_t left) {
+        if (agree(gone, left)) support[left] -= weights[gone];
+      });
+    });
+    candidates.erase(dropped, candidates.end());
   }
   return set;
 }
@@ -73,18 +100,17 @@ Indices Grown(std::size_t first,
 // The ones with whom most agree come first; few starts find what all would.
 Indices HeaviestSet(const Indices& indices,
                     const Agreement& agree,
-                    std::span<const Closure> closures) {
+                    const std::vector<Weight>& weights) {
   constexpr std::size_t kStarts = 16;
-  std::vector<std::pair<double, std::size_t>> starts;
+  std::vector<std::pair<Weight, std::size_t>> starts;
   for (const std::size_t i : indices) {
-    starts.emplace_back(-closures[i].weight - WeightOf(closures, agree.WithAll(indices, i)), i);
+    starts.emplace_back(-weights[i] - SumOf(agree.WithAll(indices, i), weights), i);
   }
   std::sort(starts.begin(), starts.end());
   Indices heaviest;
   for (std::size_t k = 0; k < std::min(kStarts, starts.size()); ++k) {
-    Indices set = Grown(starts[k].second, indices, agree, closures);
-    const bool is_heavier =
-        heaviest.empty() || WeightOf(closures, set) > WeightOf(closures, heaviest);
+    Indices set = Grown(starts[k].second, indices, agree, weights);
+    const bool is_heavier = heaviest.empty() || SumOf(set, weights) > SumOf(heaviest, weights);
     if (is_heavier) heaviest = std::move(set);
   }
   std::sort(heaviest.begin(), heaviest.end());
@@ -128,9 +154,10 @@ std::vector<Indices> ConsistentSets(std::span<const Closure> closures,
                                     std::size_t most) {
   Indices left = Weightiest(closures, options.max_closures);
   const Agreement agree(closures, left, sessions, options);
+  const std::vector<Weight> weights = WeightsOf(closures);
   std::vector<Indices> sets;
   while (sets.size() < most && !left.empty()) {
-    Indices set = HeaviestSet(left, agree, closures);
+    Indices set = HeaviestSet(left, agree, weights);
     std::erase_if(left, [&](std::size_t i) {
       return std::any_of(set.begin(), set.end(),
                          [&](std::size_t j) { return i == j || agree(i, j); });

@@ -79,9 +79,16 @@ class Reader {
     for (SubmapCut& cut : cuts) {
       cut.begin = in_.U64();
       cut.end = in_.U64();
-      cut.follows_jump = in_.U8() != 0;
+      const std::uint8_t follows_jump = in_.U8();
+      if (follows_jump > 1) in_.Fail();
+      cut.follows_jump = follows_jump != 0;
     }
     return cuts;
+  }
+  std::optional<Pose> ReadPoseIfThere() {
+    const std::vector<Pose> found = ReadPoses();
+    if (found.size() > 1) in_.Fail();
+    return found.empty() ? std::nullopt : std::optional(found.front());
   }
   std::vector<SubmapPlace> ReadAllPlaces() { return ReadPlaces(in_); }
   bool IsAtEnd() const { return in_.ok() && in_.remaining() == 0; }
@@ -162,8 +169,7 @@ SearchRecord ReadSearch(Reader& in) {
                               &record.reach.direction_rad}) {
     *value = in.ReadDouble();
   }
-  const std::vector<Pose> found = in.ReadPoses();
-  if (!found.empty()) record.T_a_b = found.front();
+  record.T_a_b = in.ReadPoseIfThere();
   return record;
 }
 

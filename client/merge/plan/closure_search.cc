@@ -27,17 +27,6 @@ void KeepLikeliest(std::vector<FoundClosure>& closures) {
 
 }  // namespace
 
-SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions) {
-  SubmapPoses stored;
-  for (const MergeSession& session : sessions) {
-    std::vector<Pose>& poses = stored.emplace_back();
-    for (const MergeSubmap& submap : session.submaps) {
-      poses.push_back(StoredPose(session, submap));
-    }
-  }
-  return stored;
-}
-
 ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
                              const std::vector<SessionWay>& ways,
                              const MergeContext& context)

@@ -23,10 +23,6 @@ struct FoundClosure {
   SubmapMatch match;
 };
 
-// By session and submap.
-using SubmapPoses = std::vector<std::vector<Pose>>;
-SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions);
-
 // Its calls return closures that are believed one by one, rising, each pair once. Errors are those
 // of the work and of `progress`, which may be empty.
 class ClosureSearch {

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <mutex>
 #include <set>
 #include <utility>
 
 #include "client/merge/plan/closure_search.h"
 #include "client/merge/plan/held_sessions.h"
 #include "client/merge/plan/merge_graph.h"
-#include "client/merge/plan/parallel.h"
 #include "client/merge/plan/pose_correction.h"
 #include "client/merge/plan/prior_frame.h"
 #include "client/merge/plan/session_links.h"
@@ -109,21 +107,9 @@ class Planner {
   }
 
   Status Link(const SubmapPoses& T_world_submap) {
-    links_.assign(sessions_.size(), {});
-    std::vector<MatchWorker> workers;
-    for (std::size_t i = 0; i < options_.workers; ++i) {
-      workers.emplace_back(sessions_, context_);
-    }
-    std::mutex mutex;
-    std::size_t done = 0;
-    ATLAS_RETURN_IF_ERROR(RunParallel(
-        sessions_.size(), options_.workers, [&](std::size_t worker, std::size_t i) -> Status {
-          auto links = LinkSession(i, sessions_, T_world_submap[i], options_, workers[worker]);
-          if (!links) return links.error();
-          links_[i] = *std::move(links);
-          const std::lock_guard lock(mutex);
-          return Step("odometry")(++done, sessions_.size());
-        }));
+    auto links = LinkSessions(sessions_, T_world_submap, context_, Step("odometry"));
+    if (!links) return links.error();
+    links_ = *std::move(links);
     ways_.clear();
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
       ways_.push_back(WayOf(sessions_[i], links_[i]));

@@ -71,6 +71,20 @@ inline Pose StoredPose(const MergeSession& session, const MergeSubmap& submap) {
          (session.T_world_sensor[middle].inverse() * submap.T_world_submap);
 }
 
+// T_world_submap by session and submap.
+using SubmapPoses = std::vector<std::vector<Pose>>;
+
+inline SubmapPoses StoredPoses(const std::vector<MergeSession>& sessions) {
+  SubmapPoses stored;
+  for (const MergeSession& session : sessions) {
+    std::vector<Pose>& poses = stored.emplace_back();
+    for (const MergeSubmap& submap : session.submaps) {
+      poses.push_back(StoredPose(session, submap));
+    }
+  }
+  return stored;
+}
+
 inline const MergeSubmap& At(const std::vector<MergeSession>& sessions, const SubmapRef& ref) {
   return sessions[ref.session].submaps[ref.submap];
 }

@@ -3,10 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "client/merge/graph/pose_graph.h"
-#include "client/merge/plan/match_worker.h"
+#include "client/merge/plan/merge_context.h"
 #include "client/merge/plan/merge_options.h"
 #include "client/merge/plan/merge_session.h"
 #include "core/base/status.h"
@@ -26,15 +27,16 @@ struct SessionLink {
 // map's own error considered: positive definite.
 PoseInformation6 InformationOf(const SubmapMatch& match, const MergeOptions& options);
 
-// From each submap of session `session` of `sessions` to the next by the stored poses, and again by
-// a match that begins at `T_world_submap`, where its submaps are thought to be, if that is believed
-// and near what the stored poses say; those count as a share then. None over a jump. Errors are
-// those of the submaps' tiles.
-Result<std::vector<SessionLink>> LinkSession(std::size_t session,
-                                             const std::vector<MergeSession>& sessions,
-                                             const std::vector<Pose>& T_world_submap,
-                                             const MergeOptions& options,
-                                             MatchWorker& worker);
+// Of each session: from each submap to the next by the stored poses, and again by a match that
+// begins at `T_world_submap`, where its submaps are thought to be, if that is believed and near
+// what the stored poses say; those count as a share then. None over a jump. `progress`, if there
+// is one, is told of submaps that are done, one thread at a time, and ends it with an error; else
+// errors are those of the submaps' tiles.
+Result<std::vector<std::vector<SessionLink>>> LinkSessions(
+    const std::vector<MergeSession>& sessions,
+    const SubmapPoses& T_world_submap,
+    const MergeContext& context,
+    const std::function<Status(std::size_t done, std::size_t all)>& progress = nullptr);
 
 // The session by its links alone, from its first submap on; after a jump by its poses.
 SessionWay WayOf(const MergeSession& session, const std::vector<SessionLink>& links);

@@ -180,7 +180,8 @@ class SqliteStore final : public AtlasStore {
     Write<std::uint32_t>(std::move(done),
                          [what, levels, a = std::move(author)](Connection& connection) {
                            return RepairTablesInStore(connection, what, levels, a);
-                         });
+                         },
+                         {.is_alone = true});
   }
 
   Result<AtlasFacts> WriteBackup(const std::filesystem::path& file,

@@ -18,7 +18,7 @@ void AddOrderChecks(const std::function<Status()>& check_stop,
 
 enum class OrderedTables { kTiles, kFootprints, kOthers };
 
-// Writes such tables anew, with all their blobs, inside a savepoint. A number out of order becomes
+// Writes such tables anew, with all their blobs, in a transaction. A number out of order becomes
 // the one between its neighbours that is one bit away; a row for which there is none, or one of
 // footprints or tombstones whose checksum is wrong, is left out; of footprints the index of changes
 // tells what it was. The names of those tables.

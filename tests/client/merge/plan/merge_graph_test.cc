@@ -23,11 +23,9 @@ class MergeGraphTest : public ::testing::Test {
         is_held_(2, false),
         uses_priors_(2, true) {
     const MapProfile profile;
-    MatchWorker worker(sessions_, {profile, options_, testing::SharedWork()});
-    for (const std::size_t i : {0U, 1U}) {
-      links_.push_back(
-          LinkSession(i, sessions_, StoredPoses(sessions_)[i], options_, worker).value());
-    }
+    links_ =
+        LinkSessions(sessions_, StoredPoses(sessions_), {profile, options_, testing::SharedWork()})
+            .value();
   }
 
   // Where they truly lie to each other.

@@ -25,8 +25,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 std::vector<SessionLink> Links(const std::vector<MergeSession>& sessions,
                                const MergeOptions& options = {}) {
   const MapProfile profile;
-  MatchWorker worker(sessions, {profile, options, testing::SharedWork()});
-  return LinkSession(0, sessions, StoredPoses(sessions)[0], options, worker).value();
+  return LinkSessions(sessions, StoredPoses(sessions), {profile, options, testing::SharedWork()})
+      .value()[0];
 }
 
 TEST(SessionLinksTest, WhatSawNothingIsLinkedByItsPoses) {
@@ -47,6 +47,47 @@ TEST(SessionLinksTest, WhatSawNothingIsLinkedByItsPoses) {
     EXPECT_NEAR(links[i].information(4, 4), std::pow(0.006, -2), 1.0);
     EXPECT_NEAR(links[i].information(5, 5), std::pow((0.05 + 0.005 * way_m) * kDegree, -2), 1.0);
   }
+}
+
+// Stretches of it are linked by several threads.
+TEST(SessionLinksTest, ALongSessionIsLinkedFromEndToEnd) {
+  const std::vector<MergeSession> sessions{BlindSession("one", Straight(At(0.0), 10)),
+                                           BlindSession("long", Straight(At(0.0), 500))};
+  const MapProfile profile;
+  MergeOptions options;
+  for (const std::size_t workers : {1U, 3U}) {
+    options.workers = workers;
+    std::size_t told = 0;
+    const auto links = LinkSessions(sessions, StoredPoses(sessions),
+                                    {profile, options, testing::SharedWork()},
+                                    [&](std::size_t done, std::size_t all) -> Status {
+                                      EXPECT_GT(done, told);
+                                      EXPECT_LE(done, all);
+                                      told = done;
+                                      return {};
+                                    })
+                           .value();
+    const std::size_t submaps = sessions[1].submaps.size();
+    EXPECT_GT(submaps, 40U);
+    EXPECT_EQ(told, sessions[0].submaps.size() + submaps);
+    ASSERT_EQ(links.size(), 2U);
+    ASSERT_EQ(links[1].size(), submaps - 1);
+    for (std::size_t i = 0; i < links[1].size(); ++i) {
+      EXPECT_EQ(links[1][i].from, i);
+      EXPECT_EQ(links[1][i].to, i + 1);
+    }
+  }
+}
+
+TEST(SessionLinksTest, WhoIsToldOfSubmapsMayEndIt) {
+  const std::vector<MergeSession> sessions{BlindSession("car", Straight(At(0.0), 500))};
+  const MapProfile profile;
+  const MergeOptions options;
+  const auto links = LinkSessions(
+      sessions, StoredPoses(sessions), {profile, options, testing::SharedWork()},
+      [](std::size_t, std::size_t) { return Status(StatusCode::kUnavailable, "enough"); });
+  ASSERT_FALSE(links.has_value());
+  EXPECT_EQ(links.error().message(), "enough");
 }
 
 TEST(SessionLinksTest, NothingLinksOverAJump) {
