@@ -4,13 +4,13 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <utility>
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include "client/atlas_file/backup_restore.h"
+#include "client/merge/output/making_folder.h"
 #include "client/merge/output/own_daemon.h"
 #include "core/base/disk_error.h"
 #include "core/base/str_cat.h"
@@ -37,39 +37,6 @@ Status CheckTarget(const fs::path& target) {
   if (!fs::exists(fs::symlink_status(target, error))) return {};
   return {StatusCode::kConflict,
           StrCat(target.string(), " is there already: a new atlas replaces no file")};
-}
-
-// Goes with everything in it.
-class WorkFolder {
- public:
-  explicit WorkFolder(fs::path path) : path_(std::move(path)) {}
-  ~WorkFolder() {
-    std::error_code ignored;  // what cannot be removed stays, and nobody takes it for an atlas
-    fs::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  WorkFolder(WorkFolder&&) = delete;
-  WorkFolder& operator=(WorkFolder&&) = delete;
-
-  fs::path data() const { return path_ / "data"; }
-  fs::path backups() const { return path_ / "backups"; }
-
- private:
-  fs::path path_;
-};
-
-Result<std::unique_ptr<WorkFolder>> MakeFolder(const fs::path& target) {
-  std::string path =
-      (FolderOf(target) / StrCat(".", target.filename().string(), ".merging-XXXXXX")).string();
-  if (::mkdtemp(path.data()) == nullptr) return Error(DiskError("cannot make", path, errno));
-  auto folder = std::make_unique<WorkFolder>(path);
-  for (const fs::path& inner : {folder->data(), folder->backups()}) {
-    std::error_code error;
-    fs::create_directory(inner, error);
-    if (error) return Error(DiskError("cannot make", inner, error.value()));
-  }
-  return folder;
 }
 
 Status CopyBase(const fs::path& base, const fs::path& data, const NewAtlas::Progress& progress) {
@@ -103,7 +70,10 @@ Status MoveTo(const fs::path& from, const fs::path& target) {
 
 class NewAtlas::Making {
  public:
-  Making(fs::path target, std::unique_ptr<WorkFolder> folder, OwnDaemon daemon, AtlasClient client)
+  Making(fs::path target,
+         std::unique_ptr<MakingFolder> folder,
+         OwnDaemon daemon,
+         AtlasClient client)
       : target_(std::move(target)),
         folder_(std::move(folder)),
         daemon_(std::move(daemon)),
@@ -150,7 +120,7 @@ class NewAtlas::Making {
 
   fs::path target_;
   // In this order: the connection goes before the daemon, and that before its folder.
-  std::unique_ptr<WorkFolder> folder_;
+  std::unique_ptr<MakingFolder> folder_;
   OwnDaemon daemon_;
   AtlasClient client_;
 };
@@ -162,7 +132,7 @@ NewAtlas::~NewAtlas() = default;
 
 Result<NewAtlas> NewAtlas::Begin(const NewAtlasPlan& plan, const Progress& progress) {
   if (Status status = CheckTarget(plan.target); !status.ok()) return Error(std::move(status));
-  auto folder = MakeFolder(plan.target);
+  auto folder = MakingFolder::Make(plan.target);
   if (!folder) return Error(folder.error());
   OwnDaemonOptions options{(*folder)->data(), (*folder)->backups(), std::nullopt};
   if (plan.base) {

@@ -3,6 +3,7 @@
 
 Usage: merge_output_test.py BIN_DIR DRIVES make|refuse."""
 
+import fcntl
 import hashlib
 import json
 import os
@@ -87,6 +88,25 @@ def interrupted_cases(merges, other, work):
             report.equal(f"signal {number} while {step}: what is left", left(made) + left(work / "temporary"), [])
 
 
+def killed_cases(merges, work):
+    """A SIGKILL leaves a hidden folder: who makes the same file next removes it, unless somebody is in it."""
+    report, made = merges.report, work / "killed"
+    made.mkdir()
+    flags = ("run", "--from", merges.server, "--output", made / "new.db")
+    watched = Watched(merges, *flags)
+    report.check("killed: it came to that", watched.wait_for("submaps"), watched.shown)
+    watched.process.kill()
+    watched.end()
+    report.equal("killed: what is left", len(left(made)), 1)
+    other = made / ".new.db.merging-others"
+    other.mkdir()
+    with open(other / "lock", "w", encoding="ascii") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = merges.merge(*flags, "--json", server=False)
+        report.equal(f"once more: exit code ({done.stderr})", done.returncode, 0)
+        report.equal("once more: what is left", left(made), [other.name, "new.db"])
+
+
 def make(report, bin_dir, drives, work):
     (work / "backups").mkdir()
     with Daemon(bin_dir, work / "atlas", *COARSE, "--backup-folder", work / "backups") as daemon, \
@@ -100,6 +120,7 @@ def make(report, bin_dir, drives, work):
         from_nothing_cases(merges, other, work)
         from_copy_cases(merges, other, work)
         interrupted_cases(merges, other, work)
+        killed_cases(merges, work)
 
 
 def alone_case(merges, work):
