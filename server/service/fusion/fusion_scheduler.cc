@@ -312,22 +312,30 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
 }
 
 // Which of the tile's keyframes are damaged is looked up, and noted for good. None is where one was
-// purged or healed while the tile was built.
+// purged or healed while the tile was built. All are read here: the write that notes them, which
+// holds up all others, looks only at those that cannot be.
 bool FusionScheduler::HasDamage(const TileId& tile) {
   const auto keyframes = store_.ListKeyframesOfTile(tile);
-  const auto noted =
-      keyframes
-          ? Await<std::uint32_t>([&](auto done) { store_.NoteDamage(*keyframes, std::move(done)); })
-          : Result<std::uint32_t>(Error(keyframes.error()));
-  if (!noted) {
-    log_(LogLevel::kError, StrCat("fusion: cannot note what is damaged of tile ", tile, ": ",
-                                  noted.error().message()));
+  const Status noted = keyframes ? NoteUnreadable(*keyframes) : keyframes.error();
+  if (!noted.ok()) {
+    log_(LogLevel::kError,
+         StrCat("fusion: cannot note what is damaged of tile ", tile, ": ", noted.message()));
     return true;
   }
   const auto damaged = store_.ListDamagedKeyframes();
   return !damaged || std::any_of(damaged->begin(), damaged->end(), [&](const DamagedKeyframe& d) {
     return std::find(keyframes->begin(), keyframes->end(), d.id) != keyframes->end();
   });
+}
+
+Status FusionScheduler::NoteUnreadable(std::vector<std::int64_t> keyframes) {
+  std::erase_if(keyframes, [&](std::int64_t id) {
+    return store_.ReadKeyframe(id).has_value() && store_.ReadKeyframeBlob(id).has_value();
+  });
+  if (keyframes.empty()) return {};
+  const auto noted = Await<std::uint32_t>(
+      [&](auto done) { store_.NoteDamage(std::move(keyframes), std::move(done)); });
+  return noted ? Status() : noted.error();
 }
 
 // True when there are some that can be built again, and the parent then.

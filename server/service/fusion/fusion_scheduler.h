@@ -92,6 +92,7 @@ class FusionScheduler {
   void NoteSuccess(RepeatedLine& line, const char* what);
   void PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why);
   bool HasDamage(const TileId& tile);
+  Status NoteUnreadable(std::vector<std::int64_t> keyframes);
   bool MarkDamagedChildren(const TileId& parent);
 
   AtlasStore& store_;

@@ -118,7 +118,9 @@ std::optional<SurveyFileHeader> ReadSurveyFileHeader(const fs::path& path) {
   const std::uintmax_t size = fs::file_size(path, error);
   const auto bytes = ReadWhole(path, kHeaderBytes);
   const auto header = bytes ? Decode(*bytes) : std::nullopt;
-  return header && !error && size == SurveyFileBytes(*header) ? header : std::nullopt;
+  const bool is_whole =
+      header && !error && size >= kHeaderBytes && header->payload_bytes == size - kHeaderBytes;
+  return is_whole ? header : std::nullopt;
 }
 
 std::optional<Bytes> ReadSurveyFile(const fs::path& path, const SurveyFileHeader& expected) {

@@ -106,4 +106,14 @@ Status StatusFromException(const std::exception& error) {
   return Status(StatusCode::kInternal, StrCat("store: ", error.what()));
 }
 
+Status StatusOf(const std::function<Status()>& check) {
+  try {
+    return check();
+  } catch (const std::exception& error) {
+    Status status = StatusFromException(error);
+    if (status.code() != StatusCode::kInvalidData) throw;
+    return status;
+  }
+}
+
 }  // namespace atlas

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <string>
 
 #include "core/base/status.h"
@@ -21,6 +22,10 @@ Status StatusFromSqliteCode(int code, const char* what);
 
 // For the one place where work runs on a connection: SQLite's exceptions and bad_alloc.
 Status StatusFromException(const std::exception& error);
+
+// What `check` says, or kInvalidData where it throws of damage. Everything else that it throws is
+// not for it: SQLite may have given the transaction up.
+Status StatusOf(const std::function<Status()>& check);
 
 // What is read is not what was written: kInvalidData where the exception becomes a Status.
 [[noreturn]] void ThrowDamaged(const std::string& what);

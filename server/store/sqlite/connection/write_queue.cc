@@ -146,8 +146,10 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     connection_->Begin();
     for (std::size_t i = 0; i < group.size(); ++i) {
       results[i] = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
-      if (!connection_->is_in_transaction()) {
-        return results[i];  // SQLite gave the whole transaction up
+      if (!connection_->is_in_transaction()) {  // SQLite gave the whole of it up
+        return results[i].ok() ? Status(StatusCode::kUnavailable,
+                                        "store: SQLite gave up the transaction of this write")
+                               : results[i];
       }
       if (group[i].is_alone && !results[i].ok()) {
         return RollBack(results[i]);

@@ -262,12 +262,10 @@ Status CheckKeyframe(Connection& connection, std::int64_t id) {
   if (!blob) {
     return blob.error();
   }
-  try {
+  return StatusOf([&]() -> Status {
     ReadFootprint(connection, id);
-  } catch (const std::exception& error) {
-    return StatusFromException(error);
-  }
-  return {};
+    return {};
+  });
 }
 
 std::uint64_t LastChange(Connection& connection, std::int64_t id) {

@@ -139,19 +139,6 @@ std::uint32_t OrderTables(Connection& connection, OrderedTables which, const std
   return static_cast<std::uint32_t>(tables.size());
 }
 
-// Runs what may throw of damage. Everything else it throws is not for it.
-Status StatusOf(const std::function<Status()>& check) {
-  try {
-    return check();
-  } catch (const std::exception& error) {
-    Status status = StatusFromException(error);
-    if (status.code() != StatusCode::kInvalidData) {
-      throw;
-    }
-    return status;
-  }
-}
-
 Result<std::uint32_t> RepairRows(Connection& connection,
                                  std::uint8_t levels,
                                  const std::string& author) {
