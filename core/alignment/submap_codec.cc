@@ -61,6 +61,13 @@ SubmapPlace ReadPlace(ByteReader& in) {
 
 }  // namespace
 
+bool AreSubmap(ByteSpan bytes) {
+  if (bytes.size() < sizeof(kMagic) + kChecksumBytes) return false;
+  const ByteSpan content = bytes.first(bytes.size() - kChecksumBytes);
+  return ByteReader(content).U32() == kMagic &&
+         ByteReader(bytes.last(kChecksumBytes)).U64() == Hash64(content);
+}
+
 void WritePlaces(const std::vector<SubmapPlace>& places, ByteWriter& out) {
   out.U32(static_cast<std::uint32_t>(places.size()));
   for (const SubmapPlace& place : places) {
@@ -95,11 +102,8 @@ Bytes Submap::Encode() const {
 
 Result<Submap> Submap::Decode(ByteSpan bytes) {
   const auto invalid = Error(StatusCode::kInvalidData, "submap: damaged or of another kind");
-  if (bytes.size() < kChecksumBytes) return invalid;
-  const ByteSpan content = bytes.first(bytes.size() - kChecksumBytes);
-  if (ByteReader(bytes.last(kChecksumBytes)).U64() != Hash64(content)) return invalid;
-  ByteReader in(content);
-  if (in.U32() != kMagic) return invalid;
+  if (!AreSubmap(bytes)) return invalid;
+  ByteReader in(bytes.first(bytes.size() - kChecksumBytes).subspan(sizeof(kMagic)));
   Submap submap;
   submap.radius_m_ = ReadDouble(in);
   submap.blobs_.resize(ReadCount(4, in));

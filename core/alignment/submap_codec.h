@@ -1,4 +1,4 @@
-// Places of submaps as bytes, as they are in a submap's own (Submap::Encode).
+// A submap's bytes, looked at without decoding them, and places of submaps as they are in them.
 #pragma once
 
 #include <vector>
@@ -7,6 +7,9 @@
 #include "core/base/bytes.h"
 
 namespace atlas {
+
+// Whether these are the bytes that Submap::Encode made of some submap: by their checksum.
+bool AreSubmap(ByteSpan bytes);
 
 void WritePlaces(const std::vector<SubmapPlace>& places, ByteWriter& out);
 // None where the reader fails.

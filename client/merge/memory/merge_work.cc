@@ -17,6 +17,7 @@
 #include "client/merge/memory/work_log.h"
 #include "client/vehicle/folder_lock.h"
 #include "client/vehicle/stored_file.h"
+#include "core/alignment/submap_codec.h"
 #include "core/base/disk_error.h"
 #include "core/base/hash.h"
 #include "core/base/str_cat.h"
@@ -124,6 +125,7 @@ struct MergeWork::Folder {
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::vector<SearchRecord>> searches = {};
   std::map<std::uint64_t, std::vector<SubmapCut>> cuts = {};
   std::set<std::pair<std::uint64_t, std::uint64_t>> searched = {};
+  std::set<SubmapName> whole = {};  // looked at, or written by this program
 
   fs::path PathOf(const SubmapName& name) const {
     return path / StrCat(Hex(name.content), "-", Hex(name.shape), kSuffix);
@@ -141,9 +143,21 @@ struct MergeWork::Folder {
     return log->Append(EncodeRecord(record));
   }
 
+  bool IsWhole(const SubmapName& name);
   Status Open(std::uint64_t rules, std::uint64_t max_bytes);
   Result<std::set<fs::path>> Tidy(const std::set<fs::path>& known, std::uint64_t max_bytes) const;
 };
+
+// One that is not is removed: after a loss of power a file may be damaged.
+bool MergeWork::Folder::IsWhole(const SubmapName& name) {
+  if (whole.contains(name)) return true;
+  const fs::path file = PathOf(name);
+  const auto bytes = LoadFile(file, kMaxSubmapBytes);
+  if (bytes && AreSubmap(*bytes)) return whole.insert(name).second;
+  std::error_code ignored;
+  fs::remove(file, ignored);
+  return false;
+}
 
 // The submaps' files that are there: of those that are `known` the latest ones; others are removed.
 Result<std::set<fs::path>> MergeWork::Folder::Tidy(const std::set<fs::path>& known,
@@ -294,10 +308,9 @@ std::optional<SubmapSketch> MergeWork::FindSubmap(std::uint64_t content,
   const auto found = folder_->submaps.find(content);
   if (found == folder_->submaps.end()) return std::nullopt;
   const auto* const nearest = Nearest(found->second, [&](const SubmapRecord& record) {
-    return fs::exists(folder_->PathOf(record.name))
-               ? MisfitOf(record.T_submap_member, T_submap_member,
-                          {tolerance.metres, tolerance.rad})
-               : std::nullopt;
+    const auto misfit =
+        MisfitOf(record.T_submap_member, T_submap_member, {tolerance.metres, tolerance.rad});
+    return misfit && folder_->IsWhole(record.name) ? misfit : std::nullopt;
   });
   if (nearest == nullptr) return std::nullopt;
   std::error_code ignored;  // it was asked for, and others go before it if that can be told
@@ -314,15 +327,19 @@ Result<SubmapSketch> MergeWork::KeepSubmap(std::uint64_t content,
   Status status = StoreFile(folder_->PathOf(record.name), submap.Encode(), Durability::kWhole);
   if (status.ok()) status = folder_->Keep(record);
   if (!status.ok()) return Error(std::move(status));
+  const std::lock_guard guard(folder_->mutex);
+  folder_->whole.insert(record.name);
   return SubmapSketch{record.name, std::move(record.places)};
 }
 
 Result<Submap> MergeWork::LoadSubmap(const SubmapName& name) const {
   const fs::path path = folder_->PathOf(name);
   const auto bytes = LoadFile(path, kMaxSubmapBytes);
-  if (!bytes) return Error(bytes.error());
-  Result<Submap> submap = Submap::Decode(*bytes);
+  Result<Submap> submap = bytes ? Submap::Decode(*bytes) : Error(bytes.error());
   if (submap) return submap;
+  const std::lock_guard guard(folder_->mutex);
+  folder_->whole.erase(name);
+  if (submap.error().code() != StatusCode::kInvalidData) return submap;
   std::error_code ignored;  // then it is damaged the next time, too
   fs::remove(path, ignored);
   return Error(submap.error().WithContext(path.string()));

@@ -61,7 +61,7 @@ class MergeWork {
   Status KeepSearched(std::uint64_t one, std::uint64_t other);
 
   // Of this content the one whose members lie nearest `T_submap_member`, if all lie as near as
-  // `tolerance`.
+  // `tolerance`, and if what is in its file is what was written there.
   std::optional<SubmapSketch> FindSubmap(std::uint64_t content,
                                          std::span<const Pose> T_submap_member,
                                          const ShapeTolerance& tolerance) const;

@@ -191,6 +191,25 @@ TEST_F(MergeWorkTest, WhatIsWithoutItsFileIsForgottenWithAllThatWasFoundWithIt) 
   }
 }
 
+// As a loss of power may leave it: another merge makes it anew and goes on.
+TEST_F(MergeWorkTest, WhatWasDamagedBetweenMergesIsNotFound) {
+  Open();
+  const SubmapName name = Keep(5);
+  const Bytes whole = LoadFile(Files()[0], kMuch).value();
+  Bytes flipped = whole;
+  flipped[flipped.size() / 2] ^= 4;
+  const Bytes cut(whole.begin(), whole.begin() + 500);
+  for (const Bytes& bytes : {flipped, cut, Bytes()}) {
+    Open();
+    ASSERT_TRUE(StoreFile(Files()[0], bytes, Durability::kWhole).ok());
+    EXPECT_FALSE(work_->FindSubmap(5, shape_, kTolerance).has_value());
+    EXPECT_TRUE(Files().empty());
+    EXPECT_EQ(Keep(5), name);
+    EXPECT_TRUE(work_->FindSubmap(5, shape_, kTolerance).has_value());
+    EXPECT_TRUE(work_->LoadSubmap(name).has_value());
+  }
+}
+
 TEST_F(MergeWorkTest, ADamagedFileIsToldAndMadeAnew) {
   Open();
   const SubmapName name = Keep(5);
