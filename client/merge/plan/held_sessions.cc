@@ -48,6 +48,16 @@ class HeldOnes {
     return ShareOf(misfit);
   }
 
+  // It meets nobody, not even itself, and no position of it is known.
+  bool IsNothingLearnedOf(std::size_t session) const {
+    return std::none_of(closures_.begin(), closures_.end(),
+                        [&](const FoundClosure& closure) {
+                          return closure.a.session == session || closure.b.session == session;
+                        }) &&
+           std::none_of(sessions_[session].keyframes.begin(), sessions_[session].keyframes.end(),
+                        [](const MergeKeyframe& keyframe) { return keyframe.prior.has_value(); });
+  }
+
   // The session farthest from what its closures with those that are held say, if it is too far; of
   // equals the last one.
   std::optional<std::size_t> Worst(const std::vector<bool>& is_held) const {
@@ -94,7 +104,8 @@ std::vector<bool> HeldSessions(const std::vector<MergeSession>& sessions,
   const HeldOnes held(sessions, closures, options);
   std::vector<bool> is_held(sessions.size());
   for (std::size_t i = 0; i < sessions.size(); ++i) {
-    is_held[i] = !sessions[i].is_staged && held.WithinItself(i, links[i]) <= 1.0;
+    is_held[i] = !sessions[i].is_staged &&
+                 (held.WithinItself(i, links[i]) <= 1.0 || held.IsNothingLearnedOf(i));
   }
   // Without the worst one others may fit.
   while (const std::optional<std::size_t> worst = held.Worst(is_held)) {

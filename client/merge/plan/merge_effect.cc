@@ -5,7 +5,6 @@
 
 #include "core/base/str_cat.h"
 #include "core/fusion/observation/keyframe_placement.h"
-#include "core/keyframe/keyframe_codec.h"
 
 namespace atlas {
 namespace {
@@ -26,7 +25,7 @@ Status AddFootprint(const QuantizedPose& T_world_sensor,
 Status AddTouchedTiles(const MergeSession& session,
                        const std::vector<MovedKeyframe>& moved,
                        bool is_published,
-                       const BlobReader& read,
+                       const HeaderReader& read,
                        const MapProfile& profile,
                        std::set<TileId>& tiles) {
   std::map<std::size_t, QuantizedPose> moves;
@@ -37,9 +36,7 @@ Status AddTouchedTiles(const MergeSession& session,
   for (std::size_t i = 0; i < session.keyframes.size(); ++i) {
     const auto move = moves.find(i);
     if (move == moves.end() && !is_published) continue;
-    const auto blob = read(i);
-    if (!blob) return blob.error();
-    const auto header = ReadKeyframeHeader(*blob);
+    const auto header = read(i);
     if (!header) return header.error();
     Status status;
     // A staged session's keyframes were nowhere before.

@@ -13,6 +13,7 @@
 #include "client/merge/plan/prior_frame.h"
 #include "client/merge/plan/session_links.h"
 #include "client/merge/plan/session_parts.h"
+#include "client/merge/plan/tilt_check.h"
 
 namespace atlas {
 namespace {
@@ -33,8 +34,8 @@ class Planner {
 
   Result<MergePlan> Plan() {
     Status status = Run();
-    if (!status.ok()) return Error(std::move(status));
-    status = Conclude();
+    if (status.ok()) status = LeaveOutTilted();
+    if (status.ok()) status = Conclude();
     if (!status.ok()) return Error(std::move(status));
     return std::move(plan_);
   }
@@ -93,12 +94,60 @@ class Planner {
     return Settle(*again, &before);
   }
 
-  // One that would have to be tilted too far keeps the submaps it has; LookAtEffect leaves it out.
+  // One that would have to be tilted too far keeps the submaps it has; LeaveOutTilted looks at it.
   Status FuseAgain(std::size_t i) {
     const std::vector<Pose> corrected = CorrectedPoses(sessions_[i], poses_.T_world_submap[i]);
     Status status = Fuse(i, corrected, options_.refined_shape);
     return status.code() == StatusCode::kInvalidData ? Status() : status;
   }
+
+  // One that would have to be tilted too far bends the others while it tilts: without it again, the
+  // most tilted first, until there is none.
+  Status LeaveOutTilted() {
+    for (;;) {
+      bool is_found = false;
+      for (;;) {
+        auto worst = MostTilted();
+        if (!worst) return worst.error();
+        if (!*worst) break;
+        left_out_.insert(**worst);
+        is_found = true;
+        const SubmapPoses before = poses_.T_world_submap;
+        ATLAS_RETURN_IF_ERROR(Settle(choice_.believed, &before));
+      }
+      if (!is_found) return {};
+      if (options_.refinements > 0) ATLAS_RETURN_IF_ERROR(Refine());
+    }
+  }
+
+  Result<std::optional<std::pair<std::size_t, std::string>>> MostTilted() {
+    const std::set<std::size_t> joined = JoinedParts();
+    std::optional<std::pair<std::size_t, std::string>> worst;
+    double most_rad = 0.0;
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      if (is_held_[i] || IsLeftOut(i) || !joined.contains(parts_.part_of[i])) continue;
+      const auto tilt = TiltOf(sessions_[i], CorrectedPoses(sessions_[i], poses_.T_world_submap[i]),
+                               HeadersOf(i));
+      if (!tilt) return Error(tilt.error());
+      if (tilt->too_far.empty() || tilt->rms_rad <= most_rad) continue;
+      worst = {i, tilt->Message()};
+      most_rad = tilt->rms_rad;
+    }
+    return worst;
+  }
+  // Each blob is read once for its header.
+  HeaderReader HeadersOf(std::size_t session) {
+    return [this, session](std::size_t keyframe) -> Result<KeyframeHeader> {
+      const auto known = headers_.find({session, keyframe});
+      if (known != headers_.end()) return known->second;
+      const auto blob = readers_[session](keyframe);
+      if (!blob) return Error(blob.error());
+      Result<KeyframeHeader> header = ReadKeyframeHeader(*blob);
+      if (header) headers_.emplace(std::pair(session, keyframe), *header);
+      return header;
+    };
+  }
+  bool IsLeftOut(std::size_t session) const { return left_out_.contains(session); }
 
   ClosureSearch::Progress Step(std::string_view name) const {
     return [this, name](std::size_t done, std::size_t all) {
@@ -126,6 +175,9 @@ class Planner {
       const std::vector<FoundClosure> more = more_closures_(found, ways_);
       found.insert(found.end(), more.begin(), more.end());
     }
+    std::erase_if(found, [this](const FoundClosure& closure) {
+      return IsLeftOut(closure.a.session) || IsLeftOut(closure.b.session);
+    });
     for (int attempt = 1;; ++attempt) {
       choice_ = ChooseClosures(found, ways_, options_);
       plan_.rejected += choice_.rejected.size();
@@ -178,6 +230,7 @@ class Planner {
     std::set<std::size_t> joined;
     std::map<std::size_t, std::size_t> keyframes;  // by part
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      if (IsLeftOut(i)) continue;
       if (!sessions_[i].is_staged) joined.insert(parts_.part_of[i]);
       keyframes[parts_.part_of[i]] += sessions_[i].keyframes.size();
     }
@@ -192,13 +245,13 @@ class Planner {
     const std::set<std::size_t> joined = JoinedParts();
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
       SessionOutcome& outcome = plan_.sessions.emplace_back();
-      outcome.is_joined = joined.contains(parts_.part_of[i]);
+      outcome.is_joined = joined.contains(parts_.part_of[i]) && !IsLeftOut(i);
       outcome.is_held = is_held_[i];
       outcome.submaps = sessions_[i].submaps.size();
       outcome.priors = priors_[i];
       outcome.prior_off_m = MedianOff(sessions_[i], poses_.T_world_submap[i]);
       if (outcome.is_joined && !outcome.is_held) Move(i, outcome);
-      if (!outcome.is_joined) outcome.why_not = WhyNot(outcome);
+      if (!outcome.is_joined) outcome.why_not = WhyNot(i, outcome);
       ATLAS_RETURN_IF_ERROR(LookAtEffect(i, outcome));
     }
     CountClosures();
@@ -209,8 +262,13 @@ class Planner {
   }
 
   // Positions are too coarse for it to be laid on the map by them.
-  static std::string WhyNot(const SessionOutcome& outcome) {
-    std::string why = "meets no session of the map often enough";
+  std::string WhyNot(std::size_t session, const SessionOutcome& outcome) const {
+    if (const auto why = left_out_.find(session); why != left_out_.end()) return why->second;
+    const bool has_map = std::any_of(sessions_.begin(), sessions_.end(),
+                                     [](const MergeSession& one) { return !one.is_staged; });
+    std::string why = has_map ? "meets no session of the map often enough"
+                              : "there is no map yet, and more of what is staged belongs together "
+                                "without it: published, that is the map";
     return outcome.priors.count == 0 ? why : why + ", and positions alone place no session";
   }
 
@@ -234,16 +292,10 @@ class Planner {
     outcome.rms_move_m = std::sqrt(squares_m2 / static_cast<double>(corrected.size()));
   }
 
-  // One that would have to be tilted too far is left where it is.
-  Status LookAtEffect(std::size_t session, SessionOutcome& outcome) {
+  Status LookAtEffect(std::size_t session, const SessionOutcome& outcome) {
     const bool is_published = outcome.is_joined && sessions_[session].is_staged;
-    const Status status = AddTouchedTiles(sessions_[session], outcome.moved, is_published,
-                                          readers_[session], context_.profile, plan_.tiles);
-    if (status.code() != StatusCode::kInvalidData) return status;
-    outcome.is_joined = false;
-    outcome.moved.clear();
-    outcome.why_not = status.message();
-    return {};
+    return AddTouchedTiles(sessions_[session], outcome.moved, is_published, HeadersOf(session),
+                           context_.profile, plan_.tiles);
   }
 
   void CountClosures() {
@@ -272,6 +324,8 @@ class Planner {
   ClosureChoice choice_;
   SessionParts parts_;
   std::vector<bool> is_held_;
+  std::map<std::size_t, std::string> left_out_;                            // by session: why
+  std::map<std::pair<std::size_t, std::size_t>, KeyframeHeader> headers_;  // session, keyframe
   std::vector<PriorUse> priors_;
   MergedPoses poses_;
   MergePlan plan_;

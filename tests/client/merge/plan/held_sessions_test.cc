@@ -72,12 +72,25 @@ TEST_F(HeldSessionsTest, AStagedOneIsNeverHeldAndDragsNobody) {
 
 TEST_F(HeldSessionsTest, OneThatDriftsWithinItselfIsLetGo) {
   Make(2);
+  Meet(0, 1);
   Link(0, At(0.05));
   Link(1, At(0.0, 0.0, 0.0, 0.2 * kDegree));
   EXPECT_EQ(HeldOnes(), (Held{false, false}));
   options_.held_m = 0.06;
   options_.held_rad = 0.25 * kDegree;
   EXPECT_EQ(HeldOnes(), (Held{true, true}));
+}
+
+// A map does not move because somebody was merged who has nothing to do with it.
+TEST_F(HeldSessionsTest, OneThatMeetsNobodyStaysUnlessItsPositionsAreKnown) {
+  Make(2);
+  Link(0, At(0.05));
+  Link(1, At(0.05));
+  EXPECT_EQ(HeldOnes(), (Held{true, true}));
+  sessions_[0].keyframes[3].prior = {Eigen::Vector3d::Zero(), 0.5};
+  EXPECT_EQ(HeldOnes(), (Held{false, true}));
+  closures_.push_back(FoundAsStored(sessions_, {1, 0}, {1, 4}));  // it meets itself
+  EXPECT_EQ(HeldOnes(), (Held{false, false}));
 }
 
 // They say what the poses say, whatever that is.

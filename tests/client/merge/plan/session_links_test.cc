@@ -58,15 +58,15 @@ TEST(SessionLinksTest, ALongSessionIsLinkedFromEndToEnd) {
   for (const std::size_t workers : {1U, 3U}) {
     options.workers = workers;
     std::size_t told = 0;
-    const auto links = LinkSessions(sessions, StoredPoses(sessions),
-                                    {profile, options, testing::SharedWork()},
-                                    [&](std::size_t done, std::size_t all) -> Status {
-                                      EXPECT_GT(done, told);
-                                      EXPECT_LE(done, all);
-                                      told = done;
-                                      return {};
-                                    })
-                           .value();
+    const auto links =
+        LinkSessions(sessions, StoredPoses(sessions), {profile, options, testing::SharedWork()},
+                     [&](std::size_t done, std::size_t all) -> Status {
+                       EXPECT_GT(done, told);
+                       EXPECT_LE(done, all);
+                       told = done;
+                       return {};
+                     })
+            .value();
     const std::size_t submaps = sessions[1].submaps.size();
     EXPECT_GT(submaps, 40U);
     EXPECT_EQ(told, sessions[0].submaps.size() + submaps);

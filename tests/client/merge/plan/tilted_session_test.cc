@@ -18,6 +18,7 @@ namespace {
 
 using testing::At;
 using testing::BlindSession;
+using testing::FoundAsStored;
 using testing::Staged;
 using testing::Straight;
 
@@ -77,6 +78,33 @@ TEST(TiltedSessionTest, OthersAreMergedAsEver) {
   EXPECT_TRUE(plan->sessions[0].is_joined) << "the larger one becomes the map";
   EXPECT_FALSE(plan->sessions[1].is_joined);
   EXPECT_FALSE(plan->tiles.empty());
+}
+
+// Beside it, 0.5 m off as their closures have it: half of that the level one would move.
+TEST(TiltedSessionTest, WhoMeetsItIsNotBentByIt) {
+  std::vector<MergeSession> sessions{LevelSession("level", 0.0, 41),
+                                     LevelSession("tilted", 0.0, 41),
+                                     LevelSession("behind", 20.0, 31)};
+  const MoreClosures meet = [&](const auto&, const auto&) {
+    std::vector<FoundClosure> closures;
+    for (const std::size_t i : {0U, 1U, 2U}) {
+      closures.push_back(FoundAsStored(sessions, {0, i}, {1, i}, At(0.0, 0.5)));
+      closures.push_back(FoundAsStored(sessions, {1, i}, {2, i}));
+    }
+    return closures;
+  };
+  MergeWork work = MergeWork::Temporary().value();
+  const auto plan = PlanMerge(sessions, {Level(), LevelOnce(41), Level()},
+                              {MapProfile(), MergeOptions(), work}, nullptr, meet);
+  ASSERT_TRUE(plan.has_value()) << plan.error().message();
+  EXPECT_TRUE(plan->sessions[0].is_joined);
+  EXPECT_TRUE(plan->sessions[0].moved.empty());
+  EXPECT_FALSE(plan->sessions[1].is_joined);
+  EXPECT_NE(plan->sessions[1].why_not.find("keyframe 0 to 40: "), std::string::npos)
+      << plan->sessions[1].why_not;
+  EXPECT_NE(plan->sessions[1].why_not.find("3.00 degrees"), std::string::npos);
+  EXPECT_FALSE(plan->sessions[2].is_joined) << "it hangs on the tilted one alone";
+  EXPECT_TRUE(plan->closures.empty());
 }
 
 }  // namespace
