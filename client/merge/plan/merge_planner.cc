@@ -105,19 +105,37 @@ class Planner {
   // most tilted first, until there is none.
   Status LeaveOutTilted() {
     for (;;) {
-      bool is_found = false;
-      for (;;) {
-        auto worst = MostTilted();
+      const std::vector<FoundClosure> closures = choice_.believed;
+      std::vector<std::size_t> tilted;
+      for (auto worst = MostTilted();; worst = MostTilted()) {
         if (!worst) return worst.error();
         if (!*worst) break;
         left_out_.insert(**worst);
-        is_found = true;
-        const SubmapPoses before = poses_.T_world_submap;
-        ATLAS_RETURN_IF_ERROR(Settle(choice_.believed, &before));
+        tilted.push_back((*worst)->first);
+        ATLAS_RETURN_IF_ERROR(SettleAgain(closures));
       }
-      if (!is_found) return {};
+      if (tilted.empty()) return {};
+      // The last one was it; those before it may have been bent by it.
+      tilted.pop_back();
+      for (const std::size_t session : tilted) ATLAS_RETURN_IF_ERROR(TakeBack(session, closures));
       if (options_.refinements > 0) ATLAS_RETURN_IF_ERROR(Refine());
     }
+  }
+
+  // If nobody is tilted with it.
+  Status TakeBack(std::size_t session, const std::vector<FoundClosure>& closures) {
+    auto why = left_out_.extract(session);
+    ATLAS_RETURN_IF_ERROR(SettleAgain(closures));
+    const auto worst = MostTilted();
+    if (!worst) return worst.error();
+    if (!*worst) return {};
+    left_out_.insert(std::move(why));
+    return SettleAgain(closures);
+  }
+
+  Status SettleAgain(const std::vector<FoundClosure>& closures) {
+    const SubmapPoses before = poses_.T_world_submap;
+    return Settle(closures, &before);
   }
 
   Result<std::optional<std::pair<std::size_t, std::string>>> MostTilted() {

@@ -107,5 +107,37 @@ TEST(TiltedSessionTest, WhoMeetsItIsNotBentByIt) {
   EXPECT_TRUE(plan->closures.empty());
 }
 
+// All three by as much, of which one alone has a part in it: it is the last to go, and the others
+// come back.
+TEST(TiltedSessionTest, WhoWasTiltedByItIsNotBlamed) {
+  std::vector<MergeSession> sessions{LevelSession("level", 0.0, 61),
+                                     LevelSession("tilted", 0.0, 41),
+                                     LevelSession("bent", 20.0, 31)};
+  sessions[0].is_staged = false;
+  // What lies 2.7 degrees off can only be reached where the one that is tilted is reached.
+  const Pose roll(Eigen::AngleAxisd(2.7 * std::numbers::pi / 180.0, Eigen::Vector3d::UnitX()));
+  const MoreClosures meet = [&](const auto&, const auto&) {
+    std::vector<FoundClosure> closures;
+    for (const std::size_t i : {0U, 1U, 2U}) {
+      const Pose T_world_a = StoredPose(sessions[0], sessions[0].submaps[i]);
+      const Pose off = T_world_a.inverse() * roll * T_world_a;
+      closures.push_back(FoundAsStored(sessions, {0, i}, {1, i}, off));
+      closures.push_back(FoundAsStored(sessions, {1, i}, {2, i}));
+    }
+    return closures;
+  };
+  MergeOptions options;
+  options.graph.tilt_sigma_rad = 0.2;  // gravity does not hold them
+  MergeWork work = MergeWork::Temporary().value();
+  const auto plan = PlanMerge(sessions, {Level(), Level(), Level()}, {MapProfile(), options, work},
+                              nullptr, meet);
+  ASSERT_TRUE(plan.has_value()) << plan.error().message();
+  EXPECT_TRUE(plan->sessions[0].is_joined);
+  EXPECT_TRUE(plan->sessions[0].moved.empty());
+  EXPECT_NE(plan->sessions[1].why_not.find("levelled otherwise"), std::string::npos)
+      << plan->sessions[1].why_not;
+  EXPECT_EQ(plan->sessions[2].why_not, "meets no session of the map often enough");
+}
+
 }  // namespace
 }  // namespace atlas
