@@ -24,13 +24,17 @@ class DriveLocalization {
     for (const SelectedScan& selected : SelectScans(drive_, options_.selection)) {
       const DriveScan& scan = drive_.scans[selected.index];
       const Result<PointCloud> cloud = ReadScan(scan.scan);
-      if (!cloud) return Error(cloud.error());
+      if (!cloud && !(IsDamaged(cloud.error()) && !options_.shots)) return Error(cloud.error());
+      ++report_.scans;
+      if (!cloud) {
+        NoteUnreadable(scan, cloud.error());
+        continue;
+      }
       const bool is_start = last_part != selected.session_part;
       const Status status = options_.shots ? Shoot(scan, *cloud)
                                            : Track(scan, *cloud, is_start, last_part.has_value());
       if (!status.ok()) return Error(status.WithContext(StrCat("scan ", scan.number)));
       last_part = selected.session_part;
-      ++report_.scans;
     }
     return report_;
   }
@@ -59,7 +63,7 @@ class DriveLocalization {
     const Eigen::Quaterniond R_level_sensor = DisturbedLevel(
         scan.T_world_sensor, options_.tilt_error_rad, {options_.seed, scan.number, 0});
     LocalizedScan localized;
-    localized.is_after_jump = is_start && is_after_jump;
+    localized.is_after_jump = is_start && is_after_jump && options_.is_restarted;
     return Localize(scan, cloud, R_level_sensor, localized);
   }
 
@@ -75,14 +79,30 @@ class DriveLocalization {
     localized.scan = scan.number;
     localized.time_s = scan.time_s;
     localized.located = *std::move(located);
+    last_ = localized.located.T_world_sensor;
     Judge(scan.T_world_sensor, localized);
     on_scan_(localized);
     return {};
   }
 
+  static bool IsDamaged(const Status& status) { return status.code() == StatusCode::kInvalidData; }
+
+  // Lost, where the scan before it was.
+  void NoteUnreadable(const DriveScan& scan, const Status& why) {
+    report_.unreadable.push_back({scan.number, why});
+    LocalizedScan localized;
+    localized.scan = scan.number;
+    localized.time_s = scan.time_s;
+    localized.located.T_world_sensor = last_.value_or(scan.T_world_sensor);
+    localized.located.health = LocalizationHealth::kLost;
+    Judge(scan.T_world_sensor, localized);
+    on_scan_(localized);
+  }
+
   void Judge(const Pose& truth, LocalizedScan& localized) {
     const LocatedScan& located = localized.located;
     const bool is_lost = located.health == LocalizationHealth::kLost;
+    const bool is_good = located.health == LocalizationHealth::kGood;
     localized.error = ErrorOf(located.T_world_sensor, truth);
     localized.offset = OffsetOf(located.T_world_sensor, truth);
     localized.is_failure = IsFailure(localized.error, is_lost);
@@ -90,6 +110,9 @@ class DriveLocalization {
       localized.covariance = AlongHeading(*located.covariance, truth);
       localized.normalized_square = NormalizedSquare(localized.offset, *localized.covariance);
     }
+    report_.good += is_good ? 1U : 0U;
+    report_.weak += !is_good && !is_lost ? 1U : 0U;
+    report_.good_failures += is_good && localized.is_failure ? 1U : 0U;
     report_.score.Add(localized.error, is_lost);
     report_.cpu_s += localized.cpu_s;
   }
@@ -98,6 +121,7 @@ class DriveLocalization {
   const DriveLocalizationOptions& options_;
   const std::function<void(const LocalizedScan&)>& on_scan_;
   ScanLocalizer& localizer_;
+  std::optional<Pose> last_;
   DriveLocalizationReport report_;
 };
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include "client/drive/drive_monitor.h"
 #include "client/drive/drive_selection.h"
@@ -65,17 +66,30 @@ struct LocalizedScan {
   double cpu_s = 0.0;
 };
 
+struct UnreadableScan {
+  std::uint32_t scan = 0;
+  Status why;
+};
+
 struct DriveLocalizationReport {
   LocalizationScore score;
   std::uint64_t scans = 0;
-  std::uint64_t restarts = 0;  // after jumps
-  double cpu_s = 0.0;          // segmentation and tiles included
+  // What the localizer said of its shots, and how often it said good where it was a failure.
+  std::uint64_t good = 0;
+  std::uint64_t weak = 0;
+  std::uint64_t good_failures = 0;
+  std::vector<UnreadableScan> unreadable;  // damaged, while tracking: lost there, and it goes on
+  std::uint64_t restarts = 0;              // after jumps
+  double cpu_s = 0.0;                      // segmentation and tiles included
   DeskewDecision deskewing;
 
   // Shots a CPU second.
   double hz() const { return cpu_s > 0.0 ? static_cast<double>(score.shots()) / cpu_s : 0.0; }
 };
 
+// `on_scan` is told of each scan, of those that are unreadable, too. Errors are those of the
+// options, of the map and of files: a damaged scan ends single shots, and what comes before
+// tracking.
 Result<DriveLocalizationReport> LocalizeDrive(
     const DriveFolder& drive,
     const DriveLocalizationOptions& options,

@@ -79,13 +79,16 @@ std::string CsvLine(const LocalizedScan& scan) {
   return std::move(line.Add(std::string(scan.is_after_jump ? "1" : "0"))).End();
 }
 
+// Where it is lost it is nowhere, and the times of the others say so.
 std::string TumLine(const LocalizedScan& scan) {
+  if (scan.located.health == LocalizationHealth::kLost) return {};
   Line line(' ');
   line.Add(scan.time_s.value_or(scan.scan));
   AddPlace(scan.located.T_world_sensor, line);
   return std::move(line).End();
 }
 
+// A line a scan: where it is lost, where it thought it was.
 std::string KittiLine(const LocalizedScan& scan) {
   Line line(' ');
   for (const double number : PoseToRowMajor(scan.located.T_world_sensor)) {

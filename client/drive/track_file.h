@@ -11,9 +11,13 @@
 namespace atlas {
 
 enum class TrackFormat {
-  kCsv,    // a line a scan with errors, health and sigmas; the first line names the columns
-  kTum,    // "time x y z qx qy qz qw", T_world_sensor; scans' numbers where there is no time
-  kKitti,  // 12 numbers, 3x4 row-major, T_world_sensor, as poses.txt
+  kCsv,  // a line a scan with errors, health and sigmas; the first line names the columns
+  // "time x y z qx qy qz qw", T_world_sensor; scans' numbers where there is no time. None of a scan
+  // that is lost.
+  kTum,
+  // 12 numbers, 3x4 row-major, T_world_sensor, as poses.txt: a line a scan, also of one that is
+  // lost, where it thought it was.
+  kKitti,
 };
 
 // By the name's ending, .csv, .tum or .kitti in letters of either case; else kInvalidArgument.

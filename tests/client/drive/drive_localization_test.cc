@@ -106,6 +106,54 @@ TEST_F(DriveLocalizationTest, LostAndFarOffAreFailures) {
   EXPECT_TRUE(scans_[0].is_failure && scans_[1].is_failure);
 }
 
+TEST_F(DriveLocalizationTest, HealthIsCountedAndSoIsWhatWasCalledGoodAndIsNot) {
+  ScriptedLocalizer localizer({{{0, 0, 0}},
+                               {{2.5, 0, 0}},
+                               {{2.0, 0, 0}, LocalizationHealth::kWeak},
+                               {{9, 0, 0}, LocalizationHealth::kLost},
+                               {{1, 0, 0}}});
+  const auto report = Run(localizer);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->good, 3U);
+  EXPECT_EQ(report->weak, 1U);
+  EXPECT_EQ(report->score.lost(), 1U);
+  EXPECT_EQ(report->good_failures, 1U);
+}
+
+TEST_F(DriveLocalizationTest, NoRestartIsNone) {
+  options_.is_restarted = false;
+  ScriptedLocalizer localizer({{}, {{1, 0, 0}}, {{2, 0, 0}}, {{103, 0, 0}}, {{104, 0, 0}}});
+  const auto report = Run(localizer);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->restarts, 0U);
+  for (const LocalizedScan& scan : scans_) EXPECT_FALSE(scan.is_after_jump);
+}
+
+TEST_F(DriveLocalizationTest, ADamagedScanIsLostAndTrackingGoesOn) {
+  std::filesystem::resize_file(drive_.scans[1].scan, 10);
+  ScriptedLocalizer localizer({{}, {{2, 0, 0}}, {{0, 0, 0}}, {{1, 0, 0}}});
+  const auto report = Run(localizer);
+  ASSERT_TRUE(report.has_value()) << report.error().message();
+  ASSERT_EQ(report->unreadable.size(), 1U);
+  EXPECT_EQ(report->unreadable[0].scan, 1U);
+  EXPECT_NE(report->unreadable[0].why.message().find("truncated"), std::string::npos);
+  EXPECT_EQ(report->scans, 5U);
+  EXPECT_EQ(report->score.lost(), 1U);
+  EXPECT_EQ(report->score.failures(), 1U);
+  ASSERT_EQ(scans_.size(), 5U);
+  EXPECT_EQ(scans_[1].scan, 1U);
+  EXPECT_EQ(scans_[1].located.health, LocalizationHealth::kLost);
+  EXPECT_TRUE(scans_[1].located.T_world_sensor.isApprox(scans_[0].located.T_world_sensor));
+  EXPECT_EQ(report->restarts, 1U);
+}
+
+TEST_F(DriveLocalizationTest, ADamagedScanEndsSingleShots) {
+  options_.shots = {0.4, 0.02, 1};
+  std::filesystem::resize_file(drive_.scans[1].scan, 10);
+  ScriptedLocalizer localizer({{}, {}});
+  EXPECT_EQ(Run(localizer).error().code(), StatusCode::kInvalidData);
+}
+
 TEST_F(DriveLocalizationTest, ShotsStartAnewEachTime) {
   options_.selection.end = 1;
   options_.shots = {0.4, 0.02, 3};

@@ -88,6 +88,13 @@ TEST(TrackFileTest, TumIsTimePlaceAndQuaternion) {
   EXPECT_EQ(TrackText(TrackFormat::kTum, std::vector{timeless}).substr(0, 10), "42.000000 ");
 }
 
+TEST(TrackFileTest, WhereItIsLostTumHasNoPlaceAndKittiALine) {
+  LocalizedScan lost = Sample();
+  lost.located.health = LocalizationHealth::kLost;
+  EXPECT_EQ(TrackText(TrackFormat::kTum, std::vector{lost}), "");
+  EXPECT_EQ(Split(TrackText(TrackFormat::kKitti, std::vector{lost}), ' ').size(), 12U);
+}
+
 TEST(TrackFileTest, KittiIsAPoseARow) {
   const auto fields = Split(TrackText(TrackFormat::kKitti, std::vector{Sample()}), ' ');
   ASSERT_EQ(fields.size(), 12U);

@@ -50,12 +50,20 @@ boost::json::object SummaryJson(const DriveLocalizationReport& report,
       {"translation_p95_m", ErrorJson(report.score, report.score.translation_p95_m())},
       {"failures", report.score.failures()},
       {"lost", report.score.lost()},
+      {"good", report.good},
+      {"weak", report.weak},
+      {"good_failures", report.good_failures},
       {"restarts", report.restarts},
       {"scans", report.scans},
       {"shots", report.score.shots()},
       {"hz", Rounded(report.hz(), 2)},
       {"bytes_received", bytes_received}};
   if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
+  for (const UnreadableScan& scan : report.unreadable) {
+    if (!json.contains("unreadable")) json["unreadable"] = boost::json::array();
+    json["unreadable"].as_array().push_back(
+        boost::json::object{{"scan", scan.scan}, {"error", scan.why.message()}});
+  }
   return json;
 }
 
@@ -71,11 +79,25 @@ void PrintSummary(const DriveLocalizationReport& report,
                          : StrCat(FixedText(score.translation_rmse_m(), 3), " m, ",
                                   FixedText(score.rotation_rmse_deg(), 3), " deg RMSE; ",
                                   FixedText(score.translation_p95_m(), 3), " m at 95 %"));
-  facts.Add("failures", StrCat(score.failures(), ", of them ", score.lost(), " lost"));
+  facts.Add("failures", StrCat(score.failures(), ", of them ", score.lost(), " lost and ",
+                               report.good_failures, " called good"));
+  facts.Add("health",
+            StrCat(report.good, " good, ", report.weak, " weak, ", score.lost(), " lost"));
   if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
   facts.Add("speed", FixedText(report.hz(), 1) + " scans a CPU second");
   facts.Add("received", BytesText(bytes_received));
   facts.Print(out);
+}
+
+// What was asked for is done; that scans were damaged is an error all the same.
+Status StatusOf(const DriveLocalizationReport& report) {
+  if (report.unreadable.empty()) return {};
+  const Status& first = report.unreadable.front().why;
+  const std::size_t count = report.unreadable.size();
+  return {first.code(), StrCat(count, count == 1 ? " scan" : " scans",
+                               " could not be read and counted as lost, the others were localized; "
+                               "the first: ",
+                               first.message())};
 }
 
 class LocalizeCommand : public Command {
@@ -123,7 +145,7 @@ class LocalizeCommand : public Command {
     ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
     ATLAS_RETURN_IF_ERROR(contradictions_.Write(map->profile().cell_size_m()));
     PrintReport(*report, monitor, map->bytes_received(), context);
-    return {};
+    return StatusOf(*report);
   }
 
  private:

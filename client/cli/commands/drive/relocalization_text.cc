@@ -1,6 +1,7 @@
 #include "client/cli/commands/drive/relocalization_text.h"
 
 #include <optional>
+#include <string>
 
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
@@ -62,10 +63,13 @@ boost::json::object RelocalizationJson(const DriveRelocalizationReport& report) 
 void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& out) {
   FactList facts;
   facts.Add("scans", StrCat(report.scans, " in a map of ", report.places, " places"));
-  facts.Add("found",
-            StrCat(report.right, " within ", FixedText(DriveRelocalizationReport::kRight_m, 1),
-                   " m; ", FixedText(report.score.translation_rmse_m(), 3), " m, ",
-                   FixedText(report.score.rotation_rmse_deg(), 3), " deg RMSE"));
+  std::string found =
+      StrCat(report.right, " within ", FixedText(DriveRelocalizationReport::kRight_m, 1), " m");
+  if (report.score.successes() > 0) {
+    found += StrCat("; ", FixedText(report.score.translation_rmse_m(), 3), " m, ",
+                    FixedText(report.score.rotation_rmse_deg(), 3), " deg RMSE");
+  }
+  facts.Add("found", found);
   facts.Add("wrong", StrCat(report.wrong));
   facts.Add("don't know", StrCat(report.unknown));
   facts.Add("CPU", StrCat(FixedText(CpuPerScan(report), 3), " s a scan, at most ",
