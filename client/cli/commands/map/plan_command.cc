@@ -68,6 +68,20 @@ void PrintRoute(const Route& route, double ms, std::ostream& out) {
       << ", " << route.tiles_loaded << " tiles loaded, " << FixedText(ms, 0) << " ms CPU\n";
 }
 
+// Whether it is the map or the vehicle, nobody can tell without planning for another one.
+Status NoRoute(const PlanOptions& vehicle) {
+  return {
+      StatusCode::kNotFound,
+      StrCat("no route: what start and goal stand on is not joined, for a vehicle ",
+             vehicle.vehicle_width_m, " m wide (--width) with ", vehicle.safety_margin_m,
+             " m to each side (--margin) that needs ", vehicle.headroom_m,
+             " m of height (--headroom) and drives slopes of ", vehicle.max_slope_deg,
+             " degrees (--max-slope-deg)",
+             vehicle.allow_unknown
+                 ? ""
+                 : " and only over what was found free (--allow-unknown: over all that was seen)")};
+}
+
 class PlanCommand : public Command {
  public:
   std::string Name() const override { return "plan"; }
@@ -118,7 +132,7 @@ class PlanCommand : public Command {
       PrintRoute(*route, ms, context.out);
     }
     if (failure.ok() && !route->found) {
-      failure = {StatusCode::kNotFound, "no route: what start and goal stand on is not joined"};
+      failure = NoRoute(request_.options);
     }
     return failure;
   }
