@@ -1,5 +1,6 @@
 #include "client/merge/plan/closure_choice.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <utility>
@@ -22,7 +23,9 @@ std::size_t CountPlaces(const std::vector<Closure>& closures, const std::vector<
 
 ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
                              const std::vector<SessionWay>& ways,
-                             const MergeOptions& options) {
+                             const MergeOptions& options,
+                             const IsAsKnown& is_as_known) {
+  constexpr std::size_t kFewButKnown = 2;
   std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> by_sessions;
   for (std::size_t i = 0; i < found.size(); ++i) {
     by_sessions[{found[i].a.session, found[i].b.session}].push_back(i);
@@ -41,8 +44,13 @@ ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
     const bool has_rival =
         next_weight > 0.0 && CountPlaces(closures, sets[1]) >= options.min_closures;
     if (next_weight > 0.0) meeting.margin = WeightOf(closures, sets[0]) / next_weight;
-    meeting.is_believed = CountPlaces(closures, sets[0]) >= options.min_closures &&
-                          (!has_rival || meeting.margin >= options.min_margin);
+    const bool is_enough = CountPlaces(closures, sets[0]) >= options.min_closures;
+    const bool is_known = is_as_known && sets[0].size() >= kFewButKnown &&
+                          std::all_of(sets[0].begin(), sets[0].end(), [&](std::size_t k) {
+                            return is_as_known(found[indices[k]]);
+                          });
+    meeting.is_believed =
+        (is_enough || is_known) && (!has_rival || meeting.margin >= options.min_margin);
     choice.meetings.push_back(meeting);
     std::set<std::size_t> agreeing(sets[0].begin(), sets[0].end());
     for (std::size_t k = 0; k < indices.size(); ++k) {

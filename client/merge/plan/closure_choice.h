@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "client/merge/plan/closure_search.h"
@@ -28,10 +29,16 @@ struct ClosureChoice {
   std::vector<SessionMeeting> meetings;  // rising, those of which anything was found
 };
 
+// Whether the others have the two submaps of a closure nearly where it has them: they hang together
+// without it.
+using IsAsKnown = std::function<bool(const FoundClosure&)>;
+
 // `ways` of each session, as its own links have it. A set counts by the fewer of the two sessions'
-// submaps that have a part in it.
+// submaps that have a part in it: `min_closures`, or, where all of it is as known, two closures.
+// `is_as_known` may be empty: nothing is.
 ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
                              const std::vector<SessionWay>& ways,
-                             const MergeOptions& options);
+                             const MergeOptions& options,
+                             const IsAsKnown& is_as_known = nullptr);
 
 }  // namespace atlas

@@ -27,6 +27,13 @@ void KeepLikeliest(std::vector<FoundClosure>& closures) {
 
 }  // namespace
 
+bool IsNearlyThere(const Pose& T_a_b, const Pose& T_a_b_expected, const MergeOptions& options) {
+  const double turned = Eigen::Quaterniond(T_a_b.linear())
+                            .angularDistance(Eigen::Quaterniond(T_a_b_expected.linear()));
+  return (T_a_b.translation() - T_a_b_expected.translation()).norm() <= options.max_surprise_m &&
+         turned <= options.max_surprise_rad;
+}
+
 ClosureSearch::ClosureSearch(const std::vector<MergeSession>& sessions,
                              const std::vector<SessionWay>& ways,
                              const MergeContext& context)
@@ -210,10 +217,7 @@ bool ClosureSearch::IsExpected(const Task& task, const SubmapMatch& match) const
   if (task.reach) {
     return true;  // it was looked for
   }
-  const double turned = Eigen::Quaterniond(match.T_a_b.linear())
-                            .angularDistance(Eigen::Quaterniond(task.T_a_b.linear()));
-  return (match.T_a_b.translation() - task.T_a_b.translation()).norm() <= options_.max_surprise_m &&
-         turned <= options_.max_surprise_rad;
+  return IsNearlyThere(match.T_a_b, task.T_a_b, options_);
 }
 
 // Pairs of a few submaps on end are one worker's, one submap after the other: what is prepared of

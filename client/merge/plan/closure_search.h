@@ -23,6 +23,9 @@ struct FoundClosure {
   SubmapMatch match;
 };
 
+// Within `max_surprise_m` and `max_surprise_rad`.
+bool IsNearlyThere(const Pose& T_a_b, const Pose& T_a_b_expected, const MergeOptions& options);
+
 // Its calls return closures that are believed one by one, rising, each pair once. Errors are those
 // of the work and of `progress`, which may be empty.
 class ClosureSearch {

@@ -81,7 +81,8 @@ struct MergeOptions {
   double guided_height_m = 1.0;
   std::size_t guided_neighbours = 2;  // in each session,
   std::size_t guided_most = 12;       // and of all earlier ones together, one of each first
-  double max_surprise_m = 1.0;        // of a match from where it was expected
+  // Of a match from where it was expected: where a loop is not closed yet, a metre and more.
+  double max_surprise_m = 2.0;
   double max_surprise_rad = 3.0 * std::numbers::pi / 180.0;
   int guided_rounds = 3;
 

@@ -189,6 +189,13 @@ class Planner {
   // other: without them again.
   Status Settle(std::vector<FoundClosure> found, const SubmapPoses* start) {
     constexpr int kAttempts = 3;
+    const std::vector<std::size_t> known_parts = parts_.part_of;
+    const IsAsKnown is_as_known = [&](const FoundClosure& closure) {
+      if (known_parts[closure.a.session] != known_parts[closure.b.session]) return false;
+      const Pose expected = (*start)[closure.a.session][closure.a.submap].inverse() *
+                            (*start)[closure.b.session][closure.b.submap];
+      return IsNearlyThere(closure.match.T_a_b, expected, options_);
+    };
     if (more_closures_) {
       const std::vector<FoundClosure> more = more_closures_(found, ways_);
       found.insert(found.end(), more.begin(), more.end());
@@ -197,7 +204,7 @@ class Planner {
       return IsLeftOut(closure.a.session) || IsLeftOut(closure.b.session);
     });
     for (int attempt = 1;; ++attempt) {
-      choice_ = ChooseClosures(found, ways_, options_);
+      choice_ = ChooseClosures(found, ways_, options_, start != nullptr ? is_as_known : nullptr);
       plan_.rejected += choice_.rejected.size();
       ATLAS_RETURN_IF_ERROR(Place(start));
       const std::size_t believed = choice_.believed.size();

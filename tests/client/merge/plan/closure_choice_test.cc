@@ -65,6 +65,20 @@ TEST_F(ClosureChoiceTest, EnoughThatAgreeAreBelieved) {
   EXPECT_TRUE(meeting.is_believed);
 }
 
+TEST_F(ClosureChoiceTest, TwoAreEnoughWhereTheOthersHaveThemThere) {
+  const std::vector<FoundClosure> found{Meeting({0, 1}, {1, 1}), Meeting({0, 1}, {1, 2})};
+  const IsAsKnown all = [](const FoundClosure&) {
+    return true;
+  };
+  const IsAsKnown one = [](const FoundClosure& closure) {
+    return closure.b.submap == 1;
+  };
+  EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 2U);
+  EXPECT_TRUE(ChooseClosures(found, ways_, options_, one).believed.empty());
+  EXPECT_TRUE(ChooseClosures(found, ways_, options_).believed.empty());
+  EXPECT_TRUE(ChooseClosures({found[0]}, ways_, options_, all).believed.empty()) << "one is chance";
+}
+
 TEST_F(ClosureChoiceTest, TooFewAreNot) {
   const ClosureChoice choice = Choose({Meeting({0, 1}, {1, 1}), Meeting({0, 3}, {1, 3})});
   EXPECT_TRUE(choice.believed.empty());
