@@ -62,6 +62,11 @@ MergePicture MergeRun::Picture() const {
     const std::vector<Eigen::Vector2d>& b_after = picture.sessions[closure.b.session].after;
     picture.closures_after.emplace_back(a_after[a], b_after[b]);
   }
+  const double side_m = profile.tile_size_m();
+  for (const TileId& id : plan.tiles) {
+    const Eigen::Vector2d corner = side_m * Eigen::Vector2d(id.x, id.y);
+    picture.tiles.emplace_back(corner, corner + Eigen::Vector2d::Constant(side_m));
+  }
   return picture;
 }
 

@@ -11,6 +11,7 @@
 #include "client/merge/plan/merge_graph.h"
 #include "client/merge/plan/pose_correction.h"
 #include "client/merge/plan/prior_frame.h"
+#include "client/merge/plan/rejected_closures.h"
 #include "client/merge/plan/session_links.h"
 #include "client/merge/plan/session_parts.h"
 
@@ -126,6 +127,7 @@ class Planner {
       const std::vector<FoundClosure> more = more_closures_(found, ways_);
       found.insert(found.end(), more.begin(), more.end());
     }
+    rejected_.Note(found);
     for (int attempt = 1;; ++attempt) {
       choice_ = ChooseClosures(found, ways_, options_);
       plan_.rejected += choice_.rejected.size();
@@ -202,6 +204,7 @@ class Planner {
       ATLAS_RETURN_IF_ERROR(LookAtEffect(i, outcome));
     }
     CountClosures();
+    ListRejected();
     plan_.closures = choice_.believed;
     plan_.meetings = choice_.meetings;
     plan_.links = links_;
@@ -261,6 +264,15 @@ class Planner {
     }
   }
 
+  void ListRejected() {
+    for (FoundClosure& closure : rejected_.Without(choice_.believed)) {
+      const Pose off = OffOf(closure);
+      const bool is_placed = parts_.part_of[closure.a.session] == parts_.part_of[closure.b.session];
+      plan_.rejected_closures.push_back({std::move(closure), is_placed, off.translation().norm(),
+                                         Eigen::AngleAxisd(off.linear()).angle()});
+    }
+  }
+
   std::vector<MergeSession>& sessions_;
   const std::vector<BlobReader>& readers_;
   const MergeContext& context_;
@@ -270,6 +282,7 @@ class Planner {
   std::vector<std::vector<SessionLink>> links_;
   std::vector<SessionWay> ways_;
   ClosureChoice choice_;
+  RejectedClosures rejected_;
   SessionParts parts_;
   std::vector<bool> is_held_;
   std::vector<PriorUse> priors_;

@@ -42,6 +42,15 @@ struct SessionOutcome {
   std::vector<MovedKeyframe> moved;  // none of a session that is not joined
 };
 
+// One that was found at some time and is not believed in the end.
+struct RejectedClosure {
+  FoundClosure closure;
+  // Its sessions hang together, so that it is off by what is left between its submaps.
+  bool is_placed = false;
+  double off_m = 0.0;
+  double off_rad = 0.0;
+};
+
 struct MergePlan {
   std::vector<SessionOutcome> sessions;  // as they were given
   std::vector<FoundClosure> closures;    // that are believed
@@ -52,6 +61,8 @@ struct MergePlan {
   int rounds = 0;                               // of the guided search
   std::vector<std::vector<SessionLink>> links;  // by session
   std::set<TileId> tiles;                       // of level 0, that would be fused again
+  // Of each two submaps one, rising.
+  std::vector<RejectedClosure> rejected_closures;
 };
 
 // Closures from elsewhere, which are judged with those that were found by `ways`, each time that

@@ -14,7 +14,7 @@ from harness import Daemon  # noqa: E402
 from merge_harness import COARSE, Merges, Watched, run_group  # noqa: E402
 
 KEYS = {"revision", "sessions", "left_out", "closures", "rejected", "closure_rms_m", "closure_rms_deg",
-        "keyframes_moved", "published", "tiles", "applied"}
+        "keyframes_moved", "published", "tiles", "applied", "rejected_closures", "pairs", "tile_size_m", "fused_tiles"}
 APPLIED_KEYS = KEYS | {"batch", "updated", "tiles_marked", "revision_after"}
 SESSION_KEYS = {"vehicle", "session", "was_staged", "joined", "held", "keyframes", "moved", "rms_move_m", "max_move_m",
                 "submaps", "submaps_met", "closures"}
@@ -25,7 +25,9 @@ def nothing_cases(merges):
     report = merges.report
     empty = merges.merged("an empty daemon")
     report.equal("an empty daemon", (empty["sessions"], empty["applied"]), ([], False))
-    report.check("an empty daemon, for people", "nothing to do" in merges.merge("run").stdout)
+    people = merges.merge("run").stdout
+    report.check("an empty daemon, for people", "nothing to do" in people and "no closures; 0 rejected" in people and
+                 "no tiles to be fused again" in people and "0.000" not in people, people)
     merges.ingest("garage")  # in the map at once
     alone = merges.merged("one in the map")  # it is as good as it can be made
     report.equal("one in the map", ([one["joined"] for one in alone["sessions"]], alone["published"]), ([True], 0))
@@ -35,6 +37,32 @@ def nothing_cases(merges):
     left = merges.merged("one retracted")
     report.equal("one retracted", (left["sessions"], [one["why"] for one in left["left_out"]]), ([], ["retracted"]))
     report.equal("one retracted: restored", merges.call("session", "restore", "garage/day").returncode, 0)
+
+
+def tables_cases(merges, dry):
+    """What is found of each two sessions, and which tiles would change: the same for people and for scripts."""
+    report = merges.report
+    pairs = {(one["a"]["vehicle"], one["b"]["vehicle"]): one for one in dry["pairs"]}
+    met = pairs.get(("first", "second"), {})
+    report.equal("a dry run: a pair's keys", set(met), {"a", "b", "closures", "rejected", "rms_m", "rms_deg"})
+    report.equal("a dry run: closures by pair", sum(one["closures"] for one in dry["pairs"]), len(dry["closures"]))
+    report.equal("a dry run: rejected ones by pair", sum(one["rejected"] for one in dry["pairs"]),
+                 len(dry["rejected_closures"]))
+    report.check("a dry run: rejected ones", all(set(one) == {"a", "b", "fit", "off_m", "off_deg"}
+                                                 for one in dry["rejected_closures"]), dry["rejected_closures"])
+    by_level = [sum(tile["level"] == level for tile in dry["fused_tiles"]) for level in range(8)]
+    finest = {(tile["x"], tile["y"]) for tile in dry["fused_tiles"] if tile["level"] == 0}
+    above = {(tile["x"], tile["y"]) for tile in dry["fused_tiles"] if tile["level"] == 1}
+    report.equal("a dry run: tiles of level 0", (by_level[0], len(finest)), (dry["tiles"], dry["tiles"]))
+    report.equal("a dry run: tiles above them", above, {(x // 2, y // 2) for x, y in finest})
+    report.equal("a dry run: a tile's side", dry["tile_size_m"], 25.6)
+    people = merges.merge("run", "--dry-run").stdout
+    lines = [" ".join(line.split()) for line in people.splitlines()]
+    report.check("a dry run, for people: closures by pair",
+                 f"first/day second/day {met['closures']} {met['rejected']} {met['rms_m']:.3f} {met['rms_deg']:.3f}" in lines,
+                 people)
+    report.check("a dry run, for people: tiles by level",
+                 f"tiles to be fused again: {by_level[0]} of level 0, {by_level[1]} of level 1, " in people, people)
 
 
 def dry_run_cases(merges, work):
@@ -52,6 +80,7 @@ def dry_run_cases(merges, work):
     report.equal("a dry run: published would be", (dry["published"], dry["applied"]), (2, False))
     report.check("a dry run: closures", len(dry["closures"]) >= 3 and
                  set(dry["closures"][0]) == {"a", "b", "fit", "off_m", "off_deg"}, dry["closures"])
+    tables_cases(merges, dry)
     report.equal("a dry run: the picture", picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
     lines = corrections.read_text(encoding="ascii").splitlines()
     report.equal("a dry run: corrections", len([line for line in lines if line and line[0] != "#"]),

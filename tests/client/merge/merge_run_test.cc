@@ -58,7 +58,11 @@ TEST(MergeRunTest, StagedSessionsThatAreJoinedArePublished) {
 TEST(MergeRunTest, ThePictureHasWaysBeforeAndAfter) {
   MergeRun run = SomeRun();
   run.plan.closures.push_back(testing::Found({1, 0}, {2, 0}, At(0.0)));
+  run.plan.tiles = {{0, -1, 2}};
   const MergePicture picture = run.Picture();
+  ASSERT_EQ(picture.tiles.size(), 1U);
+  EXPECT_NEAR(picture.tiles[0].min().x(), -12.8, 1e-9);
+  EXPECT_NEAR(picture.tiles[0].max().y(), 38.4, 1e-9);
   ASSERT_EQ(picture.sessions.size(), 4U);
   EXPECT_EQ(picture.sessions[1].name, "moved/drive");
   EXPECT_EQ(picture.sessions[3].name, "apart/drive, stays as it is");

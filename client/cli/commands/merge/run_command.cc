@@ -8,6 +8,7 @@
 #include "client/cli/command_line/interruption.h"
 #include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/merge/merge_commands.h"
+#include "client/cli/commands/merge/merge_json.h"
 #include "client/cli/commands/merge/merge_sources.h"
 #include "client/cli/commands/merge/merge_text.h"
 #include "client/cli/files/change_file.h"

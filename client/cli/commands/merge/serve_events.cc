@@ -5,7 +5,7 @@
 
 #include <boost/json/array.hpp>
 
-#include "client/cli/commands/merge/merge_text.h"
+#include "client/cli/commands/merge/merge_json.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
