@@ -1,5 +1,6 @@
 #include "client/merge/merge_run.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -43,6 +44,25 @@ std::vector<Pose> MergeRun::PosesAfter(std::size_t session) const {
     poses[moved.keyframe] = moved.T_world_sensor.ToPose();
   }
   return poses;
+}
+
+std::vector<UnmergedSession> UnmergedOf(const MergeRun& run,
+                                        const std::vector<SessionKey>& wanted) {
+  std::vector<UnmergedSession> unmerged;
+  for (const SessionKey& key : wanted) {
+    const auto session = std::find_if(run.sessions.begin(), run.sessions.end(),
+                                      [&](const MergeSession& one) { return one.key == key; });
+    if (session != run.sessions.end()) {
+      const auto i = static_cast<std::size_t>(session - run.sessions.begin());
+      const SessionOutcome& outcome = run.plan.sessions[i];
+      if (!outcome.is_joined) unmerged.push_back({key, outcome.why_not, !outcome.is_refused});
+      continue;
+    }
+    const auto left_out = std::find_if(run.left_out.begin(), run.left_out.end(),
+                                       [&](const LeftOut& one) { return one.key == key; });
+    if (left_out != run.left_out.end()) unmerged.push_back({key, left_out->why});
+  }
+  return unmerged;
 }
 
 MergePicture MergeRun::Picture() const {

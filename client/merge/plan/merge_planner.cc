@@ -244,6 +244,7 @@ class Planner {
                                           readers_[session], context_.profile, plan_.tiles);
     if (status.code() != StatusCode::kInvalidData) return status;
     outcome.is_joined = false;
+    outcome.is_refused = true;
     outcome.moved.clear();
     outcome.why_not = status.message();
     return {};

@@ -31,7 +31,9 @@ struct SessionOutcome {
   // the others.
   bool is_joined = false;
   bool is_held = false;  // it is in the map, and where it should be
-  std::string why_not;   // it is not joined; for people
+  // It meets them, and cannot lie where it belongs: nothing that comes later helps.
+  bool is_refused = false;
+  std::string why_not;  // it is not joined; for people
   std::size_t closures = 0;
   std::size_t submaps_met = 0;  // that have one, of so many:
   std::size_t submaps = 0;

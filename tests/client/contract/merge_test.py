@@ -10,7 +10,7 @@ import signal
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
-from harness import Daemon  # noqa: E402
+from harness import EXIT, Daemon  # noqa: E402
 from merge_harness import COARSE, Merges, Watched, run_group  # noqa: E402
 
 KEYS = {"revision", "sessions", "left_out", "closures", "rejected", "closure_rms_m", "closure_rms_deg",
@@ -89,6 +89,12 @@ def dry_run_cases(merges, work):
     one = merges.merged("one session", "--dry-run", "--session", "second/day")
     report.equal("one session", ([s["vehicle"] for s in one["sessions"]], sorted(o["vehicle"] for o in one["left_out"])),
                  (["second"], ["first", "garage"]))
+    merges.call("session", "retract", "second/day")
+    out = merges.merge("run", "--dry-run", "--session", "second/day", "--session", "first/day", "--json")
+    report.equal("one that is retracted: exit code", out.returncode, EXIT["invalid_data"])
+    report.equal("one that is retracted: the other one", json.loads(out.stdout)["published"], 1)
+    merges.typed("one that is retracted", out.stderr, "invalid_data", "second/day is not merged: retracted")
+    merges.call("session", "restore", "second/day")
     return dry
 
 
@@ -174,6 +180,18 @@ def conflict_case(merges):
     return done["batch"]
 
 
+def named_case(merges):
+    """Who is asked for by name and stays staged is a failure, after all that could be done."""
+    report = merges.report
+    before = merges.state()
+    done = merges.merge("run", "--session", "garage/day")
+    report.equal("asked for: exit code", done.returncode, EXIT["invalid_data"])
+    report.check("asked for: it was tried", "stays staged" in done.stdout and "nothing to do" in done.stdout, done.stdout)
+    report.check("asked for: why not", "garage/day is not merged: meets no session" in done.stderr, done.stderr)
+    report.equal("asked for: the atlas", merges.state(), before)
+    report.equal("not asked for: exit code", merges.merge("run").returncode, 0)
+
+
 def twice_case(merges, batch):
     """What was merged stays; undone, it is merged again."""
     report = merges.report
@@ -223,7 +241,10 @@ def change(report, bin_dir, drives, work):
         merges.staged("first", "garage")
         merges.ingest("second", "--staged", "--range", "0:55")
         interrupted_case(merges)
-        twice_case(merges, conflict_case(merges))
+        batch = conflict_case(merges)
+        merges.run("wait")
+        named_case(merges)
+        twice_case(merges, batch)
     role_cases(report, bin_dir, drives, work)
 
 

@@ -177,7 +177,7 @@ class MergeRunCommand : public Command {
     progress.Wipe();
     if (!file) return file.error();
     Print(*merged, *file, context);
-    return {};
+    return CheckWanted(merged->run);
   }
 
   // Without --from a merge that is ended has changed nothing; with it, what came stays staged.
@@ -208,7 +208,16 @@ class MergeRunCommand : public Command {
     const auto merged = Merge(source, client, author, progress, context);
     if (!merged) return merged.error();
     Print(*merged, std::nullopt, context);
-    return {};
+    return CheckWanted(merged->run);
+  }
+
+  // What was asked for by name and is not in the map then: a failure, when all else is done.
+  Status CheckWanted(const MergeRun& run) const {
+    std::string text;
+    for (const UnmergedSession& one : UnmergedOf(run, wanted_)) {
+      text += StrCat(text.empty() ? "" : "; ", one.key, " is not merged: ", one.why);
+    }
+    return text.empty() ? Status() : Status(StatusCode::kInvalidData, text);
   }
 
   // `client` is null where there is nobody to hand it to.

@@ -62,7 +62,7 @@ class MergeServeCommand : public Command {
     if (stop.HasCome()) {
       log.Line(ServeLogLevel::kInfo, "stopped by a signal", {{"event", "stopped"}});
     }
-    return status;
+    return options_.is_once && status.ok() && !stop.HasCome() ? events.refused() : status;
   }
 
  private:
