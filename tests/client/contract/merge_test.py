@@ -11,7 +11,7 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
 from harness import EXIT, Daemon  # noqa: E402
-from merge_harness import COARSE, Merges, Watched, run_group  # noqa: E402
+from merge_harness import COARSE, NEAR, Merges, Watched, run_group  # noqa: E402
 
 KEYS = {"revision", "sessions", "left_out", "closures", "rejected", "closure_rms_m", "closure_rms_deg",
         "keyframes_moved", "published", "tiles", "applied", "rejected_closures", "pairs", "tile_size_m", "fused_tiles"}
@@ -309,10 +309,29 @@ def bring(report, bin_dir, drives, work):
         merges = Merges(report, bin_dir, daemon.server, drives)
         merges.staged("first", "second")
         kept_cases(merges, work)
+    names_case(report, bin_dir, drives, work)
     with Daemon(bin_dir, work / "fine") as daemon:
         merges = Merges(report, bin_dir, daemon.server, drives)
         merges.merge_refused("--from another profile", ["run", "--from", work / "other/atlas.db"], "invalid_argument",
-                             "profile")
+                             "cells of 0.2 m instead of 0.1 m")
+
+
+def names_case(report, bin_dir, drives, work):
+    """Two drives of one name, each in an atlas: who has which is said, and what can be done."""
+    with Daemon(bin_dir, work / "one", *COARSE) as one, Daemon(bin_dir, work / "two", *COARSE) as two:
+        mine = Merges(report, bin_dir, one.server, drives)
+        other = Merges(report, bin_dir, two.server, drives)
+        for merges, name in ((mine, "first"), (other, "second")):
+            merges.run("ingest", drives / name, *NEAR, "--vehicle", "car", "--session", "day")
+        says = f"session car/day: {two.server} has other keyframes under this name than "
+        mine.merge_refused("one name", ["run", "--from", two.server], "conflict", says + "the daemon: ")
+        mine.merge_refused("one name, a dry run", ["run", "--from", two.server, "--dry-run"], "conflict",
+                           says + "the daemon: ")
+        mine.merge_refused("one name, a new atlas",
+                           ["run", "--from", one.server, "--from", two.server, "--output", work / "new.db"], "conflict",
+                           f"{says}{one.server}: ", server=False)
+        mine.merge_refused("one name: what to do", ["run", "--from", two.server], "conflict",
+                           "atlas session retract car/day")
 
 
 GROUPS = {"tell": tell, "change": change, "bring": bring}

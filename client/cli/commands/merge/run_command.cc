@@ -103,10 +103,11 @@ class MergeRunCommand : public Command {
     if (is_dry_run_ || context.atlas_file) return LookOnly(*author, progress, context);
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
+    SessionTransfer transfer(*client, "the daemon");
     for (const std::string& from : from_) {
       auto source = OpenSessions(from, context);
       if (!source) return source.error();
-      ATLAS_RETURN_IF_ERROR(Bring(**source, *client, progress, context));
+      ATLAS_RETURN_IF_ERROR(Bring(**source, transfer, progress, context));
     }
     DaemonSessions source(*client);
     return MergeAndPrint(source, &*client, *author, progress, context);
@@ -167,8 +168,9 @@ class MergeRunCommand : public Command {
     auto made = NewAtlas::Begin(plan, std::ref(progress));
     progress.Wipe();
     if (!made) return made.error();
+    SessionTransfer transfer(made->client(), sources->front()->name());
     for (std::size_t i = context.atlas_file ? 1 : 0; i < sources->size(); ++i) {
-      ATLAS_RETURN_IF_ERROR(Bring(*(*sources)[i], made->client(), progress, context));
+      ATLAS_RETURN_IF_ERROR(Bring(*(*sources)[i], transfer, progress, context));
     }
     DaemonSessions source(made->client(), *output_);
     const auto merged = Merge(source, &made->client(), author, progress, context);
@@ -182,12 +184,11 @@ class MergeRunCommand : public Command {
 
   // Without --from a merge that is ended has changed nothing; with it, what came stays staged.
   static Status Bring(SessionSource& source,
-                      AtlasClient& client,
+                      SessionTransfer& transfer,
                       Progress& progress,
                       CommandContext& context) {
-    const auto report = TransferSessions(source, client, [&](std::size_t done, std::size_t all) {
-      return progress("bringing", done, all);
-    });
+    const auto report = transfer.Bring(
+        source, [&](std::size_t done, std::size_t all) { return progress("bringing", done, all); });
     progress.Wipe();
     if (!report) return report.error();
     for (const LeftOut& one : report->left_out) {
