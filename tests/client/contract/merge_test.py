@@ -119,6 +119,8 @@ def refused_cases(merges, work):
     merges.merge_refused("an unknown session", ["run", "--session", "nobody/day"], "not_found", "nobody/day")
     for flags in (["--session", "first"], ["--session"], ["more"], ["--workers", "3"], ["--author", "a b"]):
         merges.merge_refused(f"run {flags}", ["run", *flags], "invalid_argument")
+    for flag, name in (("--picture", "x.jpg"), ("--changes-picture", "x.gif"), ("--picture", "png")):
+        merges.merge_refused(f"{flag} {name}", ["run", flag, work / name], "invalid_argument", ".png")
     (work / "folder").mkdir()
     for flag in ("--picture", "--corrections"):
         merges.merge_refused(f"{flag} in no folder", ["run", flag, work / "none/x"], "not_found", "none/x")
@@ -180,7 +182,7 @@ def conflict_case(merges):
     return done["batch"]
 
 
-def named_case(merges):
+def named_case(merges, work):
     """Who is asked for by name and stays staged is a failure, after all that could be done."""
     report = merges.report
     before = merges.state()
@@ -190,6 +192,9 @@ def named_case(merges):
     report.check("asked for: why not", "garage/day is not merged: meets no session" in done.stderr, done.stderr)
     report.equal("asked for: the atlas", merges.state(), before)
     report.equal("not asked for: exit code", merges.merge("run").returncode, 0)
+    done = merges.merge("run", "--changes-picture", work / "none.png")
+    report.check("nothing is published: no picture, and it says so",
+                 done.returncode == 0 and "none.png is not written" in done.stderr, done)
 
 
 def twice_case(merges, batch):
@@ -243,7 +248,7 @@ def change(report, bin_dir, drives, work):
         interrupted_case(merges)
         batch = conflict_case(merges)
         merges.run("wait")
-        named_case(merges)
+        named_case(merges, work)
         twice_case(merges, batch)
     role_cases(report, bin_dir, drives, work)
 
