@@ -1,5 +1,6 @@
 #include "client/merge/merge_run.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -45,6 +46,25 @@ std::vector<Pose> MergeRun::PosesAfter(std::size_t session) const {
   return poses;
 }
 
+std::vector<UnmergedSession> UnmergedOf(const MergeRun& run,
+                                        const std::vector<SessionKey>& wanted) {
+  std::vector<UnmergedSession> unmerged;
+  for (const SessionKey& key : wanted) {
+    const auto session = std::find_if(run.sessions.begin(), run.sessions.end(),
+                                      [&](const MergeSession& one) { return one.key == key; });
+    if (session != run.sessions.end()) {
+      const auto i = static_cast<std::size_t>(session - run.sessions.begin());
+      const SessionOutcome& outcome = run.plan.sessions[i];
+      if (!outcome.is_joined) unmerged.push_back({key, outcome.why_not, !outcome.is_refused});
+      continue;
+    }
+    const auto left_out = std::find_if(run.left_out.begin(), run.left_out.end(),
+                                       [&](const LeftOut& one) { return one.key == key; });
+    if (left_out != run.left_out.end()) unmerged.push_back({key, left_out->why});
+  }
+  return unmerged;
+}
+
 MergePicture MergeRun::Picture() const {
   MergePicture picture;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
@@ -61,6 +81,11 @@ MergePicture MergeRun::Picture() const {
     const std::vector<Eigen::Vector2d>& a_after = picture.sessions[closure.a.session].after;
     const std::vector<Eigen::Vector2d>& b_after = picture.sessions[closure.b.session].after;
     picture.closures_after.emplace_back(a_after[a], b_after[b]);
+  }
+  const double side_m = profile.tile_size_m();
+  for (const TileId& id : plan.tiles) {
+    const Eigen::Vector2d corner = side_m * Eigen::Vector2d(id.x, id.y);
+    picture.tiles.emplace_back(corner, corner + Eigen::Vector2d::Constant(side_m));
   }
   return picture;
 }

@@ -40,6 +40,16 @@ struct MergeRun {
   MergePicture Picture() const;
 };
 
+// A session that was asked for and is not in the map after the merge.
+struct UnmergedSession {
+  SessionKey key;
+  std::string why;
+  bool is_waiting = false;  // nothing is wrong with it: it meets nobody yet
+};
+
+// Those of `wanted`, in their order.
+std::vector<UnmergedSession> UnmergedOf(const MergeRun& run, const std::vector<SessionKey>& wanted);
+
 // `wanted` as for ReadForMerge. Errors are those of ReadForMerge and PlanMerge.
 Result<MergeRun> RunMerge(SessionSource& source,
                           const std::vector<SessionKey>& wanted,

@@ -58,6 +58,8 @@ class AtlasLink {
   bool is_connected() const { return client_.has_value(); }
   // Ok, or why no attempt is made any more.
   const Status& refusal() const { return refusal_; }
+  // Of the latest attempt, or connection, that failed; ok: none did.
+  const Status& last_failure() const { return last_failure_; }
   // Somebody changed what was refused: attempts go on at once.
   void TryAgain();
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <mutex>
 #include <numbers>
@@ -14,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "client/merge/memory/temporary_folder.h"
 #include "client/merge/memory/work_log.h"
 #include "client/vehicle/folder_lock.h"
 #include "client/vehicle/stored_file.h"
@@ -93,14 +92,6 @@ std::uint64_t ShapeOf(std::span<const Pose> T_submap_member) {
 bool IsSubmapFile(const fs::path& path) {
   return path.extension() == kSuffix ||
          (path.extension() == kPartialSuffix && path.stem().extension() == kSuffix);
-}
-
-Result<fs::path> MakeTemporaryFolder() {
-  std::error_code error;
-  std::string name = (fs::temp_directory_path(error) / "atlas-merge.XXXXXX").string();
-  if (error) return Error(DiskError("cannot find", "the temporary folder", error.value()));
-  if (mkdtemp(name.data()) == nullptr) return Error(DiskError("cannot make folder", name, errno));
-  return fs::path(name);
 }
 
 }  // namespace
@@ -271,10 +262,14 @@ Result<MergeWork> MergeWork::Open(const fs::path& folder,
 }
 
 Result<MergeWork> MergeWork::Temporary() {
-  const auto path = MakeTemporaryFolder();
-  if (!path) return Error(path.error());
+  std::error_code error;
+  const fs::path among = fs::temp_directory_path(error);
+  if (error) return Error(DiskError("cannot find", "the temporary folder", error.value()));
+  auto made = MakeTemporaryFolder(among);
+  if (!made) return Error(made.error());
   auto folder = std::make_unique<Folder>();
-  folder->path = *path;
+  folder->path = made->path;
+  folder->lock = std::move(made->lock);
   folder->is_temporary = true;
   MergeWork work(std::move(folder));
   if (Status status = work.folder_->Open(0, 0); !status.ok()) return Error(std::move(status));

@@ -11,6 +11,7 @@
 #include "client/merge/plan/merge_graph.h"
 #include "client/merge/plan/pose_correction.h"
 #include "client/merge/plan/prior_frame.h"
+#include "client/merge/plan/rejected_closures.h"
 #include "client/merge/plan/session_links.h"
 #include "client/merge/plan/session_parts.h"
 #include "client/merge/plan/tilt_check.h"
@@ -200,6 +201,7 @@ class Planner {
       const std::vector<FoundClosure> more = more_closures_(found, ways_);
       found.insert(found.end(), more.begin(), more.end());
     }
+    rejected_.Note(found);
     std::erase_if(found, [this](const FoundClosure& closure) {
       return IsLeftOut(closure.a.session) || IsLeftOut(closure.b.session);
     });
@@ -271,6 +273,7 @@ class Planner {
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
       SessionOutcome& outcome = plan_.sessions.emplace_back();
       outcome.is_joined = joined.contains(parts_.part_of[i]) && !IsLeftOut(i);
+      outcome.is_refused = IsLeftOut(i);
       outcome.is_held = is_held_[i];
       outcome.submaps = sessions_[i].submaps.size();
       outcome.priors = priors_[i];
@@ -280,6 +283,7 @@ class Planner {
       ATLAS_RETURN_IF_ERROR(LookAtEffect(i, outcome));
     }
     CountClosures();
+    ListRejected();
     plan_.closures = choice_.believed;
     plan_.meetings = choice_.meetings;
     plan_.links = links_;
@@ -338,6 +342,15 @@ class Planner {
     }
   }
 
+  void ListRejected() {
+    for (FoundClosure& closure : rejected_.Without(choice_.believed)) {
+      const Pose off = OffOf(closure);
+      const bool is_placed = parts_.part_of[closure.a.session] == parts_.part_of[closure.b.session];
+      plan_.rejected_closures.push_back({std::move(closure), is_placed, off.translation().norm(),
+                                         Eigen::AngleAxisd(off.linear()).angle()});
+    }
+  }
+
   std::vector<MergeSession>& sessions_;
   const std::vector<BlobReader>& readers_;
   const MergeContext& context_;
@@ -347,6 +360,7 @@ class Planner {
   std::vector<std::vector<SessionLink>> links_;
   std::vector<SessionWay> ways_;
   ClosureChoice choice_;
+  RejectedClosures rejected_;
   SessionParts parts_;
   std::vector<bool> is_held_;
   std::map<std::size_t, std::string> left_out_;                            // by session: why

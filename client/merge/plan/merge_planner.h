@@ -31,7 +31,9 @@ struct SessionOutcome {
   // the others.
   bool is_joined = false;
   bool is_held = false;  // it is in the map, and where it should be
-  std::string why_not;   // it is not joined; for people
+  // It meets them, and cannot lie where it belongs: nothing that comes later helps.
+  bool is_refused = false;
+  std::string why_not;  // it is not joined; for people
   std::size_t closures = 0;
   std::size_t submaps_met = 0;  // that have one, of so many:
   std::size_t submaps = 0;
@@ -40,6 +42,15 @@ struct SessionOutcome {
   PriorUse priors;           // the positions that are known of it
   double prior_off_m = 0.0;  // of half of them from the keyframes, at most, as they are in the end
   std::vector<MovedKeyframe> moved;  // none of a session that is not joined
+};
+
+// One that was found at some time and is not believed in the end.
+struct RejectedClosure {
+  FoundClosure closure;
+  // Its sessions hang together, so that it is off by what is left between its submaps.
+  bool is_placed = false;
+  double off_m = 0.0;
+  double off_rad = 0.0;
 };
 
 struct MergePlan {
@@ -52,6 +63,8 @@ struct MergePlan {
   int rounds = 0;                               // of the guided search
   std::vector<std::vector<SessionLink>> links;  // by session
   std::set<TileId> tiles;                       // of level 0, that would be fused again
+  // Of each two submaps one, rising.
+  std::vector<RejectedClosure> rejected_closures;
 };
 
 // Closures from elsewhere, which are judged with those that were found by `ways`, each time that

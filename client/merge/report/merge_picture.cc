@@ -18,6 +18,8 @@ constexpr double kLine_px = 18.0;  // of the legend
 
 constexpr Rgb kInk{40, 40, 40};
 constexpr Rgb kClosure{170, 170, 170};
+constexpr Rgb kTile{222, 235, 247};
+constexpr std::size_t kLongClosures = 60;
 // Told apart by those who see no red or green, too (Okabe and Ito).
 constexpr std::array<Rgb, 7> kColors{{{0, 114, 178},
                                       {213, 94, 0},
@@ -27,13 +29,64 @@ constexpr std::array<Rgb, 7> kColors{{{0, 114, 178},
                                       {230, 159, 0},
                                       {0, 0, 0}}};
 
+// Pixels that are drawn, and that are not, over and over.
+struct Dash {
+  double on_px;
+  double off_px;
+};
+// One for each round through the colours.
+constexpr std::array<Dash, 3> kDashes{{{1.0, 0.0}, {14.0, 7.0}, {4.0, 5.0}}};
+
+struct Look {
+  Rgb color;
+  Dash dash;
+};
+
+Look LookOf(std::size_t session) {
+  return {kColors[session % kColors.size()], kDashes[session / kColors.size() % kDashes.size()]};
+}
+
 Eigen::AlignedBox2d BoundsOf(const MergePicture& picture) {
   Eigen::AlignedBox2d bounds;
   for (const PictureSession& session : picture.sessions) {
     for (const Eigen::Vector2d& p : session.before) bounds.extend(p);
     for (const Eigen::Vector2d& p : session.after) bounds.extend(p);
   }
+  if (bounds.isEmpty()) return bounds;
+  for (const Eigen::AlignedBox2d& tile : picture.tiles) bounds.extend(tile);
   return bounds;
+}
+
+// Whether a line is drawn so far from its beginning.
+bool IsOn(const Dash& dash, double way_px) {
+  return std::fmod(way_px, dash.on_px + dash.off_px) < dash.on_px;
+}
+
+// A line that goes on where one of `way_px` ended; how long both are.
+double DrawDashed(PlotCanvas& canvas,
+                  PlotPoint from,
+                  PlotPoint to,
+                  const Look& look,
+                  double width_px,
+                  double way_px) {
+  const double dx = to.x_px - from.x_px;
+  const double dy = to.y_px - from.y_px;
+  const double length_px = std::hypot(dx, dy);
+  if (look.dash.off_px == 0.0) {
+    canvas.Line(from, to, look.color, width_px);
+    return way_px + length_px;
+  }
+  const auto steps = static_cast<int>(std::ceil(std::max(1.0, length_px)));
+  const auto at = [&](int step) {
+    const double share = static_cast<double>(step) / steps;
+    return PlotPoint{from.x_px + share * dx, from.y_px + share * dy};
+  };
+  for (int i = 0; i < steps; ++i) {
+    if (IsOn(look.dash, way_px + length_px * i / steps)) {
+      canvas.Line(at(i), at(i + 1), look.color, width_px);
+    }
+  }
+  return way_px + length_px;
 }
 
 // From the world to a panel whose left edge is at `left_px`; north is up.
@@ -45,14 +98,43 @@ class Panel {
         middle_{left_px + 0.5 * kPanel_px, kHead_px + 0.5 * kPanel_px},
         px_a_m_((kPanel_px - 2.0 * kMargin_px) / std::max(1.0, bounds.sizes().maxCoeff())) {}
 
-  void Line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, Rgb color, double width_px) {
-    canvas_.Line(At(from), At(to), color, width_px);
+  void Way(const std::vector<Eigen::Vector2d>& points, const Look& look) {
+    constexpr double kJump_m = 10.0;  // nobody drove it
+    double way_px = 0.0;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      if ((points[i] - points[i - 1]).norm() > kJump_m) continue;
+      way_px = DrawDashed(canvas_, At(points[i - 1]), At(points[i]), look, 2.0, way_px);
+    }
   }
 
-  void Way(const std::vector<Eigen::Vector2d>& points, Rgb color) {
-    constexpr double kJump_m = 10.0;  // nobody drove it
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      if ((points[i] - points[i - 1]).norm() <= kJump_m) Line(points[i - 1], points[i], color, 2.0);
+  // With a pixel to the next one, where they are large enough.
+  void Tile(const Eigen::AlignedBox2d& tile) {
+    const PlotPoint low = At(tile.min());
+    const PlotPoint high = At(tile.max());
+    const double gap_px = high.x_px - low.x_px > 4.0 ? 1.0 : 0.0;
+    for (double y_px = std::ceil(high.y_px); y_px <= low.y_px - gap_px; y_px += 1.0) {
+      canvas_.Line({low.x_px, y_px}, {high.x_px - 2.0 * gap_px, y_px}, kTile, 1.0);
+    }
+  }
+
+  // Short ones all; of long ones so many, spread over them.
+  void Closures(const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>& closures) {
+    const double long_m = 0.1 * kPanel_px / px_a_m_;
+    const auto is_long = [&](const auto& closure) {
+      return (closure.second - closure.first).norm() > long_m;
+    };
+    const auto all =
+        static_cast<std::size_t>(std::count_if(closures.begin(), closures.end(), is_long));
+    const std::size_t drawn = std::min(all, kLongClosures);
+    std::size_t number = 0;
+    for (const auto& closure : closures) {
+      if (is_long(closure)) {
+        // One of so many each, the last of them.
+        const bool is_drawn = (number + 1) * drawn / all > number * drawn / all;
+        ++number;
+        if (!is_drawn) continue;
+      }
+      canvas_.Line(At(closure.first), At(closure.second), kClosure, 1.0);
     }
   }
 
@@ -81,18 +163,21 @@ class Panel {
 };
 
 void DrawLegend(const MergePicture& picture, PlotCanvas& canvas) {
-  for (std::size_t i = 0; i < picture.sessions.size(); ++i) {
-    const double y_px = kHead_px + kPanel_px + kLine_px * (static_cast<double>(i) + 0.5);
-    const Rgb color = kColors[i % kColors.size()];
-    canvas.Line({kMargin_px, y_px}, {kMargin_px + 30.0, y_px}, color, 3.0);
+  double y_px = kHead_px + kPanel_px + 0.5 * kLine_px;
+  for (std::size_t i = 0; i < picture.sessions.size(); ++i, y_px += kLine_px) {
+    DrawDashed(canvas, {kMargin_px, y_px}, {kMargin_px + 30.0, y_px}, LookOf(i), 3.0, 0.0);
     canvas.Text({kMargin_px + 40.0, y_px}, picture.sessions[i].name, kInk, TextAnchor::kLeft);
   }
+  if (picture.tiles.empty()) return;
+  canvas.Line({kMargin_px + 5.0, y_px}, {kMargin_px + 25.0, y_px}, kTile, 10.0);
+  canvas.Text({kMargin_px + 40.0, y_px}, "tiles to be fused again", kInk, TextAnchor::kLeft);
 }
 
 }  // namespace
 
 Image DrawMerge(const MergePicture& picture) {
-  const double legend_px = kLine_px * static_cast<double>(picture.sessions.size() + 1);
+  const std::size_t lines = picture.sessions.size() + (picture.tiles.empty() ? 0 : 1);
+  const double legend_px = kLine_px * static_cast<double>(lines + 1);
   ImageCanvas canvas(static_cast<std::uint32_t>(2.0 * kPanel_px),
                      static_cast<std::uint32_t>(kHead_px + kPanel_px + legend_px));
   canvas.Text({0.5 * kPanel_px, 0.5 * kHead_px}, "before", kInk, TextAnchor::kMiddle);
@@ -101,11 +186,12 @@ Image DrawMerge(const MergePicture& picture) {
   if (!bounds.isEmpty()) {
     Panel before(bounds, 0.0, canvas);
     Panel after(bounds, kPanel_px, canvas);
-    for (const auto& [from, to] : picture.closures_before) before.Line(from, to, kClosure, 1.0);
-    for (const auto& [from, to] : picture.closures_after) after.Line(from, to, kClosure, 1.0);
+    for (const Eigen::AlignedBox2d& tile : picture.tiles) after.Tile(tile);
+    before.Closures(picture.closures_before);
+    after.Closures(picture.closures_after);
     for (std::size_t i = 0; i < picture.sessions.size(); ++i) {
-      before.Way(picture.sessions[i].before, kColors[i % kColors.size()]);
-      after.Way(picture.sessions[i].after, kColors[i % kColors.size()]);
+      before.Way(picture.sessions[i].before, LookOf(i));
+      after.Way(picture.sessions[i].after, LookOf(i));
     }
     before.Scale();
   }

@@ -45,7 +45,9 @@ Result<AtlasClient*> WatchedDaemon::Wait(std::optional<Clock::time_point> latest
     refusal_ = link_.refusal();
     if (!refusal_.ok()) break;
     Lost(client.error());
-    if (latest && environment_.now() >= *latest) return client;
+    if (latest && environment_.now() >= *latest) {
+      return Error(link_.last_failure().ok() ? client.error() : link_.last_failure());
+    }
     environment_.sleep(kSlice);
   }
   if (!refusal_.ok()) return Error(refusal_);

@@ -62,9 +62,7 @@ Result<SessionReading> JoinedSessions::ReadKeyframes(
         return on_keyframe(std::move(keyframe));
       }
       if (before->second == hash) return {};
-      return {StatusCode::kConflict,
-              StrCat("session ", session, ", keyframe ", keyframe.sequence, ": ", source->name(),
-                     " has another one than ", owners->second.front()->name())};
+      return NameIsTaken(session, source->name(), owners->second.front()->name());
     });
     if (!reading) return Error(reading.error());
     if (source == sources_.front().get()) all.revision = reading->revision;

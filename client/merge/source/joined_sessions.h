@@ -14,7 +14,7 @@ namespace atlas {
 
 class JoinedSessions : public SessionSource {
  public:
-  // Of those behind the first, sessions in their maps or staged there, as TransferSessions takes
+  // Of those behind the first, sessions in their maps or staged there, as SessionTransfer takes
   // them. The first one's are as they are, and get those of their keyframes that only others have.
   // kInvalidArgument: one has another map profile than the first, which it needs.
   static Result<JoinedSessions> Make(std::vector<std::unique_ptr<SessionSource>> sources);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/connection/keyframe_uploader.h"
+#include "client/merge/source/profile_difference.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -35,15 +36,15 @@ class Transfer {
                                    .is_staged = true,
                                    .prior = keyframe.prior});
         });
-    return reading ? Status() : reading.error();
+    // What is refused is this session's.
+    return reading ? uploader_.Finish() : reading.error();
   }
 
   void LeaveOut(const SessionKey& key, std::string why) {
     report_.left_out.push_back({key, std::move(why)});
   }
 
-  Result<TransferReport> Finish() {
-    if (Status status = uploader_.Finish(); !status.ok()) return Error(std::move(status));
+  TransferReport Finish() {
     report_.duplicates = uploader_.totals().duplicates;
     return std::move(report_);
   }
@@ -53,6 +54,15 @@ class Transfer {
   KeyframeUploader uploader_;
   TransferReport report_;
 };
+
+// A session that was purged has a name, and takes none.
+bool HasKeyframes(AtlasClient& atlas, const SessionKey& key) {
+  const auto sessions = atlas.ListSessions();
+  return sessions &&
+         std::any_of(sessions->begin(), sessions->end(), [&](const SessionSummary& session) {
+           return session.key == key && session.keyframes > 0;
+         });
+}
 
 }  // namespace
 
@@ -64,16 +74,29 @@ std::string WhyNotBrought(const SessionSummary& session) {
 Status CheckTransfer(const SessionSource& from, const MapProfile& to) {
   if (from.profile() == to) return {};
   return {StatusCode::kInvalidArgument,
-          StrCat(from.name(),
-                 " has another map profile than the atlas that it is brought to: its keyframes "
-                 "cannot be fused there")};
+          StrCat(from.name(), " has another map profile than the atlas that it is brought to (",
+                 DifferenceOf(from.profile(), to), "): its keyframes cannot be fused there")};
 }
 
-Result<TransferReport> TransferSessions(
-    SessionSource& from,
-    AtlasClient& to,
-    const std::function<Status(std::size_t done, std::size_t all)>& progress) {
-  if (Status status = CheckTransfer(from, to.profile()); !status.ok()) {
+Status NameIsTaken(const SessionKey& session, const std::string& source, const std::string& other) {
+  return {
+      StatusCode::kConflict,
+      StrCat("session ", session, ": ", source, " has other keyframes under this name than ", other,
+             ": another drive, or the same one ingested otherwise. In one of the two retract it "
+             "(atlas session retract ",
+             session,
+             "), and it is not brought from there, or ingest it there under another name (atlas "
+             "ingest --vehicle, --session)")};
+}
+
+const std::string& SessionTransfer::HolderOf(const SessionKey& session) const {
+  const auto brought = brought_from_.find(session);
+  return brought == brought_from_.end() ? to_name_ : brought->second;
+}
+
+Result<TransferReport> SessionTransfer::Bring(
+    SessionSource& from, const std::function<Status(std::size_t done, std::size_t all)>& progress) {
+  if (Status status = CheckTransfer(from, to_.profile()); !status.ok()) {
     return Error(std::move(status));
   }
   const auto sessions = from.ListSessions();
@@ -83,7 +106,7 @@ Result<TransferReport> TransferSessions(
     all += WhyNotBrought(session).empty() ? session.keyframes : 0;
   }
   std::size_t done = 0;
-  Transfer transfer(from, to);
+  Transfer transfer(from, to_);
   for (const SessionSummary& session : *sessions) {
     if (std::string why = WhyNotBrought(session); !why.empty()) {
       transfer.LeaveOut(session.key, std::move(why));
@@ -93,7 +116,11 @@ Result<TransferReport> TransferSessions(
       done = std::min(done + 1, all);  // more may come meanwhile
       return progress ? progress(done, all) : Status();
     });
+    if (status.code() == StatusCode::kConflict && HasKeyframes(to_, session.key)) {
+      return Error(NameIsTaken(session.key, from.name(), HolderOf(session.key)));
+    }
     if (!status.ok()) return Error(status.WithContext(from.name()));
+    brought_from_.emplace(session.key, from.name());
   }
   return transfer.Finish();
 }

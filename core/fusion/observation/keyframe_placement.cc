@@ -92,7 +92,8 @@ Result<KeyframePlacement> PlaceKeyframe(const QuantizedPose& T_world_sensor,
                             180.0 / 3.14159265358979;
     return Error(StatusCode::kInvalidData,
                  StrCat("keyframe placement: pose is tilted by ", tilt_deg,
-                        " deg against the keyframe's level, at most 2; upload the keyframe again"));
+                        " deg against the keyframe's level, at most 2: look at roll and pitch of "
+                        "the drive's poses, upload it levelled, or retract its session"));
   }
   const std::int64_t norm = WideSqrt(Product(m.m00, m.m00) + Product(m.m10, m.m10));
   KeyframePlacement placement;

@@ -65,7 +65,7 @@ def from_copy_cases(merges, other, work):
     file = made / "copied.db"
     done = merges.merge("run", "--atlas", base, "--from", other.server, "--output", file, server=False)
     report.equal(f"of a copy: exit code ({done.stderr})", done.returncode, 0)
-    report.check("of a copy: for people", f"{file}: " in done.stdout and "undone by" in done.stdout, done.stdout)
+    report.check("of a copy: for people", f"{file}: " in done.stdout and "once a daemon serves the new file" in done.stdout, done.stdout)
     report.equal("of a copy: the backup", hash_of(base), content)
     states, _ = look_into(merges, file)
     report.equal("of a copy: who is in its map", states, {"first": "live", "second": "live"})

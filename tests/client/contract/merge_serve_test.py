@@ -213,8 +213,8 @@ def conflict_case(merges):
 
 
 def refused_cases(merges, work):
-    for flags, says in ((["--every", "0"], "every"), (["--settle", "-1"], ""), (["--max-move", "-1"], "max_move_m"),
-                        (["--max-move", "nan"], ""), (["--max-turn-deg", "-1"], "max_turn_rad"),
+    for flags, says in ((["--every", "0"], "--every: "), (["--settle", "-1"], ""), (["--max-move", "-1"], "--max-move: -1"),
+                        (["--max-move", "nan"], ""), (["--max-turn-deg", "-1"], "--max-turn-deg: -1"),
                         (["--max-tiles", "-1"], ""), (["--keep-reports", "0"], "--keep-reports"),
                         (["--author", "a b"], ""), (["--atlas", "x"], ""), (["more"], "")):
         merges.merge_refused(f"serve {flags}", ["serve", *flags], "invalid_argument", says)
@@ -239,6 +239,8 @@ def role_cases(report, bin_dir, drives, data):
                                  service.events)
     with Service(Merges(report, bin_dir, "127.0.0.1:1", drives), "--once") as service:
         report.equal("a round without a daemon", service.end(), 5)
+        last = str(service.events[-1])
+        report.check("a round without a daemon: why", "127.0.0.1:1" in last and "next attempt" not in last, last)
 
 
 def main():

@@ -10,11 +10,11 @@ import signal
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
-from harness import Daemon  # noqa: E402
-from merge_harness import COARSE, Merges, Watched, run_group  # noqa: E402
+from harness import EXIT, Daemon  # noqa: E402
+from merge_harness import COARSE, NEAR, Merges, Watched, run_group  # noqa: E402
 
 KEYS = {"revision", "sessions", "left_out", "closures", "rejected", "closure_rms_m", "closure_rms_deg",
-        "keyframes_moved", "published", "tiles", "applied"}
+        "keyframes_moved", "published", "tiles", "applied", "rejected_closures", "pairs", "tile_size_m", "fused_tiles"}
 APPLIED_KEYS = KEYS | {"batch", "updated", "tiles_marked", "revision_after"}
 SESSION_KEYS = {"vehicle", "session", "was_staged", "joined", "held", "keyframes", "moved", "rms_move_m", "max_move_m",
                 "submaps", "submaps_met", "closures"}
@@ -25,7 +25,9 @@ def nothing_cases(merges):
     report = merges.report
     empty = merges.merged("an empty daemon")
     report.equal("an empty daemon", (empty["sessions"], empty["applied"]), ([], False))
-    report.check("an empty daemon, for people", "nothing to do" in merges.merge("run").stdout)
+    people = merges.merge("run").stdout
+    report.check("an empty daemon, for people", "nothing to do" in people and "no closures; 0 rejected" in people and
+                 "no tiles to be fused again" in people and "0.000" not in people, people)
     merges.ingest("garage")  # in the map at once
     alone = merges.merged("one in the map")  # it is as good as it can be made
     report.equal("one in the map", ([one["joined"] for one in alone["sessions"]], alone["published"]), ([True], 0))
@@ -35,6 +37,32 @@ def nothing_cases(merges):
     left = merges.merged("one retracted")
     report.equal("one retracted", (left["sessions"], [one["why"] for one in left["left_out"]]), ([], ["retracted"]))
     report.equal("one retracted: restored", merges.call("session", "restore", "garage/day").returncode, 0)
+
+
+def tables_cases(merges, dry):
+    """What is found of each two sessions, and which tiles would change: the same for people and for scripts."""
+    report = merges.report
+    pairs = {(one["a"]["vehicle"], one["b"]["vehicle"]): one for one in dry["pairs"]}
+    met = pairs.get(("first", "second"), {})
+    report.equal("a dry run: a pair's keys", set(met), {"a", "b", "closures", "rejected", "rms_m", "rms_deg"})
+    report.equal("a dry run: closures by pair", sum(one["closures"] for one in dry["pairs"]), len(dry["closures"]))
+    report.equal("a dry run: rejected ones by pair", sum(one["rejected"] for one in dry["pairs"]),
+                 len(dry["rejected_closures"]))
+    report.check("a dry run: rejected ones", all(set(one) == {"a", "b", "fit", "off_m", "off_deg"}
+                                                 for one in dry["rejected_closures"]), dry["rejected_closures"])
+    by_level = [sum(tile["level"] == level for tile in dry["fused_tiles"]) for level in range(8)]
+    finest = {(tile["x"], tile["y"]) for tile in dry["fused_tiles"] if tile["level"] == 0}
+    above = {(tile["x"], tile["y"]) for tile in dry["fused_tiles"] if tile["level"] == 1}
+    report.equal("a dry run: tiles of level 0", (by_level[0], len(finest)), (dry["tiles"], dry["tiles"]))
+    report.equal("a dry run: tiles above them", above, {(x // 2, y // 2) for x, y in finest})
+    report.equal("a dry run: a tile's side", dry["tile_size_m"], 25.6)
+    people = merges.merge("run", "--dry-run").stdout
+    lines = [" ".join(line.split()) for line in people.splitlines()]
+    report.check("a dry run, for people: closures by pair",
+                 f"first/day second/day {met['closures']} {met['rejected']} {met['rms_m']:.3f} {met['rms_deg']:.3f}" in lines,
+                 people)
+    report.check("a dry run, for people: tiles by level",
+                 f"tiles to be fused again: {by_level[0]} of level 0, {by_level[1]} of level 1, " in people, people)
 
 
 def dry_run_cases(merges, work):
@@ -52,6 +80,7 @@ def dry_run_cases(merges, work):
     report.equal("a dry run: published would be", (dry["published"], dry["applied"]), (2, False))
     report.check("a dry run: closures", len(dry["closures"]) >= 3 and
                  set(dry["closures"][0]) == {"a", "b", "fit", "off_m", "off_deg"}, dry["closures"])
+    tables_cases(merges, dry)
     report.equal("a dry run: the picture", picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
     lines = corrections.read_text(encoding="ascii").splitlines()
     report.equal("a dry run: corrections", len([line for line in lines if line and line[0] != "#"]),
@@ -60,6 +89,12 @@ def dry_run_cases(merges, work):
     one = merges.merged("one session", "--dry-run", "--session", "second/day")
     report.equal("one session", ([s["vehicle"] for s in one["sessions"]], sorted(o["vehicle"] for o in one["left_out"])),
                  (["second"], ["first", "garage"]))
+    merges.call("session", "retract", "second/day")
+    out = merges.merge("run", "--dry-run", "--session", "second/day", "--session", "first/day", "--json")
+    report.equal("one that is retracted: exit code", out.returncode, EXIT["invalid_data"])
+    report.equal("one that is retracted: the other one", json.loads(out.stdout)["published"], 1)
+    merges.typed("one that is retracted", out.stderr, "invalid_data", "second/day is not merged: retracted")
+    merges.call("session", "restore", "second/day")
     return dry
 
 
@@ -84,6 +119,8 @@ def refused_cases(merges, work):
     merges.merge_refused("an unknown session", ["run", "--session", "nobody/day"], "not_found", "nobody/day")
     for flags in (["--session", "first"], ["--session"], ["more"], ["--workers", "3"], ["--author", "a b"]):
         merges.merge_refused(f"run {flags}", ["run", *flags], "invalid_argument")
+    for flag, name in (("--picture", "x.jpg"), ("--changes-picture", "x.gif"), ("--picture", "png")):
+        merges.merge_refused(f"{flag} {name}", ["run", flag, work / name], "invalid_argument", ".png")
     (work / "folder").mkdir()
     for flag in ("--picture", "--corrections"):
         merges.merge_refused(f"{flag} in no folder", ["run", flag, work / "none/x"], "not_found", "none/x")
@@ -145,6 +182,21 @@ def conflict_case(merges):
     return done["batch"]
 
 
+def named_case(merges, work):
+    """Who is asked for by name and stays staged is a failure, after all that could be done."""
+    report = merges.report
+    before = merges.state()
+    done = merges.merge("run", "--session", "garage/day")
+    report.equal("asked for: exit code", done.returncode, EXIT["invalid_data"])
+    report.check("asked for: it was tried", "stays staged" in done.stdout and "nothing to do" in done.stdout, done.stdout)
+    report.check("asked for: why not", "garage/day is not merged: meets no session" in done.stderr, done.stderr)
+    report.equal("asked for: the atlas", merges.state(), before)
+    report.equal("not asked for: exit code", merges.merge("run").returncode, 0)
+    done = merges.merge("run", "--changes-picture", work / "none.png")
+    report.check("nothing is published: no picture, and it says so",
+                 done.returncode == 0 and "none.png is not written" in done.stderr, done)
+
+
 def twice_case(merges, batch):
     """What was merged stays; undone, it is merged again."""
     report = merges.report
@@ -194,7 +246,10 @@ def change(report, bin_dir, drives, work):
         merges.staged("first", "garage")
         merges.ingest("second", "--staged", "--range", "0:55")
         interrupted_case(merges)
-        twice_case(merges, conflict_case(merges))
+        batch = conflict_case(merges)
+        merges.run("wait")
+        named_case(merges, work)
+        twice_case(merges, batch)
     role_cases(report, bin_dir, drives, work)
 
 
@@ -259,10 +314,29 @@ def bring(report, bin_dir, drives, work):
         merges = Merges(report, bin_dir, daemon.server, drives)
         merges.staged("first", "second")
         kept_cases(merges, work)
+    names_case(report, bin_dir, drives, work)
     with Daemon(bin_dir, work / "fine") as daemon:
         merges = Merges(report, bin_dir, daemon.server, drives)
         merges.merge_refused("--from another profile", ["run", "--from", work / "other/atlas.db"], "invalid_argument",
-                             "profile")
+                             "cells of 0.2 m instead of 0.1 m")
+
+
+def names_case(report, bin_dir, drives, work):
+    """Two drives of one name, each in an atlas: who has which is said, and what can be done."""
+    with Daemon(bin_dir, work / "one", *COARSE) as one, Daemon(bin_dir, work / "two", *COARSE) as two:
+        mine = Merges(report, bin_dir, one.server, drives)
+        other = Merges(report, bin_dir, two.server, drives)
+        for merges, name in ((mine, "first"), (other, "second")):
+            merges.run("ingest", drives / name, *NEAR, "--vehicle", "car", "--session", "day")
+        says = f"session car/day: {two.server} has other keyframes under this name than "
+        mine.merge_refused("one name", ["run", "--from", two.server], "conflict", says + "the daemon: ")
+        mine.merge_refused("one name, a dry run", ["run", "--from", two.server, "--dry-run"], "conflict",
+                           says + "the daemon: ")
+        mine.merge_refused("one name, a new atlas",
+                           ["run", "--from", one.server, "--from", two.server, "--output", work / "new.db"], "conflict",
+                           f"{says}{one.server}: ", server=False)
+        mine.merge_refused("one name: what to do", ["run", "--from", two.server], "conflict",
+                           "atlas session retract car/day")
 
 
 GROUPS = {"tell": tell, "change": change, "bring": bring}

@@ -55,10 +55,34 @@ TEST(MergeRunTest, StagedSessionsThatAreJoinedArePublished) {
   EXPECT_TRUE(run.IsNothing());
 }
 
+TEST(MergeRunTest, WhoWasAskedForAndStaysOutIsToldWithWhy) {
+  MergeRun run = SomeRun();
+  run.plan.sessions[3].why_not = "meets nobody";
+  run.left_out = {{{"gone", "drive"}, "retracted"},
+                  {{"published", "drive"}, "keyframe 3: damaged"}};
+  const std::vector<SessionKey> all{
+      {"gone", "drive"}, {"published", "drive"}, {"held", "drive"}, {"apart", "drive"}};
+  std::vector<UnmergedSession> unmerged = UnmergedOf(run, all);
+  ASSERT_EQ(unmerged.size(), 2U);
+  EXPECT_EQ(unmerged[0].key, all[0]);
+  EXPECT_EQ(unmerged[0].why, "retracted");
+  EXPECT_FALSE(unmerged[0].is_waiting);
+  EXPECT_EQ(unmerged[1].key, all[3]);
+  EXPECT_EQ(unmerged[1].why, "meets nobody");
+  EXPECT_TRUE(unmerged[1].is_waiting);
+  run.plan.sessions[3].is_refused = true;
+  EXPECT_FALSE(UnmergedOf(run, all)[1].is_waiting) << "whoever comes, it is tilted";
+  EXPECT_TRUE(UnmergedOf(run, {}).empty());
+}
+
 TEST(MergeRunTest, ThePictureHasWaysBeforeAndAfter) {
   MergeRun run = SomeRun();
   run.plan.closures.push_back(testing::Found({1, 0}, {2, 0}, At(0.0)));
+  run.plan.tiles = {{0, -1, 2}};
   const MergePicture picture = run.Picture();
+  ASSERT_EQ(picture.tiles.size(), 1U);
+  EXPECT_NEAR(picture.tiles[0].min().x(), -12.8, 1e-9);
+  EXPECT_NEAR(picture.tiles[0].max().y(), 38.4, 1e-9);
   ASSERT_EQ(picture.sessions.size(), 4U);
   EXPECT_EQ(picture.sessions[1].name, "moved/drive");
   EXPECT_EQ(picture.sessions[3].name, "apart/drive, stays as it is");

@@ -1,17 +1,14 @@
-// What a merge found, as text and as JSON.
+// What a merge found, for people.
 #pragma once
 
-#include <optional>
 #include <ostream>
-
-#include <boost/json/object.hpp>
 
 #include "client/merge/merge_run.h"
 
 namespace atlas {
 
+// Each session and what becomes of it, each two that were found in each other, and how much of the
+// map is fused again.
 void PrintMerge(const MergeRun& run, std::ostream& out);
-// Without a batch nothing was applied.
-boost::json::object MergeJson(const MergeRun& run, const std::optional<PoseBatchSummary>& batch);
 
 }  // namespace atlas

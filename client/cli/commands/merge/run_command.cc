@@ -5,15 +5,15 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/command_line/interruption.h"
 #include "client/cli/commands/atlas/author_flag.h"
 #include "client/cli/commands/merge/merge_commands.h"
+#include "client/cli/commands/merge/merge_json.h"
+#include "client/cli/commands/merge/merge_progress.h"
 #include "client/cli/commands/merge/merge_sources.h"
 #include "client/cli/commands/merge/merge_text.h"
 #include "client/cli/files/change_file.h"
 #include "client/cli/files/pose_file.h"
 #include "client/cli/files/whole_file.h"
-#include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
 #include "client/merge/change_report.h"
 #include "client/merge/merge_run.h"
@@ -24,31 +24,6 @@
 
 namespace atlas {
 namespace {
-
-// A bar a step, and an end when a signal comes.
-class Progress {
- public:
-  explicit Progress(CommandContext& context) : context_(context) {}
-
-  Status operator()(std::string_view step, std::size_t done, std::size_t all) {
-    if (step != step_ || all != all_) {
-      bar_.reset();
-      step_ = step;
-      all_ = all;
-      bar_.emplace(context_.err, context_.is_err_terminal, step_, all);
-    }
-    bar_->Update(done);
-    return interruption_.Check();
-  }
-  void Wipe() { bar_.reset(); }
-
- private:
-  CommandContext& context_;
-  Interruption interruption_;
-  std::string step_;
-  std::size_t all_ = 0;
-  std::optional<ProgressBar> bar_;
-};
 
 constexpr std::uint64_t kMaxWorkBytes = 16ULL << 30U;
 
@@ -90,22 +65,17 @@ class MergeRunCommand : public Command {
   Status Run(CommandContext& context) override {
     const Result<std::string> author = author_.Author("atlas-merge");
     if (!author) return author.error();
-    for (const auto& file : {picture_, corrections_, changes_, changes_picture_}) {
-      if (file) ATLAS_RETURN_IF_ERROR(CheckPlace(*file));
-    }
-    if (changes_) {
-      const auto format = ChangeFormatOf(*changes_);
-      if (!format) return format.error();
-    }
-    Progress progress(context);
+    ATLAS_RETURN_IF_ERROR(CheckFiles());
+    MergeProgressBar progress(context);
     if (output_) return MergeIntoFile(*author, progress, context);
     if (is_dry_run_ || context.atlas_file) return LookOnly(*author, progress, context);
     Result<AtlasClient> client = context.Connect();
     if (!client) return client.error();
+    SessionTransfer transfer(*client, "the daemon");
     for (const std::string& from : from_) {
       auto source = OpenSessions(from, context);
       if (!source) return source.error();
-      ATLAS_RETURN_IF_ERROR(Bring(**source, *client, progress, context));
+      ATLAS_RETURN_IF_ERROR(Bring(**source, transfer, progress, context));
     }
     DaemonSessions source(*client);
     return MergeAndPrint(source, &*client, *author, progress, context);
@@ -118,8 +88,27 @@ class MergeRunCommand : public Command {
     bool is_applied = false;                // as far as there was something
   };
 
+  // Before much is done.
+  Status CheckFiles() const {
+    for (const auto& file : {picture_, corrections_, changes_, changes_picture_}) {
+      if (file) ATLAS_RETURN_IF_ERROR(CheckPlace(*file));
+    }
+    for (const auto& [flag, file] :
+         {std::pair{"--picture", &picture_}, {"--changes-picture", &changes_picture_}}) {
+      if (*file && !(*file)->ends_with(".png")) {
+        return {StatusCode::kInvalidArgument,
+                StrCat(flag, " ", **file, ": expected a name that ends in .png")};
+      }
+    }
+    if (!changes_) return {};
+    const auto format = ChangeFormatOf(*changes_);
+    return format ? Status() : format.error();
+  }
+
   // Nobody is told of it: what would be brought is read from where it is.
-  Status LookOnly(const std::string& author, Progress& progress, CommandContext& context) const {
+  Status LookOnly(const std::string& author,
+                  MergeProgressBar& progress,
+                  CommandContext& context) const {
     auto sources = OpenAll(context);
     if (!sources) return sources.error();
     auto joined = JoinedSessions::Make(*std::move(sources));
@@ -150,7 +139,7 @@ class MergeRunCommand : public Command {
 
   // Ended before it is whole, there is no new file.
   Status MergeIntoFile(const std::string& author,
-                       Progress& progress,
+                       MergeProgressBar& progress,
                        CommandContext& context) const {
     if (is_dry_run_) {
       return {StatusCode::kInvalidArgument, "--output makes an atlas, which --dry-run does not"};
@@ -166,8 +155,9 @@ class MergeRunCommand : public Command {
     auto made = NewAtlas::Begin(plan, std::ref(progress));
     progress.Wipe();
     if (!made) return made.error();
+    SessionTransfer transfer(made->client(), sources->front()->name());
     for (std::size_t i = context.atlas_file ? 1 : 0; i < sources->size(); ++i) {
-      ATLAS_RETURN_IF_ERROR(Bring(*(*sources)[i], made->client(), progress, context));
+      ATLAS_RETURN_IF_ERROR(Bring(*(*sources)[i], transfer, progress, context));
     }
     DaemonSessions source(made->client(), *output_);
     const auto merged = Merge(source, &made->client(), author, progress, context);
@@ -176,17 +166,16 @@ class MergeRunCommand : public Command {
     progress.Wipe();
     if (!file) return file.error();
     Print(*merged, *file, context);
-    return {};
+    return CheckWanted(merged->run);
   }
 
   // Without --from a merge that is ended has changed nothing; with it, what came stays staged.
   static Status Bring(SessionSource& source,
-                      AtlasClient& client,
-                      Progress& progress,
+                      SessionTransfer& transfer,
+                      MergeProgressBar& progress,
                       CommandContext& context) {
-    const auto report = TransferSessions(source, client, [&](std::size_t done, std::size_t all) {
-      return progress("bringing", done, all);
-    });
+    const auto report = transfer.Bring(
+        source, [&](std::size_t done, std::size_t all) { return progress("bringing", done, all); });
     progress.Wipe();
     if (!report) return report.error();
     for (const LeftOut& one : report->left_out) {
@@ -202,19 +191,28 @@ class MergeRunCommand : public Command {
   Status MergeAndPrint(SessionSource& source,
                        AtlasClient* client,
                        const std::string& author,
-                       Progress& progress,
+                       MergeProgressBar& progress,
                        CommandContext& context) const {
     const auto merged = Merge(source, client, author, progress, context);
     if (!merged) return merged.error();
     Print(*merged, std::nullopt, context);
-    return {};
+    return CheckWanted(merged->run);
+  }
+
+  // What was asked for by name and is not in the map then: a failure, when all else is done.
+  Status CheckWanted(const MergeRun& run) const {
+    std::string text;
+    for (const UnmergedSession& one : UnmergedOf(run, wanted_)) {
+      text += StrCat(text.empty() ? "" : "; ", one.key, " is not merged: ", one.why);
+    }
+    return text.empty() ? Status() : Status(StatusCode::kInvalidData, text);
   }
 
   // `client` is null where there is nobody to hand it to.
   Result<Merged> Merge(SessionSource& source,
                        AtlasClient* client,
                        const std::string& author,
-                       Progress& progress,
+                       MergeProgressBar& progress,
                        CommandContext& context) const {
     constexpr int kAttempts = 3;
     Result<MergeWork> work =
@@ -225,7 +223,7 @@ class MergeRunCommand : public Command {
       progress.Wipe();
       if (!run) return Error(run.error());
       Status written = WriteFiles(*run);
-      if (written.ok()) written = WriteChanges(*run, progress);
+      if (written.ok()) written = WriteChanges(*run, progress, context);
       if (!written.ok()) return Error(std::move(written));
       if (client == nullptr || run->IsNothing()) {
         return Merged{*std::move(run), std::nullopt, client != nullptr};
@@ -256,7 +254,9 @@ class MergeRunCommand : public Command {
     return {};
   }
 
-  Status WriteChanges(const MergeRun& run, Progress& progress) const {
+  Status WriteChanges(const MergeRun& run,
+                      MergeProgressBar& progress,
+                      CommandContext& context) const {
     if (!changes_ && !changes_picture_) return {};
     const auto report = ReportChanges(run, std::ref(progress));
     progress.Wipe();
@@ -265,8 +265,10 @@ class MergeRunCommand : public Command {
       const ChangeFormat format = *ChangeFormatOf(*changes_);
       ATLAS_RETURN_IF_ERROR(WriteTextFile(*changes_, ChangeText(format, report->changes)));
     }
-    if (!changes_picture_ || !report->picture) return {};
-    return WritePng(*report->picture, *changes_picture_);
+    if (!changes_picture_) return {};
+    if (report->picture) return WritePng(*report->picture, *changes_picture_);
+    context.err << "note: no session is published, " << *changes_picture_ << " is not written\n";
+    return {};
   }
 
   void Print(const Merged& merged,
@@ -289,7 +291,7 @@ class MergeRunCommand : public Command {
       const PoseBatchSummary& batch = *merged.batch;
       context.out << "batch " << batch.batch << ": " << batch.updated << " poses corrected, "
                   << batch.tiles_marked << " tiles marked; undone by: atlas poses undo "
-                  << batch.batch << '\n';
+                  << batch.batch << (file ? ", once a daemon serves the new file" : "") << '\n';
     } else {
       context.out << (merged.is_applied ? "nothing to do\n" : "nothing was changed\n");
     }

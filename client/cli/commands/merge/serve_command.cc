@@ -3,6 +3,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "client/cli/command_line/stop_signal.h"
 #include "client/cli/commands/atlas/author_flag.h"
@@ -11,6 +12,7 @@
 #include "client/cli/commands/merge/serve_events.h"
 #include "client/cli/commands/merge/serve_log.h"
 #include "client/merge/serve/merge_service.h"
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -62,7 +64,7 @@ class MergeServeCommand : public Command {
     if (stop.HasCome()) {
       log.Line(ServeLogLevel::kInfo, "stopped by a signal", {{"event", "stopped"}});
     }
-    return status;
+    return options_.is_once && status.ok() && !stop.HasCome() ? events.refused() : status;
   }
 
  private:
@@ -82,8 +84,25 @@ class MergeServeCommand : public Command {
     options_.author = *author;
     if (work_) options_.work = *work_;
     options_.limits.max_turn_rad = kDegree * max_turn_deg_;
-    if (kept_ == 0) return {StatusCode::kInvalidArgument, "--keep-reports: expected at least 1"};
+    ATLAS_RETURN_IF_ERROR(CheckFlags());
     return options_.Validate();
+  }
+
+  // By the names that they have here.
+  Status CheckFlags() const {
+    if (kept_ == 0) return {StatusCode::kInvalidArgument, "--keep-reports: expected at least 1"};
+    if (options_.every.count() <= 0) {
+      return {StatusCode::kInvalidArgument, "--every: expected more than 0 seconds"};
+    }
+    for (const auto& [flag, value] :
+         {std::pair<const char*, double>{"--max-move", options_.limits.max_move_m},
+          {"--max-turn-deg", max_turn_deg_},
+          {"--max-staged-move", options_.limits.max_staged_move_m}}) {
+      if (!(value >= 0.0)) {  // NaN, too
+        return {StatusCode::kInvalidArgument, StrCat(flag, ": ", value, ", expected at least 0")};
+      }
+    }
+    return {};
   }
 
   MergeServiceOptions options_;

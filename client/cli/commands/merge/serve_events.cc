@@ -5,7 +5,7 @@
 
 #include <boost/json/array.hpp>
 
-#include "client/cli/commands/merge/merge_text.h"
+#include "client/cli/commands/merge/merge_json.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -87,6 +87,13 @@ void ServeEvents::Note(const MergeEvent& event) {
   }
 }
 
+void ServeEvents::NoteRefused(const MergeEvent& event) {
+  for (const UnmergedSession& one : UnmergedOf(*event.run, event.sessions)) {
+    if (one.is_waiting || !refused_.ok()) continue;
+    refused_ = {StatusCode::kInvalidData, StrCat(one.key, " stays staged: ", one.why)};
+  }
+}
+
 // What became of one.
 void ServeEvents::NoteMerge(const MergeEvent& event) {
   const std::string names = NamesOf(event.sessions);
@@ -95,6 +102,7 @@ void ServeEvents::NoteMerge(const MergeEvent& event) {
     fields["code"] = StatusCodeName(event.status.code());
     log_.Line(level, StrCat(sentence, event.status.message()), fields);
   };
+  if (event.run != nullptr && event.kind != MergeEventKind::kOverLimits) NoteRefused(event);
   if (event.kind == MergeEventKind::kApplied) {
     NoteApplied(event);
   } else if (event.kind == MergeEventKind::kOverLimits) {

@@ -9,6 +9,7 @@
 #include "client/cli/commands/merge/report_folder.h"
 #include "client/cli/commands/merge/serve_log.h"
 #include "client/merge/serve/merge_event.h"
+#include "core/base/status.h"
 
 namespace atlas {
 
@@ -21,7 +22,12 @@ class ServeEvents {
 
   void Note(const MergeEvent& event);
 
+  // kInvalidData names the first session that cannot be merged however many others come: tilted too
+  // far, damaged. Ok: there was none.
+  const Status& refused() const { return refused_; }
+
  private:
+  void NoteRefused(const MergeEvent& event);
   void NoteMerge(const MergeEvent& event);
   void NoteApplied(const MergeEvent& event);
   void NoteOverLimits(const MergeEvent& event);
@@ -34,6 +40,7 @@ class ServeEvents {
   ServeLog& log_;
   std::string daemon_;
   std::optional<ReportFolder> reports_;
+  Status refused_;
 };
 
 }  // namespace atlas

@@ -198,6 +198,13 @@ TEST_F(MergePlannerTest, ARowOfWrongClosuresIsContradicted) {
     EXPECT_NE(closure.a.session, closure.b.session);
   }
   EXPECT_GE(merge.plan().rejected, 3U);
+  std::size_t listed = 0;
+  for (const RejectedClosure& one : merge.plan().rejected_closures) {
+    if (one.closure.a.session != one.closure.b.session) continue;
+    EXPECT_TRUE(one.is_placed);
+    listed += one.off_m > 1.0 ? 1U : 0U;
+  }
+  EXPECT_GE(listed, 3U) << "each once, however often it was rejected";
   merge.ExpectTrueClosures();
   merge.ExpectTogether(0, 1);
 }

@@ -61,6 +61,7 @@ TEST(TiltedSessionTest, ItIsLeftOutWithWhyAndTouchesNothing) {
         PlanMerge(sessions, {LevelOnce(keyframes)}, {MapProfile(), options, work}, nullptr);
     ASSERT_TRUE(plan.has_value()) << plan.error().message();
     EXPECT_FALSE(plan->sessions[0].is_joined);
+    EXPECT_TRUE(plan->sessions[0].is_refused);
     EXPECT_TRUE(plan->sessions[0].moved.empty());
     EXPECT_NE(plan->sessions[0].why_not.find("keyframe 0"), std::string::npos)
         << plan->sessions[0].why_not;
@@ -77,6 +78,7 @@ TEST(TiltedSessionTest, OthersAreMergedAsEver) {
   ASSERT_TRUE(plan.has_value()) << plan.error().message();
   EXPECT_TRUE(plan->sessions[0].is_joined) << "the larger one becomes the map";
   EXPECT_FALSE(plan->sessions[1].is_joined);
+  EXPECT_FALSE(plan->sessions[1].is_refused) << "it meets nobody, and is not moved";
   EXPECT_FALSE(plan->tiles.empty());
 }
 

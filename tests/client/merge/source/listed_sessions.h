@@ -39,7 +39,7 @@ class ListedSessions : public SessionSource {
     return session;
   }
 
-  std::string name() const override { return "a list"; }
+  std::string name() const override { return list_name; }
   const MapProfile& profile() const override { return map_profile; }
   Result<std::vector<SessionSummary>> ListSessions() override {
     std::vector<SessionSummary> summaries;
@@ -60,6 +60,7 @@ class ListedSessions : public SessionSource {
 
   std::vector<Session> sessions;
   MapProfile map_profile;
+  std::string list_name = "a list";
 };
 
 }  // namespace atlas::testing

@@ -82,7 +82,7 @@ TEST(KeyframePlacementTest, RefusesMoreThanTwoDegreesOfTilt) {
   const auto refused = tilted(2.0001);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code(), StatusCode::kInvalidData);
-  EXPECT_NE(refused.error().message().find("upload the keyframe again"), std::string::npos);
+  EXPECT_NE(refused.error().message().find("upload it levelled"), std::string::npos);
   EXPECT_FALSE(tilted(180.0).has_value());
 }
 
