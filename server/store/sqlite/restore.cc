@@ -9,12 +9,12 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/backup/atlas_copy.h"
 #include "server/store/sqlite/backup/atlas_reading.h"
+#include "server/store/sqlite/backup/former_place.h"
 #include "server/store/sqlite/backup/replaced_atlas.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/database_files.h"
-#include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
@@ -86,8 +86,7 @@ Status GoOn(const fs::path& target, const std::string& backup, RestoredAtlas& re
   if (!identity) {
     return identity.error();
   }
-  const auto noted = ReadRevisionNote(NoteOf(target));
-  const PlaceInLine line = BeginLine(connection, *identity, PlaceOf(noted, *identity));
+  const PlaceInLine line = BeginLine(connection, *identity, FindFormerPlace(target, *identity));
   restored.epoch = line.epoch;
   restored.revision = line.revision;
   AddEvent(connection, {EventKind::kBackupRestored, kAuthor, backup,
