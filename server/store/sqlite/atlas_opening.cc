@@ -14,6 +14,7 @@
 #include "server/store/sqlite/connection/log_damage.h"
 #include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/log_origin.h"
 #include "server/store/sqlite/migrations/migration.h"
 #include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
@@ -166,20 +167,25 @@ Status CheckWhatIsLeft(Connection& writer, const std::string& loss) {
     left = StatusFromException(error);
   }
   if (left.ok()) {
-    writer.KeepLog(false);
     return {};
   }
   return {StatusCode::kInvalidData, StrCat(loss, ", and what is left is no atlas (", left.message(),
                                            "): nothing was changed; restore a backup")};
 }
 
-Status CheckBehindDamage(Connection& writer, const DamagedLog& log) {
-  Status left = CheckWhatIsLeft(writer, LossOf(log));
-  if (!left.ok() && log.damage.turned.empty()) {
+// Before anything is read of it, or written. What was copied of lost commits may be longer than
+// what is left.
+Status CheckFiles(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
+  Status status = origin.Check(writer, log.is_lossy());
+  if (status.ok()) {
+    status =
+        log.is_lossy() ? CheckWhatIsLeft(writer, LossOf(log)) : CheckEnd(writer, origin.database());
+  }
+  if (!status.ok() && log.damage.turned.empty() && !log.kept.empty()) {
     std::error_code ignored;
     std::filesystem::remove(log.kept, ignored);  // the log is what it was
   }
-  return left;
+  return status;
 }
 
 // Which commits are lost, for people: by what the log is, else by how far the atlas is known to
@@ -295,11 +301,9 @@ Status Refusal(const DataDirectory& directory, const Status& status) {
 // Nothing is read by a schema that is damaged. What was put right of it, for people.
 Result<std::string> MakeReadable(Connection& writer,
                                  const DamagedLog& log,
-                                 const DataDirectory& directory,
+                                 const LogOrigin& origin,
                                  const SqliteStoreOptions& options) {
-  // What was copied of lost commits may be longer than what is left.
-  Status status =
-      log.is_lossy() ? CheckBehindDamage(writer, log) : CheckEnd(writer, directory.database_file());
+  Status status = CheckFiles(writer, log, origin);
   if (!status.ok()) {
     return Error(std::move(status));
   }
@@ -339,9 +343,12 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     return Error(status.WithContext(directory.database_file().string()));
   }
   try {
+    const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
+    const LogOrigin origin(directory.database_file(), noted);
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
+    writer->KeepLog(origin.has_log());  // whoever refuses leaves all as it was
     AddRowHash(*writer);
-    const Result<std::string> schema = MakeReadable(*writer, *log, directory, options);
+    const Result<std::string> schema = MakeReadable(*writer, *log, origin, options);
     if (!schema) {
       return Error(Refusal(directory, schema.error()));
     }
@@ -349,7 +356,6 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     if (!identity) {
       return Error(identity.error().WithContext(directory.database_file().string()));
     }
-    const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
     const Result<std::string> loss = FindLoss(*writer, *identity, *log, noted);
     if (!loss) {
       return Error(Refusal(directory, loss.error()));
@@ -373,7 +379,9 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     KeepVehicleBytes(*writer);
     AtlasPast past = ReadPast(*writer);
     identity->lost = std::move(past.lost);
-    return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged};
+    writer->KeepLog(false);
+    return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged, origin.log(),
+                       origin.revision_alone()};
   } catch (const std::exception& error) {
     return Error(Refusal(directory, StatusFromException(error)));
   }
