@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "core/base/str_cat.h"
-#include "server/store/sqlite/connection/log_damage.h"
 #include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/damaged_log.h"
 #include "server/store/sqlite/log_origin.h"
 #include "server/store/sqlite/migrations/migration.h"
 #include "server/store/sqlite/revision_note.h"
@@ -114,45 +114,6 @@ void WhereThereIsRoom(const std::function<void()>& write) {
       throw;
     }
   }
-}
-
-struct DamagedLog {
-  std::filesystem::path kept;  // a copy, if anything was done to it
-  LogDamage damage;
-
-  bool is_lossy() const { return damage.lost_commits > 0; }
-};
-
-// Before bits are turned back in it, and SQLite drops what is behind other damage. Who knows better
-// can look at the copy.
-Result<DamagedLog> MendLog(const std::filesystem::path& log) {
-  const Result<LogDamage> found = FindLogDamage(log, HasRunSince(log));
-  if (!found) {
-    return Error(found.error());
-  }
-  DamagedLog damaged{{}, *found};
-  if (damaged.is_lossy() || !found->turned.empty()) {
-    std::error_code error;
-    for (int number = 1; number == 1 || std::filesystem::exists(damaged.kept, error); ++number) {
-      damaged.kept = log.string() + StrCat(".damaged-", number);
-    }
-    if (!std::filesystem::copy_file(log, damaged.kept, error)) {
-      return Error(StatusCode::kUnavailable,
-                   StrCat(log.string(), " is damaged at frame ", damaged.damage.frame,
-                          ", and no copy of it can be kept: ", error.message()));
-    }
-  }
-  if (!found->turned.empty()) {
-    if (Status status = TurnBack(log, found->turned); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  return damaged;
-}
-
-std::string LossOf(const DamagedLog& log) {
-  return StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.lost_commits,
-                " commits are lost");
 }
 
 // Part of what is lost may have been copied into the database before the damage: then pages of
@@ -304,6 +265,9 @@ Result<std::string> MakeReadable(Connection& writer,
                                  const LogOrigin& origin,
                                  const SqliteStoreOptions& options) {
   Status status = CheckFiles(writer, log, origin);
+  if (status.ok() && log.damage.has_rest && !log.is_lossy()) {  // before anything is written
+    WhereThereIsRoom([&] { DropRest(writer, origin.log_file()); });
+  }
   if (!status.ok()) {
     return Error(std::move(status));
   }
@@ -335,7 +299,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       return Error(std::move(status));
     }
   }
-  const auto log = MendLog(directory.database_file().string() + "-wal");
+  const Result<DamagedLog> log = MendLog(directory.database_file().string() + "-wal");
   if (!log) {
     return Error(log.error());
   }
@@ -363,11 +327,11 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     writer->Execute("PRAGMA journal_mode = WAL");
     KeepTableSums(*writer);
     MarkAtTheEnd(*writer);
-    if (log->damage.has_rest) {  // else what is written from now on would stand before it
-      WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
-    }
     if (!loss->empty()) {  // before a revision is given again
       Tell(options.on_damaged_log, NoteLoss(*writer, *identity, *loss, log->kept, noted));
+    }
+    if (log->is_lossy()) {  // not before it is noted: a kill in between is told twice
+      WhereThereIsRoom([&] { DropRest(*writer, origin.log_file()); });
     }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
     for (const std::string& what : Mend(*writer, identity->profile.levels, *schema)) {

@@ -40,7 +40,7 @@ Status Refuse(const std::string& what, const char* remedy) {
 
 LogOrigin::LogOrigin(std::filesystem::path database, const std::optional<NotedRevision>& noted)
     : database_(std::move(database)), alone_(ReadAlone(database_)) {
-  log_.salts = ReadLogSalts(database_.string() + "-wal");
+  log_.salts = ReadLogSalts(log_file());
   if (has_log() && noted && noted->log.salts == log_.salts) {
     log_ = noted->log;
     atlas_id_ = noted->atlas_id;

@@ -22,6 +22,7 @@ class LogOrigin {
   LogOrigin(std::filesystem::path database, const std::optional<NotedRevision>& noted);
 
   const std::filesystem::path& database() const { return database_; }
+  std::filesystem::path log_file() const { return database_.string() + "-wal"; }
   bool has_log() const { return log_.salts != 0; }
   // The log, and from which revision on it goes, if that is known.
   const LogStart& log() const { return log_; }
