@@ -40,16 +40,23 @@ DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem
           true};
 }
 
+std::filesystem::path LogOf(const DataDirectory& directory) {
+  return directory.database_file().string() + "-wal";
+}
+
+bool HasLog(const DataDirectory& directory) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(LogOf(directory), error);
+  return !error && bytes > 0;
+}
+
 // SQLite would take it for the new atlas's own.
 Status RefuseLogOfAnother(const DataDirectory& directory) {
-  const std::filesystem::path log = directory.database_file().string() + "-wal";
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(log, error);
-  if (error || bytes == 0) {
+  if (!HasLog(directory)) {
     return {};
   }
   return {StatusCode::kConflict,
-          StrCat(log.string(),
+          StrCat(LogOf(directory).string(),
                  " is the log of an atlas that is not there: put atlas.db back beside it, or move "
                  "the log away to begin a new atlas")};
 }
@@ -103,6 +110,11 @@ Status SettleRestore(const DataDirectory& directory) {
   }
   std::filesystem::remove(directory.restored_file(), error);  // it takes room, and nothing else
   return {};
+}
+
+Status FindOrCreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
+  ATLAS_RETURN_IF_ERROR(SettleRestore(directory));
+  return directory.has_atlas() ? Status() : CreateAtlas(directory, options);
 }
 
 // What can wait does on a full disk: all that is stored can be read there.
@@ -250,11 +262,15 @@ std::vector<std::string> Mend(Connection& writer, std::uint8_t levels, const std
   return ListMended(writer, last_event);
 }
 
-// Why there is no atlas to be served.
-Status Refusal(const DataDirectory& directory, const Status& status) {
-  const bool is_full = status.code() == StatusCode::kResourceExhausted;
-  const std::string advice =
-      is_full ? "; this is written before the atlas is served: make room on its disk" : "";
+// Why there is no atlas to be served. A daemon that was killed while its log was copied leaves a
+// database that is none without it.
+Status Refusal(const DataDirectory& directory, const Status& status, bool has_note_alone) {
+  const char* advice = "";
+  if (status.code() == StatusCode::kResourceExhausted) {
+    advice = "; this is written before the atlas is served: make room on its disk";
+  } else if (status.code() == StatusCode::kInvalidData && has_note_alone) {
+    advice = "; there is no log (atlas.db-wal): if it was moved away after a kill, put it back";
+  }
   return Status(status.code(), status.message() + advice)
       .WithContext(directory.database_file().string());
 }
@@ -291,30 +307,26 @@ void Tell(const std::function<void(const std::string&)>& whom, const std::string
 }  // namespace
 
 Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
-  if (Status status = SettleRestore(directory); !status.ok()) {
+  if (Status status = FindOrCreateAtlas(directory, options); !status.ok()) {
     return Error(std::move(status));
   }
-  if (!directory.has_atlas()) {
-    if (Status status = CreateAtlas(directory, options); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  const Result<DamagedLog> log = MendLog(directory.database_file().string() + "-wal");
+  const Result<DamagedLog> log = MendLog(LogOf(directory));
   if (!log) {
     return Error(log.error());
   }
   if (Status status = RenewLog(directory.database_file()); !status.ok()) {
     return Error(status.WithContext(directory.database_file().string()));
   }
+  const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
+  const bool has_note_alone = noted && !HasLog(directory);
   try {
-    const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
     const LogOrigin origin(directory.database_file(), noted);
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     writer->KeepLog(origin.has_log());  // whoever refuses leaves all as it was
     AddRowHash(*writer);
     const Result<std::string> schema = MakeReadable(*writer, *log, origin, options);
     if (!schema) {
-      return Error(Refusal(directory, schema.error()));
+      return Error(Refusal(directory, schema.error(), has_note_alone));
     }
     auto identity = ReadMeta(*writer);
     if (!identity) {
@@ -322,7 +334,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     }
     const Result<std::string> loss = FindLoss(*writer, *identity, *log, noted);
     if (!loss) {
-      return Error(Refusal(directory, loss.error()));
+      return Error(Refusal(directory, loss.error(), has_note_alone));
     }
     writer->Execute("PRAGMA journal_mode = WAL");
     KeepTableSums(*writer);
@@ -347,7 +359,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged, origin.log(),
                        origin.revision_alone()};
   } catch (const std::exception& error) {
-    return Error(Refusal(directory, StatusFromException(error)));
+    return Error(Refusal(directory, StatusFromException(error), has_note_alone));
   }
 }
 

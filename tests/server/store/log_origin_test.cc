@@ -162,6 +162,30 @@ TEST_F(LogOriginTest, NorAreTwoAtlases) {
                 "another atlas");
 }
 
+// A kill in the middle of copying the log, which copies the first page first: without its log the
+// file is shorter than it says.
+TEST_F(LogOriginTest, WhoeverMovedTheLogAwayIsToldToPutItBack) {
+  Open();
+  PutLarge(0, 2);
+  CloseAndOpen();
+  const Bytes short_one = ReadFile(Database());
+  PutLarge(2, 3);
+  Files killed = Look();
+  CopyLog();
+  const Bytes copied = ReadFile(Database());
+  killed["atlas.db"].assign(copied.begin(),
+                            copied.begin() + static_cast<std::ptrdiff_t>(short_one.size()));
+  const std::string advice = "if it was moved away after a kill, put it back";
+  ExpectRefused(Without(killed, "atlas.db-wal"), StatusCode::kInvalidData, advice);
+  ExpectServed(killed, 5);
+  store_.reset();
+  Files longer = Look();
+  longer["atlas.db"].resize(longer["atlas.db"].size() * 2);
+  ExpectRefused(longer, StatusCode::kInvalidData, advice);
+  PutThere(Without(longer, "atlas.db-revision"));
+  EXPECT_EQ(OpenSqliteStore(options_).error().message().find(advice), std::string::npos);
+}
+
 // Whoever refuses for another reason does not copy the log either.
 TEST_F(LogOriginTest, AStartThatIsRefusedLeavesTheLog) {
   Open();
