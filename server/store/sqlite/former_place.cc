@@ -1,4 +1,4 @@
-#include "server/store/sqlite/backup/former_place.h"
+#include "server/store/sqlite/former_place.h"
 
 #include <algorithm>
 #include <exception>
