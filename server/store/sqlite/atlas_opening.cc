@@ -11,9 +11,10 @@
 #include <vector>
 
 #include "core/base/str_cat.h"
-#include "server/store/sqlite/connection/log_damage.h"
 #include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/connection/sqlite_error.h"
+#include "server/store/sqlite/damaged_log.h"
+#include "server/store/sqlite/log_origin.h"
 #include "server/store/sqlite/migrations/migration.h"
 #include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
@@ -39,16 +40,23 @@ DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem
           true};
 }
 
+std::filesystem::path LogOf(const DataDirectory& directory) {
+  return directory.database_file().string() + "-wal";
+}
+
+bool HasLog(const DataDirectory& directory) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(LogOf(directory), error);
+  return !error && bytes > 0;
+}
+
 // SQLite would take it for the new atlas's own.
 Status RefuseLogOfAnother(const DataDirectory& directory) {
-  const std::filesystem::path log = directory.database_file().string() + "-wal";
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(log, error);
-  if (error || bytes == 0) {
+  if (!HasLog(directory)) {
     return {};
   }
   return {StatusCode::kConflict,
-          StrCat(log.string(),
+          StrCat(LogOf(directory).string(),
                  " is the log of an atlas that is not there: put atlas.db back beside it, or move "
                  "the log away to begin a new atlas")};
 }
@@ -104,6 +112,11 @@ Status SettleRestore(const DataDirectory& directory) {
   return {};
 }
 
+Status FindOrCreateAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
+  ATLAS_RETURN_IF_ERROR(SettleRestore(directory));
+  return directory.has_atlas() ? Status() : CreateAtlas(directory, options);
+}
+
 // What can wait does on a full disk: all that is stored can be read there.
 void WhereThereIsRoom(const std::function<void()>& write) {
   try {
@@ -113,45 +126,6 @@ void WhereThereIsRoom(const std::function<void()>& write) {
       throw;
     }
   }
-}
-
-struct DamagedLog {
-  std::filesystem::path kept;  // a copy, if anything was done to it
-  LogDamage damage;
-
-  bool is_lossy() const { return damage.lost_commits > 0; }
-};
-
-// Before bits are turned back in it, and SQLite drops what is behind other damage. Who knows better
-// can look at the copy.
-Result<DamagedLog> MendLog(const std::filesystem::path& log) {
-  const Result<LogDamage> found = FindLogDamage(log, HasRunSince(log));
-  if (!found) {
-    return Error(found.error());
-  }
-  DamagedLog damaged{{}, *found};
-  if (damaged.is_lossy() || !found->turned.empty()) {
-    std::error_code error;
-    for (int number = 1; number == 1 || std::filesystem::exists(damaged.kept, error); ++number) {
-      damaged.kept = log.string() + StrCat(".damaged-", number);
-    }
-    if (!std::filesystem::copy_file(log, damaged.kept, error)) {
-      return Error(StatusCode::kUnavailable,
-                   StrCat(log.string(), " is damaged at frame ", damaged.damage.frame,
-                          ", and no copy of it can be kept: ", error.message()));
-    }
-  }
-  if (!found->turned.empty()) {
-    if (Status status = TurnBack(log, found->turned); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  return damaged;
-}
-
-std::string LossOf(const DamagedLog& log) {
-  return StrCat("the log was damaged at frame ", log.damage.frame, ": ", log.damage.lost_commits,
-                " commits are lost");
 }
 
 // Part of what is lost may have been copied into the database before the damage: then pages of
@@ -166,20 +140,25 @@ Status CheckWhatIsLeft(Connection& writer, const std::string& loss) {
     left = StatusFromException(error);
   }
   if (left.ok()) {
-    writer.KeepLog(false);
     return {};
   }
   return {StatusCode::kInvalidData, StrCat(loss, ", and what is left is no atlas (", left.message(),
                                            "): nothing was changed; restore a backup")};
 }
 
-Status CheckBehindDamage(Connection& writer, const DamagedLog& log) {
-  Status left = CheckWhatIsLeft(writer, LossOf(log));
-  if (!left.ok() && log.damage.turned.empty()) {
+// Before anything is read of it, or written. What was copied of lost commits may be longer than
+// what is left.
+Status CheckFiles(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
+  Status status = origin.Check(writer, log.is_lossy());
+  if (status.ok()) {
+    status =
+        log.is_lossy() ? CheckWhatIsLeft(writer, LossOf(log)) : CheckEnd(writer, origin.database());
+  }
+  if (!status.ok() && log.damage.turned.empty() && !log.kept.empty()) {
     std::error_code ignored;
     std::filesystem::remove(log.kept, ignored);  // the log is what it was
   }
-  return left;
+  return status;
 }
 
 // Which commits are lost, for people: by what the log is, else by how far the atlas is known to
@@ -283,11 +262,15 @@ std::vector<std::string> Mend(Connection& writer, std::uint8_t levels, const std
   return ListMended(writer, last_event);
 }
 
-// Why there is no atlas to be served.
-Status Refusal(const DataDirectory& directory, const Status& status) {
-  const bool is_full = status.code() == StatusCode::kResourceExhausted;
-  const std::string advice =
-      is_full ? "; this is written before the atlas is served: make room on its disk" : "";
+// Why there is no atlas to be served. A daemon that was killed while its log was copied leaves a
+// database that is none without it.
+Status Refusal(const DataDirectory& directory, const Status& status, bool has_note_alone) {
+  const char* advice = "";
+  if (status.code() == StatusCode::kResourceExhausted) {
+    advice = "; this is written before the atlas is served: make room on its disk";
+  } else if (status.code() == StatusCode::kInvalidData && has_note_alone) {
+    advice = "; there is no log (atlas.db-wal): if it was moved away after a kill, put it back";
+  }
   return Status(status.code(), status.message() + advice)
       .WithContext(directory.database_file().string());
 }
@@ -295,11 +278,12 @@ Status Refusal(const DataDirectory& directory, const Status& status) {
 // Nothing is read by a schema that is damaged. What was put right of it, for people.
 Result<std::string> MakeReadable(Connection& writer,
                                  const DamagedLog& log,
-                                 const DataDirectory& directory,
+                                 const LogOrigin& origin,
                                  const SqliteStoreOptions& options) {
-  // What was copied of lost commits may be longer than what is left.
-  Status status =
-      log.is_lossy() ? CheckBehindDamage(writer, log) : CheckEnd(writer, directory.database_file());
+  Status status = CheckFiles(writer, log, origin);
+  if (status.ok() && log.damage.has_rest && !log.is_lossy()) {  // before anything is written
+    WhereThereIsRoom([&] { DropRest(writer, origin.log_file()); });
+  }
   if (!status.ok()) {
     return Error(std::move(status));
   }
@@ -323,45 +307,43 @@ void Tell(const std::function<void(const std::string&)>& whom, const std::string
 }  // namespace
 
 Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreOptions& options) {
-  if (Status status = SettleRestore(directory); !status.ok()) {
+  if (Status status = FindOrCreateAtlas(directory, options); !status.ok()) {
     return Error(std::move(status));
   }
-  if (!directory.has_atlas()) {
-    if (Status status = CreateAtlas(directory, options); !status.ok()) {
-      return Error(std::move(status));
-    }
-  }
-  const auto log = MendLog(directory.database_file().string() + "-wal");
+  const Result<DamagedLog> log = MendLog(LogOf(directory));
   if (!log) {
     return Error(log.error());
   }
   if (Status status = RenewLog(directory.database_file()); !status.ok()) {
     return Error(status.WithContext(directory.database_file().string()));
   }
+  const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
+  const bool has_note_alone = noted && !HasLog(directory);
   try {
+    const LogOrigin origin(directory.database_file(), noted);
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
+    writer->KeepLog(origin.has_log());  // whoever refuses leaves all as it was
     AddRowHash(*writer);
-    const Result<std::string> schema = MakeReadable(*writer, *log, directory, options);
+    const Result<std::string> schema = MakeReadable(*writer, *log, origin, options);
     if (!schema) {
-      return Error(Refusal(directory, schema.error()));
+      return Error(Refusal(directory, schema.error(), has_note_alone));
     }
     auto identity = ReadMeta(*writer);
     if (!identity) {
       return Error(identity.error().WithContext(directory.database_file().string()));
     }
-    const std::optional<NotedRevision> noted = ReadRevisionNote(NoteOf(directory.database_file()));
     const Result<std::string> loss = FindLoss(*writer, *identity, *log, noted);
     if (!loss) {
-      return Error(Refusal(directory, loss.error()));
+      return Error(Refusal(directory, loss.error(), has_note_alone));
     }
     writer->Execute("PRAGMA journal_mode = WAL");
     KeepTableSums(*writer);
     MarkAtTheEnd(*writer);
-    if (log->damage.has_rest) {  // else what is written from now on would stand before it
-      WhereThereIsRoom([&] { writer->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); });
-    }
     if (!loss->empty()) {  // before a revision is given again
       Tell(options.on_damaged_log, NoteLoss(*writer, *identity, *loss, log->kept, noted));
+    }
+    if (log->is_lossy()) {  // not before it is noted: a kill in between is told twice
+      WhereThereIsRoom([&] { DropRest(*writer, origin.log_file()); });
     }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
     for (const std::string& what : Mend(*writer, identity->profile.levels, *schema)) {
@@ -373,9 +355,11 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     KeepVehicleBytes(*writer);
     AtlasPast past = ReadPast(*writer);
     identity->lost = std::move(past.lost);
-    return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged};
+    writer->KeepLog(false);
+    return OpenedAtlas{std::move(*identity), std::move(writer), past.may_have_purged, origin.log(),
+                       origin.revision_alone()};
   } catch (const std::exception& error) {
-    return Error(Refusal(directory, StatusFromException(error)));
+    return Error(Refusal(directory, StatusFromException(error), has_note_alone));
   }
 }
 

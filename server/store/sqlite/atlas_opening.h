@@ -7,6 +7,7 @@
 #include "core/base/status.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/data_directory.h"
+#include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace atlas {
@@ -14,7 +15,9 @@ namespace atlas {
 struct OpenedAtlas {
   StoreIdentity identity;
   std::unique_ptr<Connection> writer;
-  bool may_have_purged = false;  // the log may have what was to be overwritten
+  bool may_have_purged = false;      // the log may have what was to be overwritten
+  LogStart log;                      // that was found
+  std::uint64_t revision_alone = 0;  // of the database without it
 };
 
 // Errors as OpenSqliteStore. The directory stays locked by the caller.

@@ -14,7 +14,7 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/data_directory.h"
 #include "server/store/sqlite/database_files.h"
-#include "server/store/sqlite/revision_note.h"
+#include "server/store/sqlite/former_place.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/table_sums.h"
@@ -86,8 +86,7 @@ Status GoOn(const fs::path& target, const std::string& backup, RestoredAtlas& re
   if (!identity) {
     return identity.error();
   }
-  const auto noted = ReadRevisionNote(NoteOf(target));
-  const PlaceInLine line = BeginLine(connection, *identity, PlaceOf(noted, *identity));
+  const PlaceInLine line = BeginLine(connection, *identity, FindFormerPlace(target, *identity));
   restored.epoch = line.epoch;
   restored.revision = line.revision;
   AddEvent(connection, {EventKind::kBackupRestored, kAuthor, backup,
@@ -119,9 +118,9 @@ Status MakeCopy(const RestoreOrder& order, const fs::path& target, RestoredAtlas
   return copy ? CheckCopy(restored, *copy) : copy.error().WithContext("the copy was read back");
 }
 
-Status Replace(const fs::path& target, RestoredAtlas& restored) {
+Status Replace(const fs::path& target, bool was_interrupted, RestoredAtlas& restored) {
   ATLAS_RETURN_IF_ERROR(SyncFolder(target.parent_path()));  // the copy is found by its name
-  Result<fs::path> kept = MoveAside(target);
+  Result<fs::path> kept = MoveAside(target, was_interrupted);
   if (!kept) {
     return kept.error();
   }
@@ -137,6 +136,8 @@ Status CopyAndReplace(const RestoreOrder& order, RestoredAtlas& restored) {
   ATLAS_RETURN_IF_ERROR(CheckTarget(order));  // nobody else can change it any more
   const fs::path target = directory->database_file();
   const bool was_there = directory->has_atlas();
+  std::error_code unknown;
+  const bool was_interrupted = !was_there && fs::exists(directory->restored_file(), unknown);
   Status status;
   try {
     status = MakeCopy(order, target, restored);
@@ -145,10 +146,12 @@ Status CopyAndReplace(const RestoreOrder& order, RestoredAtlas& restored) {
   }
   const bool is_made = status.ok();
   if (is_made) {
-    status = Replace(target, restored);
+    status = Replace(target, was_interrupted, restored);
   }
-  // Where the atlas has another name now, the copy tells the daemon so.
-  if (!status.ok() && (!is_made || directory->has_atlas() || !was_there)) {
+  // Where the atlas has another name, now or since an earlier restore, the copy tells the daemon
+  // so.
+  const bool has_other_name = was_interrupted || (is_made && was_there);
+  if (!status.ok() && (directory->has_atlas() || !has_other_name)) {
     RemovePartial(target);
   }
   return status;

@@ -13,10 +13,17 @@
 
 namespace atlas {
 
+// A log, and how far the database was without it when it began.
+struct LogStart {
+  std::uint64_t salts = 0;     // which log; 0: none
+  std::uint64_t revision = 0;  // at least; 0: not known
+};
+
 struct NotedRevision {
   std::array<std::uint8_t, 16> atlas_id{};
   std::uint64_t epoch = 0;
   std::uint64_t revision = 0;
+  LogStart log;
 
   // Whether an atlas was further than `revision` of `identity`: what it was given since is missing.
   // Of another atlas nothing is known, nor of one that began another line since.
@@ -34,10 +41,17 @@ PlaceInLine PlaceOf(const std::optional<NotedRevision>& noted, const StoreIdenti
 // Written in place behind each commit, and not synced: a commit was, so that a power cut leaves a
 // note that says less than the disk has, or nothing. One that the disk refuses does, too: nobody is
 // told of it.
+//
+// When SQLite begins the log anew, all of the one before is in the database, on disk: so all that
+// was noted then.
 class RevisionNote {
  public:
-  // Makes the file where it is missing; what it says stays until it is written.
-  RevisionNote(const std::filesystem::path& file, const StoreIdentity& identity);
+  // Beside `database`, which is open; made where it is missing. What it says stays until it is
+  // written. `log` is the one that was found, and `revision` that of the database without it.
+  RevisionNote(const std::filesystem::path& database,
+               const StoreIdentity& identity,
+               const LogStart& log,
+               std::uint64_t revision);
   RevisionNote(const RevisionNote&) = delete;
   RevisionNote& operator=(const RevisionNote&) = delete;
   ~RevisionNote();
@@ -47,7 +61,8 @@ class RevisionNote {
 
  private:
   NotedRevision noted_;
-  int fd_ = -1;  // none: it cannot be opened
+  int fd_ = -1;      // none: it cannot be opened
+  int log_fd_ = -1;  // likewise
 };
 
 }  // namespace atlas

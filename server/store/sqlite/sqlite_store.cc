@@ -66,7 +66,7 @@ class SqliteStore final : public AtlasStore {
         identity_(std::move(atlas.identity)),
         tiles_(options.tile_directory_bytes),
         room_([directory = options.directory] { return ReadFreeBytes(directory); }),
-        note_(NoteOf(directory_.database_file()), identity_),
+        note_(directory_.database_file(), identity_, atlas.log, atlas.revision_alone),
         guard_(options.on_failed_sync),
         log_(CopierOptions(directory_.database_file()), {}, *atlas.writer, guard_),
         writes_(std::move(atlas.writer),

@@ -11,7 +11,9 @@
 
 #include "server/store/event_types.h"
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/damaged_log.h"
 #include "tests/core/support/test_scale.h"
+#include "tests/server/store/faulty_vfs.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace atlas {
@@ -222,6 +224,49 @@ TEST_F(LogDamageTest, WhatWasLostIsNotLostOnceMore) {
 }
 
 // Killed, and nothing else.
+// Whoever reads the database meanwhile keeps the log from being emptied: it is cut.
+TEST_F(LogDamageTest, NothingIsWrittenBeforeARestThatIsRead) {
+  Live();
+  Revive(ByteOf(Frames() / 2), 0x10, 0x20);
+  ASSERT_TRUE(FindLogDamage(Log(), true)->has_rest);
+  const fs::path database = options_.directory / "atlas.db";
+  Connection reader({database, DatabaseOptions::Mode::kReadOnly, 1'024, 0});
+  reader.Execute("BEGIN");
+  const std::int64_t seen = reader.Ask("SELECT count(*) FROM keyframes");
+  Connection writer({database, DatabaseOptions::Mode::kReadWrite, 1'024, 0});
+  DropRest(writer, Log());
+  EXPECT_GT(fs::file_size(Log()), 0U) << "nobody read it";
+  EXPECT_FALSE(FindLogDamage(Log(), true)->has_rest);
+  EXPECT_EQ(FindLogDamage(Log(), true)->lost_commits, 0U);
+  writer.Execute("PRAGMA user_version = 0");
+  EXPECT_FALSE(FindLogDamage(Log(), true)->has_rest);
+  EXPECT_EQ(reader.Ask("SELECT count(*) FROM keyframes"), seen);
+  reader.Execute("COMMIT");
+  EXPECT_EQ(reader.Ask("SELECT count(*) FROM keyframes"), seen);
+}
+
+// A start that ends at any of its calls, with no note beside the database: the next one tells.
+TEST_F(LogDamageTest, AStartThatIsCutShortLosesNothingInSilence) {
+  FaultyVfs vfs;
+  Live();
+  bool has_failed = true;
+  std::uint64_t number = 1;
+  for (; has_failed; number += testing::Stride(3)) {
+    SCOPED_TRACE(number);
+    Revive(ByteOf(Frames() / 2), 0x10, 0x20);
+    vfs.BeginAnew();
+    vfs.FailAt(number, FaultyVfs::Calls::kAll, FaultyVfs::Until::kHealed);
+    static_cast<void>(OpenCode());
+    has_failed = vfs.Heal();
+    fs::remove(options_.directory / "atlas.db-revision");
+    Open();
+    ASSERT_TRUE(IsToldOfLoss());
+    ASSERT_LT(Keyframes(), all_);
+  }
+  EXPECT_GT(number, 10U);
+  store_.reset();
+}
+
 TEST_F(LogDamageTest, AWholeLogIsNoLoss) {
   Live();
   Revive(0, 0);

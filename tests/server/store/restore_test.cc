@@ -1,4 +1,7 @@
 #include <fstream>
+#include <iterator>
+#include <string>
+#include <string_view>
 
 #include "server/store/sqlite/schema/schema.h"
 #include "tests/server/store/backup_fixture.h"
@@ -20,6 +23,14 @@ class RestoreTest : public BackupTest {
     ASSERT_FALSE(done.has_value());
     EXPECT_EQ(done.error().code(), code) << done.error().message();
     EXPECT_EQ(NamesIn(restored().parent_path()), names);
+  }
+
+  static void Write(const std::filesystem::path& file, std::string_view text) {
+    std::ofstream(file) << text;
+  }
+  static std::string Read(const std::filesystem::path& file) {
+    std::ifstream in(file);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   }
 
   AtlasFacts facts_;
@@ -207,16 +218,69 @@ TEST_F(RestoreTest, NoEmptyAtlasTakesThePlaceOfAnInterruptedRestore) {
   EXPECT_FALSE(std::filesystem::exists(partial));
 }
 
+// Between two of its names: what is left of the atlas follows it.
 TEST_F(RestoreTest, TheLogOfAnAtlasThatWasMovedFollowsIt) {
   BackUp();
   ASSERT_TRUE(Restore().has_value());
-  std::filesystem::rename(restored(), restored().string() + ".replaced-1");
-  std::ofstream(restored().string() + "-wal") << "its log";
+  Write(restored().string() + ".replaced-1", "an older one");
+  std::filesystem::rename(restored(), restored().string() + ".replaced-2");
+  Write(restored().string() + "-wal", "its log");
+  Write(restored().string() + ".partial", "half a copy");
   const auto done = Restore();
   ASSERT_TRUE(done.has_value()) << done.error().message();
-  EXPECT_EQ(done->kept.filename(), "atlas.db.replaced-1");
-  EXPECT_TRUE(std::filesystem::exists(done->kept.string() + "-wal"));
+  EXPECT_EQ(done->kept.filename(), "atlas.db.replaced-2");
+  EXPECT_EQ(Read(done->kept.string() + "-wal"), "its log");
   EXPECT_FALSE(std::filesystem::exists(restored().string() + "-wal"));
+}
+
+// Of another atlas than the one that was kept last: that one has its own log, or nobody was
+// interrupted.
+TEST_F(RestoreTest, NothingThatIsKeptIsWrittenOver) {
+  BackUp();
+  for (const bool was_interrupted : {false, true}) {
+    SCOPED_TRACE(was_interrupted);
+    std::filesystem::remove_all(restored().parent_path());
+    ASSERT_TRUE(Restore().has_value());
+    const std::string kept = restored().string() + ".replaced-1";
+    std::filesystem::rename(restored(), kept);
+    Write(restored().string() + "-wal", "a log of today");
+    Write(restored().string() + "-revision", "a note of today");
+    if (was_interrupted) {
+      Write(kept + "-wal", "its log");
+      Write(restored().string() + ".partial", "half a copy");
+    }
+    const auto done = Restore();
+    ASSERT_TRUE(done.has_value()) << done.error().message();
+    EXPECT_EQ(done->kept.filename(), "atlas.db.replaced-2");
+    EXPECT_EQ(Read(done->kept.string() + "-wal"), "a log of today");
+    EXPECT_EQ(Read(done->kept.string() + "-revision"), "a note of today");
+    EXPECT_EQ(std::filesystem::exists(kept + "-wal"), was_interrupted);
+    EXPECT_FALSE(std::filesystem::exists(kept + "-revision"));
+    std::filesystem::remove(restored());
+    Write(restored().string() + "-wal", "a log of tomorrow");
+    const auto again = Restore();
+    ASSERT_TRUE(again.has_value()) << again.error().message();
+    EXPECT_EQ(again->kept.filename(), "atlas.db.replaced-3") << "a log alone takes a number, too";
+    EXPECT_EQ(Read(done->kept.string() + "-wal"), "a log of today");
+  }
+}
+
+// The daemon is still told that the atlas has another name.
+TEST_F(RestoreTest, OneThatWasInterruptedMayFailAndBeRunAgain) {
+  BackUp();
+  ASSERT_TRUE(Restore().has_value());
+  std::filesystem::rename(restored(), restored().string() + ".replaced-1");
+  Write(restored().string() + ".partial", "half a copy");
+  BackupWork work = Work();
+  work.reserve_bytes = std::uint64_t{1} << 60U;
+  ASSERT_FALSE(RestoreAtlas({backup(), restored(), false, work}).has_value());
+  store_.reset();
+  options_.directory = restored().parent_path();
+  EXPECT_EQ(OpenCode(), StatusCode::kConflict);
+  EXPECT_FALSE(std::filesystem::exists(restored())) << "an empty atlas has its place";
+  ASSERT_TRUE(Restore().has_value());
+  Open();
+  EXPECT_EQ(store_->ReadCounts()->keyframes, 3U);
 }
 
 }  // namespace

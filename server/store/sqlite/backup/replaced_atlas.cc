@@ -1,7 +1,9 @@
 #include "server/store/sqlite/backup/replaced_atlas.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <string>
 #include <system_error>
@@ -25,16 +27,40 @@ bool IsThere(const fs::path& file) {
 }
 
 fs::path Numbered(const fs::path& database, int number) {
-  return StrCat(database.string(), ".replaced-", number);
+  return StrCat(database.string(), kReplaced, number);
 }
 
-fs::path NameFor(const fs::path& database) {
-  int number = 1;
-  while (IsThere(Numbered(database, number))) {
-    ++number;
+// Of all that is kept beside it, be it a log alone; 0: nothing is.
+int LastNumber(const fs::path& database) {
+  const std::string begin = StrCat(database.filename().string(), kReplaced);
+  int last = 0;
+  std::error_code error;
+  for (fs::directory_iterator it(database.parent_path(), error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    int number = 0;
+    if (name.starts_with(begin)) {
+      std::from_chars(name.data() + begin.size(), name.data() + name.size(), number);
+    }
+    last = std::max(last, number);
   }
-  const bool is_a_rest = !IsThere(database) && number > 1;
-  return Numbered(database, is_a_rest ? number - 1 : number);
+  return last;
+}
+
+// Whether what is left of `database` may be that of `kept`, which lacks it. SQLite makes the index
+// of a log anew.
+bool MayFollow(const fs::path& database, const fs::path& kept) {
+  return !IsThere(database) && IsThere(kept) &&
+         std::none_of(kSuffixes.begin(), kSuffixes.end(), [&](const std::string& suffix) {
+           return suffix != "-shm" && IsThere(database.string() + suffix) &&
+                  IsThere(kept.string() + suffix);
+         });
+}
+
+fs::path NameFor(const fs::path& database, bool was_interrupted) {
+  const int last = LastNumber(database);
+  const fs::path kept = Numbered(database, last);
+  return was_interrupted && MayFollow(database, kept) ? kept : Numbered(database, last + 1);
 }
 
 using Renames = std::vector<std::pair<fs::path, fs::path>>;
@@ -48,8 +74,8 @@ void Undo(const Renames& done) {
 
 }  // namespace
 
-Result<fs::path> MoveAside(const fs::path& database) {
-  const fs::path kept = NameFor(database);
+Result<fs::path> MoveAside(const fs::path& database, bool was_interrupted) {
+  const fs::path kept = NameFor(database, was_interrupted);
   Renames done;
   for (const char* suffix : kSuffixes) {
     const fs::path from = database.string() + suffix;

@@ -278,7 +278,8 @@ Snapshot::~Snapshot() {
       connection_.Execute("COMMIT");
     }
   } catch (const SQLite::Exception&) {
-    // A read transaction has nothing to lose; the connection is checked when it is used next.
+    // A read transaction has nothing to lose; whoever lends the connection looks whether it is
+    // over.
   }
 }
 

@@ -24,8 +24,15 @@ std::unique_ptr<Connection> ReaderPool::Take() {
 }
 
 void ReaderPool::Return(std::unique_ptr<Connection> connection) {
+  if (connection->is_in_transaction()) {
+    connection.reset();
+  }
   const std::lock_guard lock(mutex_);
-  idle_.push_back(std::move(connection));
+  if (connection) {
+    idle_.push_back(std::move(connection));
+  } else {
+    --open_;
+  }
   returned_.notify_one();
 }
 

@@ -72,6 +72,7 @@ class ReaderPool {
   };
 
   std::unique_ptr<Connection> Take();
+  // One whose snapshot could not be ended is closed: it would keep the log, and serve nobody.
   void Return(std::unique_ptr<Connection> connection);
 
   DatabaseOptions options_;
