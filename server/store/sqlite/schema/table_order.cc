@@ -271,11 +271,14 @@ void AddOrderChecks(const std::function<Status()>& check_stop,
   add(kPaired);
 }
 
-std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables which) {
+std::vector<std::string> PutTablesInOrder(Connection& connection,
+                                          OrderedTables which,
+                                          const KeyframeNumbers& keyframes) {
   std::vector<std::string> rebuilt;
   for (const NumberedTable& table : kNumbered) {
     if (GroupOf(table.kind) == which && !CheckOrder(connection, table, GoOn).ok()) {
-      Numbers numbers = ReadNumbers(connection, table);
+      Numbers numbers =
+          table.kind == RowKind::kKeyframe ? keyframes(connection) : ReadNumbers(connection, table);
       Order(numbers);
       Rebuild(connection, table.kind, table.name,
               [&] { CopyNumbered(connection, table, std::move(numbers)); });

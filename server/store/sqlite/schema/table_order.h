@@ -3,6 +3,7 @@
 // anew mends it.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -18,10 +19,16 @@ void AddOrderChecks(const std::function<Status()>& check_stop,
 
 enum class OrderedTables { kTiles, kFootprints, kOthers };
 
+// Of the rows of table keyframes, in the order in which they lie: their numbers, where something
+// tells them better than they do.
+using KeyframeNumbers = std::function<std::vector<std::int64_t>(Connection&)>;
+
 // Writes such tables anew, with all their blobs, in a transaction. A number out of order becomes
 // the one between its neighbours that is one bit away; a row for which there is none, or one of
 // footprints or tombstones whose checksum is wrong, is left out; of footprints the index of changes
 // tells what it was. The names of those tables.
-std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables which);
+std::vector<std::string> PutTablesInOrder(Connection& connection,
+                                          OrderedTables which,
+                                          const KeyframeNumbers& keyframes);
 
 }  // namespace atlas

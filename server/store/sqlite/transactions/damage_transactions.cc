@@ -18,6 +18,7 @@
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/keyframe_row.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/pose_batch_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
@@ -131,7 +132,7 @@ void GiveUp(Connection& connection, const KeyframeRepair& repair, const Status& 
 }
 
 std::uint32_t OrderTables(Connection& connection, OrderedTables which, const std::string& author) {
-  const std::vector<std::string> tables = PutTablesInOrder(connection, which);
+  const std::vector<std::string> tables = PutTablesInOrder(connection, which, &TellKeyframeNumbers);
   for (const std::string& table : tables) {
     AddEvent(connection, {EventKind::kTablesRepaired, author, StrCat("table ", table),
                           "its rows were not found by their numbers: it was written anew"});
