@@ -120,5 +120,117 @@ TEST_F(TurnedNumbersTest, ASessionGetsItsOwnBack) {
   EXPECT_TRUE(events.empty()) << events.back().detail;
 }
 
+TEST_F(TurnedNumbersTest, UploadsGoOnBesideAKeyframeThatHasTheNextOne) {
+  FillUp();
+  Turn("keyframes", kLast, 1);
+  Open();
+  const auto put = Put(MakeKeyframe(kLast + 2, {{0, 1, 2}}));
+  ASSERT_TRUE(put) << put.error().message();
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_EQ(store_->ListKeyframeIds(0, 100)->size(), kLast + 1);
+  ExpectKeyframe(kLast);
+  ExpectKeyframe(kLast + 2);
+  ExpectNothingLeft();
+}
+
+TEST_F(TurnedNumbersTest, SessionsBeginBesideOneThatHasTheNextOne) {
+  FillUp();
+  NewKeyframe other = MakeKeyframe(1, {{0, 1, 2}});
+  other.key.session.session = "night";
+  ASSERT_TRUE(Put(other));
+  Turn("sessions", 2, 1);
+  Open();
+  other.key.session.session = "morning";
+  const auto put = Put(other);
+  ASSERT_TRUE(put) << put.error().message();
+  EXPECT_GE(Repair(), 1U);
+  std::vector<std::string> names;
+  const auto sessions = store_->ListSessions({}, 10).value();
+  for (const SessionRecord& session : sessions) {
+    names.push_back(session.key.session);
+  }
+  EXPECT_THAT(names, ElementsAre("day", "morning", "night"));
+  ExpectNothingLeft();
+}
+
+// Whatever is to be noted: by who retracts, who starts with something to mend, and who repairs.
+TEST_F(TurnedNumbersTest, EventsAreNotedBesideOneThatHasTheNextOne) {
+  FillUp();
+  for (std::int64_t i = 1; i <= 3; ++i) {
+    ASSERT_TRUE(Correct(i));
+  }
+  ASSERT_TRUE(Change(SessionAction::kRetract));
+  Turn("events", 4, 1);
+  Tamper("UPDATE counters SET checksum = 0 WHERE name = 'tiles'");
+  testing::TurnNumber(Database(), "pose_batches", 2, 64);
+  Open();
+  const auto restored = Change(SessionAction::kRestore);
+  ASSERT_TRUE(restored) << restored.error().message();
+  EXPECT_GE(Repair(), 2U);
+  ExpectNothingLeft();
+  const auto events = store_->ListEvents(0, 100).value();
+  ASSERT_GT(events.size(), 5U);
+  EXPECT_EQ(events[3].id, 4U);
+  EXPECT_EQ(events[3].kind, EventKind::kRetract);
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(),
+                          [](const Event& event) { return event.kind == EventKind::kRestore; }));
+}
+
+TEST_F(TurnedNumbersTest, CompactionsGoOnBesideOneThatHasTheNextOne) {
+  FillUp();
+  for (const std::int64_t id : {1, 2}) {
+    ASSERT_TRUE(Compact({id}));
+  }
+  Turn("compactions", 2, 1);
+  Open();
+  const auto compacted = Compact({3});
+  ASSERT_TRUE(compacted) << compacted.error().message();
+  ExpectNothingLeft();
+  const auto events = store_->ListEvents(0, 100).value();
+  for (const Event& event : events) {
+    EXPECT_EQ(event.kind, EventKind::kCompact) << event.detail;
+  }
+}
+
+// A repair moves the horizon before it comes to compactions.
+TEST_F(TurnedNumbersTest, SoDoesARepair) {
+  FillUp();
+  for (const std::int64_t id : {1, 2}) {
+    ASSERT_TRUE(Compact({id}));
+  }
+  Turn("compactions", 2, 1);
+  Tamper("UPDATE session_states SET checksum = 0");
+  Open();
+  EXPECT_GE(Repair(), 2U);
+  ExpectNothingLeft();
+}
+
+TEST_F(TurnedNumbersTest, CorrectionsGoOnBesideABatchThatHasTheNextOne) {
+  FillUp();
+  for (const std::int64_t x_um : {1, 2}) {
+    ASSERT_TRUE(Correct(x_um));
+  }
+  Turn("pose_batches", 2, 1);
+  Open();
+  const auto corrected = Correct(3);
+  ASSERT_TRUE(corrected) << corrected.error().message();
+  EXPECT_GE(Repair(), 1U);
+  ExpectNothingLeft();
+}
+
+// What was dropped has no other number than that of the keyframe.
+TEST_F(TurnedNumbersTest, WhoMeetsARowThatHasItsKeyIsToldWhatHelps) {
+  FillUp();
+  ASSERT_TRUE(Compact({2}));
+  Tamper("UPDATE tombstones SET sequence = 6");
+  Open();
+  const auto compacted = Compact({6});
+  ASSERT_FALSE(compacted);
+  EXPECT_EQ(compacted.error().code(), StatusCode::kInvalidData);
+  EXPECT_THAT(compacted.error().message(), HasSubstr("(SQLite 1555); atlas verify --repair"));
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_TRUE(Compact({6}));
+}
+
 }  // namespace
 }  // namespace atlas

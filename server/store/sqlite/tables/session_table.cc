@@ -376,7 +376,8 @@ void AddLostSession(Connection& connection,
 
 SessionRow AddSession(Connection& connection, const SessionKey& key, SessionState state) {
   SessionRow row;
-  row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));
+  row.id = static_cast<std::int64_t>(
+      TakeNumber(connection, Counter::kSessions, "SELECT 1 FROM sessions WHERE id = ?"));
   row.record.key = key;
   row.record.state = state;
   WriteSession(connection, row);
