@@ -232,5 +232,35 @@ TEST_F(TurnedNumbersTest, WhoMeetsARowThatHasItsKeyIsToldWhatHelps) {
   EXPECT_TRUE(Compact({6}));
 }
 
+// Its blobs were in the pages of the table that was written anew.
+TEST_F(TurnedNumbersTest, APurgeBehindARepairLeavesNothing) {
+  Fill();
+  Turn("keyframes", 3, 8);  // 11, before 4
+  Open();
+  EXPECT_FALSE(Check().ok());
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_EQ(Check().message(), "");
+  const auto purged = Change(SessionAction::kPurge);
+  ASSERT_TRUE(purged) << purged.error().message();
+  EXPECT_EQ(purged->keyframes, kCount);
+  store_.reset();
+  EXPECT_EQ(InTheFiles(Secret()), 0U);
+  EXPECT_GT(InTheFiles("of the night"), 1'000U);
+}
+
+// One of two of a name that an index had lost, whose other one was purged meanwhile.
+TEST_F(TurnedNumbersTest, NorDoesARepairThatPurges) {
+  Fill();
+  store_.reset();
+  testing::TurnBits(Database(), "sqlite_autoindex_sessions_1", "busday", 0, 32);
+  Open();
+  ASSERT_TRUE(Put(Large(kCount + 1)));
+  ASSERT_TRUE(Change(SessionAction::kPurge));
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_EQ(store_->ListSessions({}, 10)->size(), 2U);
+  EXPECT_TRUE(IsSoonGone(Secret()));
+  ExpectSound();
+}
+
 }  // namespace
 }  // namespace atlas

@@ -185,10 +185,12 @@ std::string ReadText(Query row, const char* table) {
   return row.Step() ? row.Text() : std::string();
 }
 
-// Calls `copy` between the making of an empty table "rebuilt" and its taking the name.
+// Calls `copy` between the making of an empty table "rebuilt" and its taking the name. What a purge
+// deletes later must not be in the pages that are free from then on.
 template <typename Copy>
 void Rebuild(Connection& connection, RowKind kind, const char* name, const Copy& copy) {
   connection.WriteDeferred();
+  const OverwritingDeletions overwriting(connection);
   const std::string table = ReadText(
       connection.Prepare("SELECT sql FROM sqlite_master WHERE type = 'table' AND name = ?"), name);
   std::vector<std::string> indexes;
