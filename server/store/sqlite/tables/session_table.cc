@@ -318,7 +318,8 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
   if (!row) {
     return row.error();
   }
-  WithoutCounting(connection, RowKind::kSession, [&] { WriteSession(connection, *row); });
+  const ToleratedIndexes tolerated(connection);  // the index of names has what is told
+  PutBackSessions(connection, {*row});
   return {};
 }
 
