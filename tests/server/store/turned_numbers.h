@@ -45,13 +45,17 @@ class RowPlaces {
     }
     return value;
   }
-  // Of up to eight bytes.
+  // Of up to nine bytes; the ninth has no bit that says whether there is another one.
   std::uint64_t ReadVarint(std::size_t& at) const {
     std::uint64_t value = 0;
-    do {
-      value = value << 7U | (Byte(at) & 0x7FU);
-    } while ((Byte(at++) & 0x80U) != 0);
-    return value;
+    for (int i = 0; i < 8; ++i) {
+      const std::uint8_t byte = Byte(at++);
+      value = value << 7U | (byte & 0x7FU);
+      if (byte < 0x80U) {
+        return value;
+      }
+    }
+    return value << 8U | Byte(at++);
   }
 
   std::string_view file_;

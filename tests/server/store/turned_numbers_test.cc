@@ -218,6 +218,19 @@ TEST_F(TurnedNumbersTest, CorrectionsGoOnBesideABatchThatHasTheNextOne) {
   ExpectNothingLeft();
 }
 
+// The index of marks still has what the row was.
+TEST_F(TurnedNumbersTest, TheMarkOfAnotherTileIsSetAgainByAStart) {
+  FillUp();
+  store_.reset();
+  const auto key = testing::AskDatabase(Database(), "SELECT key FROM dirty_tiles WHERE level = 0");
+  Turn("dirty_tiles", static_cast<std::uint64_t>(key), 1);
+  Open();
+  const ClaimResult claimed = Claim();
+  ASSERT_FALSE(claimed.claims.empty());
+  EXPECT_EQ(claimed.claims.front().id, (TileId{0, 1, 2}));
+  ExpectNothingLeft();
+}
+
 // What was dropped has no other number than that of the keyframe.
 TEST_F(TurnedNumbersTest, WhoMeetsARowThatHasItsKeyIsToldWhatHelps) {
   FillUp();

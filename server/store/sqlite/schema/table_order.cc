@@ -253,6 +253,8 @@ bool HasDamagedCopy(Connection& connection, const PairedTable& table) {
 
 OrderedTables GroupOf(RowKind kind) {
   switch (kind) {
+    case RowKind::kCounter:
+      return OrderedTables::kCounters;
     case RowKind::kTile:
       return OrderedTables::kTiles;
     case RowKind::kFootprint:

@@ -18,7 +18,7 @@ namespace atlas {
 void AddOrderChecks(const std::function<Status()>& check_stop,
                     std::vector<std::function<Status(Connection&)>>& checks);
 
-enum class OrderedTables { kTiles, kFootprints, kOthers };
+enum class OrderedTables { kCounters, kTiles, kFootprints, kOthers };
 
 struct OrderedTable {
   std::string name;
