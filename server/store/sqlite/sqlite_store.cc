@@ -177,11 +177,15 @@ class SqliteStore final : public AtlasStore {
   }
   void RepairTables(TableRepair what, std::string author, Done<std::uint32_t> done) override {
     const std::uint8_t levels = identity_.profile.levels;
-    Write<std::uint32_t>(std::move(done),
-                         [what, levels, a = std::move(author)](Connection& connection) {
-                           return RepairTablesInStore(connection, what, levels, a);
-                         },
-                         {.is_alone = true});
+    const std::function<void()> empty_soon = [this] {
+      log_.EmptySoon();  // one of two sessions that become one may be purged
+    };
+    Write<std::uint32_t>(
+        std::move(done),
+        [what, levels, a = std::move(author)](Connection& connection) {
+          return RepairTablesInStore(connection, what, levels, a);
+        },
+        {.is_alone = true, .settle = what == TableRepair::kRows ? empty_soon : nullptr});
   }
 
   Result<AtlasFacts> WriteBackup(const std::filesystem::path& file,

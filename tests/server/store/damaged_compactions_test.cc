@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/server/store/store_fixture.h"
-#include "tests/server/store/turned_bits.h"
+#include "tests/server/store/turned_numbers.h"
 
 namespace atlas {
 namespace {
@@ -115,6 +115,23 @@ TEST_F(DamagedCompactionsTest, ARowOutOfOrderGetsItsPlaceBack) {
   store_.reset();
   EXPECT_EQ(testing::AskDatabase(Database(), "SELECT group_concat(id, '') FROM pose_batches"),
             1234);
+}
+
+// The table takes none without what each has: here one says of a coordinate, 0, that it is none.
+TEST_F(DamagedCompactionsTest, ARowThatATableWrittenAnewDoesNotTakeIsNoted) {
+  Live();
+  store_.reset();
+  testing::TurnNumber(Database(), "pose_history", 5, 64);
+  testing::TurnBits(Database(), "pose_history", {14, 0, 1, 1, 9, 0x19, 9, 8, 8}, 7, 8);
+  Open();
+  EXPECT_GE(Repair(), 1U);
+  EXPECT_EQ(Findings(), "");
+  std::string noted;
+  const auto events = store_->ListEvents(0, 100).value();
+  for (const Event& event : events) {
+    noted += event.subject == "table pose_history" ? event.detail : "";
+  }
+  EXPECT_THAT(noted, ::testing::HasSubstr("without 1 of its rows"));
 }
 
 // What was dropped at its revision can be read at no earlier one.

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/server/store/store_fixture.h"
+#include "tests/server/store/turned_bits.h"
 
 namespace atlas {
 namespace {
@@ -128,6 +129,22 @@ TEST_F(DamagedSessionsTest, ABitOfARowThatItsIndexesLackKeepsNobodyFromStarting)
   }
   EXPECT_GT(places, 1U) << "its row and an index";
   EXPECT_GE(listed, 2U) << "its row was told by the index";
+}
+
+// As who reads everything back under a running daemon meets it.
+TEST_F(DamagedSessionsTest, ABitOfANameThatTurnsUnderTheStoreIsTurnedBackWithItsKeyframe) {
+  Begin({"a", "b"});
+  Spoil("PRAGMA wal_checkpoint(TRUNCATE)");
+  testing::TurnBits(Database(), "sessions", "busb", 3, 1);
+  Spoil("UPDATE starts SET number = number");  // what anybody has read is read again
+  ASSERT_FALSE(store_->ReadKeyframe(2));
+  const auto noted =
+      Await<std::uint32_t>([&](auto done) { store_->NoteDamage({2}, std::move(done)); });
+  ASSERT_TRUE(noted) << noted.error().message();
+  EXPECT_EQ(*noted, 0U) << "it is whole again";
+  EXPECT_TRUE(store_->ReadKeyframe(2));
+  EXPECT_THAT(Names(List()), ElementsAre("a", "b"));
+  EXPECT_TRUE(store_->CheckCounters().ok()) << store_->CheckCounters().message();
 }
 
 TEST_F(DamagedSessionsTest, TheNextStartPutsThemRight) {

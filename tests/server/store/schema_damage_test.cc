@@ -299,6 +299,9 @@ TEST_F(SchemaDamageTest, WhatMeddlesWithTablesOfAnAtlasIsRefusedUntilItIsDropped
   }
   Tamper("CREATE TABLE notes (text); CREATE INDEX of_notes ON notes (text)");
   EXPECT_EQ(OpenCode(), StatusCode::kOk) << "a table of somebody else";
+  Tamper(
+      "CREATE VIRTUAL TABLE words USING fts5 (text); CREATE VIRTUAL TABLE more USING fts5 (text)");
+  EXPECT_EQ(OpenCode(), StatusCode::kOk) << "two that have no page of their own";
 }
 
 // A file of the version before is upgraded behind it.

@@ -49,6 +49,12 @@ bool IsWithoutTable(const SQLite::Exception& error) {
           what.find("ON CONFLICT clause does not match") != std::string_view::npos);
 }
 
+// What a row is told whose number another one has: numbers are given once, so that one is damaged.
+bool IsNumberTaken(const SQLite::Exception& error) {
+  return error.getExtendedErrorCode() == SQLITE_CONSTRAINT_PRIMARYKEY ||
+         error.getExtendedErrorCode() == SQLITE_CONSTRAINT_ROWID;
+}
+
 // Where SQLite says itself that the file is damaged: an index that lacks a row can be made anew,
 // the text of the schema is known, a page that cannot be read is gone.
 const char* AdviceOf(const SQLite::Exception& error) {
@@ -75,6 +81,11 @@ Status StatusFromSqlite(const SQLite::Exception& error) {
   if (IsWithoutTable(error)) {
     return Status(StatusCode::kInvalidData,
                   StrCat("store: the database is damaged: ", error.what(), "; restore a backup"));
+  }
+  if (IsNumberTaken(error)) {
+    return Status(StatusCode::kInvalidData,
+                  StrCat("store: the database is damaged: ", error.what(), " (SQLite ",
+                         error.getExtendedErrorCode(), "); atlas verify --repair"));
   }
   if (error.getExtendedErrorCode() == SQLITE_IOERR_SHMSIZE) {
     return Status(

@@ -53,6 +53,25 @@ void SetCounter(Connection& connection, Counter counter, std::uint64_t value) {
   Write(connection, counter, value);
 }
 
+std::uint64_t NextNumber(Connection& connection, Counter counter, const char* find) {
+  const auto is_taken = [&](std::uint64_t number) {
+    Query row = connection.Prepare(find);
+    row.Bind(number);
+    return row.Step();
+  };
+  std::uint64_t number = ReadCounter(connection, counter) + 1;
+  while (is_taken(number)) {
+    ++number;
+  }
+  return number;
+}
+
+std::uint64_t TakeNumber(Connection& connection, Counter counter, const char* find) {
+  const std::uint64_t number = NextNumber(connection, counter, find);
+  Write(connection, counter, number);
+  return number;
+}
+
 bool IsCounterIntact(Connection& connection, Counter counter) {
   return Find(connection, counter).has_value();
 }

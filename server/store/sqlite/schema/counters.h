@@ -30,6 +30,11 @@ enum class Counter : std::uint8_t {
 std::uint64_t ReadCounter(Connection& connection, Counter counter);
 // The value after adding `delta`.
 std::uint64_t AddToCounter(Connection& connection, Counter counter, std::int64_t delta);
+// The number of the next row of those that a counter numbers: behind the counter, and none that a
+// damaged row has, as `find` tells, a statement with one parameter. The counter stays what it is.
+std::uint64_t NextNumber(Connection& connection, Counter counter, const char* find);
+// The same, and the counter says so.
+std::uint64_t TakeNumber(Connection& connection, Counter counter, const char* find);
 // Whatever it was before.
 void SetCounter(Connection& connection, Counter counter, std::uint64_t value);
 

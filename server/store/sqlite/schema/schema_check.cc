@@ -96,13 +96,17 @@ std::string DamageOf(const Pair& pair) {
                                      " is damaged (", difference, ")");
 }
 
-// Two that begin on one page: what is written to the one is gone from the other.
+// Two that begin on one page: what is written to the one is gone from the other. Views, triggers
+// and tables that somebody's module keeps begin on none.
 std::string FindSharedRoot(const std::vector<SchemaObject>& found) {
   std::map<std::int64_t, const SchemaObject*> roots;
   for (const SchemaObject& object : found) {
     const bool has_pages = object.type == "table" || object.type == "index";
+    if (!has_pages || object.root == 0) {
+      continue;
+    }
     const auto [root, is_first] = roots.emplace(object.root, &object);
-    if (has_pages && !is_first) {
+    if (!is_first) {
       return StrCat(NameOf(*root->second), " and ", NameOf(object), " begin on one page");
     }
   }

@@ -185,10 +185,12 @@ std::string ReadText(Query row, const char* table) {
   return row.Step() ? row.Text() : std::string();
 }
 
-// Calls `copy` between the making of an empty table "rebuilt" and its taking the name.
+// Calls `copy` between the making of an empty table "rebuilt" and its taking the name. What a purge
+// deletes later must not be in the pages that are free from then on.
 template <typename Copy>
 void Rebuild(Connection& connection, RowKind kind, const char* name, const Copy& copy) {
   connection.WriteDeferred();
+  const OverwritingDeletions overwriting(connection);
   const std::string table = ReadText(
       connection.Prepare("SELECT sql FROM sqlite_master WHERE type = 'table' AND name = ?"), name);
   std::vector<std::string> indexes;
@@ -213,7 +215,10 @@ void Rebuild(Connection& connection, RowKind kind, const char* name, const Copy&
   }
 }
 
-void CopyNumbered(Connection& connection, const NumberedTable& table, Numbers numbers) {
+// How many rows were left out: those without a number of their own, and those that lack a value
+// that each has to have.
+std::size_t CopyNumbered(Connection& connection, const NumberedTable& table, Numbers numbers) {
+  const std::size_t rows = numbers.size();
   const std::string columns = ReadText(
       connection.Prepare("SELECT group_concat(name) FROM pragma_table_info(?)"), table.name);
   const auto next = std::make_shared<std::size_t>(0);
@@ -225,6 +230,7 @@ void CopyNumbered(Connection& connection, const NumberedTable& table, Numbers nu
   connection.Execute(StrCat("INSERT OR IGNORE INTO rebuilt (", columns, ") SELECT next_number()",
                             others, " FROM ", table.name, " NOT INDEXED")
                          .c_str());
+  return rows - static_cast<std::size_t>(connection.Ask("SELECT changes()"));
 }
 
 void CopyPaired(Connection& connection, const PairedTable& table) {
@@ -247,6 +253,8 @@ bool HasDamagedCopy(Connection& connection, const PairedTable& table) {
 
 OrderedTables GroupOf(RowKind kind) {
   switch (kind) {
+    case RowKind::kCounter:
+      return OrderedTables::kCounters;
     case RowKind::kTile:
       return OrderedTables::kTiles;
     case RowKind::kFootprint:
@@ -271,22 +279,26 @@ void AddOrderChecks(const std::function<Status()>& check_stop,
   add(kPaired);
 }
 
-std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables which) {
-  std::vector<std::string> rebuilt;
+std::vector<OrderedTable> PutTablesInOrder(Connection& connection,
+                                           OrderedTables which,
+                                           const KeyframeNumbers& keyframes) {
+  std::vector<OrderedTable> rebuilt;
   for (const NumberedTable& table : kNumbered) {
     if (GroupOf(table.kind) == which && !CheckOrder(connection, table, GoOn).ok()) {
-      Numbers numbers = ReadNumbers(connection, table);
+      Numbers numbers =
+          table.kind == RowKind::kKeyframe ? keyframes(connection) : ReadNumbers(connection, table);
       Order(numbers);
+      OrderedTable ordered{table.name, 0};
       Rebuild(connection, table.kind, table.name,
-              [&] { CopyNumbered(connection, table, std::move(numbers)); });
-      rebuilt.emplace_back(table.name);
+              [&] { ordered.left_out = CopyNumbered(connection, table, std::move(numbers)); });
+      rebuilt.push_back(std::move(ordered));
     }
   }
   for (const PairedTable& table : kPaired) {
     if (GroupOf(table.kind) == which &&
         (!CheckOrder(connection, table, GoOn).ok() || HasDamagedCopy(connection, table))) {
       Rebuild(connection, table.kind, table.name, [&] { CopyPaired(connection, table); });
-      rebuilt.emplace_back(table.name);
+      rebuilt.push_back({table.name, 0});
     }
   }
   return rebuilt;

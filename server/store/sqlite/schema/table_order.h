@@ -3,6 +3,8 @@
 // anew mends it.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -16,12 +18,23 @@ namespace atlas {
 void AddOrderChecks(const std::function<Status()>& check_stop,
                     std::vector<std::function<Status(Connection&)>>& checks);
 
-enum class OrderedTables { kTiles, kFootprints, kOthers };
+enum class OrderedTables { kCounters, kTiles, kFootprints, kOthers };
+
+struct OrderedTable {
+  std::string name;
+  std::size_t left_out = 0;  // rows; of tables without numbers 0
+};
+
+// Of the rows of table keyframes, in the order in which they lie: their numbers, where something
+// tells them better than they do.
+using KeyframeNumbers = std::function<std::vector<std::int64_t>(Connection&)>;
 
 // Writes such tables anew, with all their blobs, in a transaction. A number out of order becomes
-// the one between its neighbours that is one bit away; a row for which there is none, or one of
-// footprints or tombstones whose checksum is wrong, is left out; of footprints the index of changes
-// tells what it was. The names of those tables.
-std::vector<std::string> PutTablesInOrder(Connection& connection, OrderedTables which);
+// the one between its neighbours that is one bit away. A row for which there is none is left out,
+// one that lacks a value that each of its table has, and one of footprints or tombstones whose
+// checksum is wrong; of footprints the index of changes tells what it was. Which tables.
+std::vector<OrderedTable> PutTablesInOrder(Connection& connection,
+                                           OrderedTables which,
+                                           const KeyframeNumbers& keyframes);
 
 }  // namespace atlas

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/str_cat.h"
+#include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 
 namespace atlas {
@@ -68,6 +69,27 @@ Result<CompactionRow> ReadCompactionRow(Connection& connection, std::int64_t id)
   return ReadCompaction(row);
 }
 
+// The number of a row that is damaged, with which it is whole.
+std::optional<std::int64_t> OwnNumber(Connection& connection, std::int64_t number) {
+  Query query = connection.Prepare(
+      "SELECT id, revision, before_ms, author, dropped, bytes, checksum FROM compactions "
+      "WHERE id = ?");
+  query.Bind(number);
+  if (!query.Step()) {
+    return std::nullopt;
+  }
+  CompactionRow row{query.Int(),  query.Unsigned(), query.Int(),
+                    query.Text(), query.Unsigned(), query.Unsigned()};
+  const std::int64_t checksum = query.Int();
+  for (int bit = 0; query.fits() && bit < 63; ++bit) {
+    row.id = number ^ (std::int64_t{1} << bit);
+    if (HashOf(row) == checksum) {
+      return row.id;
+    }
+  }
+  return std::nullopt;
+}
+
 // What a session lost to a compaction.
 struct Loss {
   std::uint64_t dropped = 0;
@@ -111,6 +133,18 @@ std::int64_t HashOf(const CompactionRow& row) {
       .Unsigned(row.dropped)
       .Unsigned(row.bytes)
       .value();
+}
+
+std::int64_t TakeCompactionNumber(Connection& connection) {
+  constexpr const char* kFind = "SELECT 1 FROM compactions WHERE id = ?";
+  const auto next = static_cast<std::int64_t>(ReadCounter(connection, Counter::kCompactions)) + 1;
+  if (const auto own = OwnNumber(connection, next)) {
+    connection.Prepare("UPDATE OR IGNORE compactions SET id = ? WHERE id = ?")
+        .Bind(*own)
+        .Bind(next)
+        .Run();
+  }
+  return static_cast<std::int64_t>(TakeNumber(connection, Counter::kCompactions, kFind));
 }
 
 void WriteCompaction(Connection& connection, const CompactionRow& row) {

@@ -23,6 +23,9 @@ struct CompactionRow {
 };
 // Its checksum.
 std::int64_t HashOf(const CompactionRow& row);
+// Of the next one. Compactions are numbered without a gap: a damaged row that has it gets its own
+// back, if that is one bit away; else it goes on having it.
+std::int64_t TakeCompactionNumber(Connection& connection);
 void WriteCompaction(Connection& connection, const CompactionRow& row);
 void DeleteCompaction(Connection& connection, std::int64_t id);
 

@@ -251,7 +251,8 @@ Status CheckMarks(Connection& connection) {
 
 void ForgetMarks(Connection& connection) {
   WriteLateMarks(connection);
-  connection.Execute("DELETE FROM dirty_tiles");
+  const ToleratedIndexes tolerated(connection);
+  connection.Execute("DELETE FROM dirty_tiles; REINDEX dirty_tiles");
   WriteTableSum(connection, RowKind::kDirtyTile);
 }
 

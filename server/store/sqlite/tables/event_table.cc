@@ -216,7 +216,7 @@ void Replace(Connection& connection, Event event) {
 }  // namespace
 
 void AddEvent(Connection& connection, const NewEvent& event) {
-  Insert(connection, {AddToCounter(connection, Counter::kEvents, 1),
+  Insert(connection, {TakeNumber(connection, Counter::kEvents, "SELECT 1 FROM events WHERE id = ?"),
                       ReadCounter(connection, Counter::kRevision), NowMs(), event.kind,
                       event.author, event.subject, event.detail, false});
 }

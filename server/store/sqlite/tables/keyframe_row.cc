@@ -24,18 +24,16 @@ std::int64_t FormerHashOf(const FullKeyframeRow& row) {
   return hash.value();
 }
 
-}  // namespace
-
-std::int64_t HashOf(const FullKeyframeRow& row) {
-  RowHash hash(RowKind::kKeyframe);
-  AddCommon(hash, row.row);
-  hash.Int(row.shard).Unsigned(row.revision).Int(row.prior ? 1 : 0);
-  const PositionPrior prior = row.prior.value_or(PositionPrior{});
-  return hash.Int(prior.x_um).Int(prior.y_um).Int(prior.z_um).Int(prior.radius_mm).value();
-}
-
-Result<FullKeyframeRow> ReadFullKeyframeRow(Query& query) {
+// As its columns have it.
+struct StoredRow {
   FullKeyframeRow row;
+  std::int64_t checksum = 0;
+  bool fits = true;  // no column was cut
+};
+
+StoredRow ReadColumns(Query& query) {
+  StoredRow stored;
+  FullKeyframeRow& row = stored.row;
   KeyframeRecord& r = row.row.record;
   r.id = query.Int();
   row.row.session_id = query.Int();
@@ -53,12 +51,44 @@ Result<FullKeyframeRow> ReadFullKeyframeRow(Query& query) {
   const bool has_prior = query.Bool();
   const PositionPrior prior{query.Int(), query.Int(), query.Int(), query.Unsigned32()};
   row.prior = has_prior ? std::optional(prior) : std::nullopt;
-  const std::int64_t checksum = query.Int();
-  if (!query.fits() || (checksum != HashOf(row) && checksum != FormerHashOf(row))) {
-    return Error(StatusCode::kInvalidData,
-                 StrCat("store: the row of keyframe ", r.id, " is damaged: wrong checksum"));
+  stored.checksum = query.Int();
+  stored.fits = query.fits();
+  return stored;
+}
+
+bool IsIntact(const StoredRow& stored) {
+  return stored.fits &&
+         (stored.checksum == HashOf(stored.row) || stored.checksum == FormerHashOf(stored.row));
+}
+
+// The number with which the row is whole, if it is that or one bit away from it; else its own.
+std::int64_t TellNumber(StoredRow stored) {
+  std::int64_t& id = stored.row.row.record.id;
+  const std::int64_t own = id;
+  for (int bit = 0; stored.fits && !IsIntact(stored) && bit < 63; ++bit) {
+    id = own ^ (std::int64_t{1} << bit);
   }
-  return row;
+  return IsIntact(stored) ? id : own;
+}
+
+}  // namespace
+
+std::int64_t HashOf(const FullKeyframeRow& row) {
+  RowHash hash(RowKind::kKeyframe);
+  AddCommon(hash, row.row);
+  hash.Int(row.shard).Unsigned(row.revision).Int(row.prior ? 1 : 0);
+  const PositionPrior prior = row.prior.value_or(PositionPrior{});
+  return hash.Int(prior.x_um).Int(prior.y_um).Int(prior.z_um).Int(prior.radius_mm).value();
+}
+
+Result<FullKeyframeRow> ReadFullKeyframeRow(Query& query) {
+  StoredRow stored = ReadColumns(query);
+  if (!IsIntact(stored)) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("store: the row of keyframe ", stored.row.row.record.id,
+                        " is damaged: wrong checksum"));
+  }
+  return std::move(stored.row);
 }
 
 Result<FullKeyframeRow> ReadFullKeyframeRow(Connection& connection, std::int64_t id) {
@@ -82,6 +112,16 @@ std::vector<std::int64_t> ListDamagedKeyframeRows(Connection& connection) {
     }
   }
   return ids;
+}
+
+std::vector<std::int64_t> TellKeyframeNumbers(Connection& connection) {
+  Query row = connection.Prepare("SELECT " KEYFRAME_COLUMNS " FROM keyframes NOT INDEXED");
+  std::vector<std::int64_t> numbers;
+  while (row.Step()) {
+    row.Rewind();
+    numbers.push_back(TellNumber(ReadColumns(row)));
+  }
+  return numbers;
 }
 
 bool IsKeyframeRowUnder(Connection& connection,

@@ -36,6 +36,9 @@ Result<FullKeyframeRow> ReadFullKeyframeRow(Connection& connection, std::int64_t
 
 // Of rows whose checksum is wrong: their ids.
 std::vector<std::int64_t> ListDamagedKeyframeRows(Connection& connection);
+// Of all rows, in the order in which they lie: their ids, as their checksums have them where one
+// bit turned.
+std::vector<std::int64_t> TellKeyframeNumbers(Connection& connection);
 // Whether the row would be intact under another key.
 bool IsKeyframeRowUnder(Connection& connection,
                         std::int64_t id,

@@ -318,7 +318,8 @@ Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching
   if (!row) {
     return row.error();
   }
-  WithoutCounting(connection, RowKind::kSession, [&] { WriteSession(connection, *row); });
+  const ToleratedIndexes tolerated(connection);  // the index of names has what is told
+  PutBackSessions(connection, {*row});
   return {};
 }
 
@@ -376,7 +377,8 @@ void AddLostSession(Connection& connection,
 
 SessionRow AddSession(Connection& connection, const SessionKey& key, SessionState state) {
   SessionRow row;
-  row.id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kSessions, 1));
+  row.id = static_cast<std::int64_t>(
+      TakeNumber(connection, Counter::kSessions, "SELECT 1 FROM sessions WHERE id = ?"));
   row.record.key = key;
   row.record.state = state;
   WriteSession(connection, row);

@@ -40,8 +40,7 @@ bool IsSessionRowOf(Connection& connection, std::int64_t id, std::int64_t other)
 // count any more.
 enum class Vouching { kByChecksum, kByNobody };
 Result<SessionRow> TellSession(Connection& connection, std::int64_t id, Vouching vouching);
-// Writes it anew. SQLite does not, and throws, where an index has something else than the damaged
-// row.
+// Writes it anew.
 Status RestoreSession(Connection& connection, std::int64_t id, Vouching vouching);
 // The same of one whose name is known.
 Result<SessionRow> TellNamedSession(Connection& connection,

@@ -91,7 +91,7 @@ Result<CompactionResult> CompactInStore(Connection& connection, const Compaction
     return CompactionResult{0, 0, ReadCounter(connection, Counter::kHistoryHorizon),
                             ReadCounter(connection, Counter::kRevision)};
   }
-  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kCompactions, 1));
+  const std::int64_t id = TakeCompactionNumber(connection);
   CompactionResult result{compaction.dropped.size(), 0, 0, 0};
   std::map<std::int64_t, Loss> losses;  // by session
   for (const std::int64_t keyframe : compaction.dropped) {

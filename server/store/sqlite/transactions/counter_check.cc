@@ -6,6 +6,7 @@
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/schema_check.h"
+#include "server/store/sqlite/schema/table_order.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/damaged_keyframe_table.h"
 #include "server/store/sqlite/tables/event_table.h"
@@ -121,8 +122,9 @@ int RecountCounters(Connection& connection) {
 
 int RestoreCounters(Connection& connection) {
   connection.WriteDeferred();
-  std::string names;
-  int restored = 0;
+  const bool is_ordered = PutTablesInOrder(connection, OrderedTables::kCounters, {}).empty();
+  std::string names = is_ordered ? "" : "their order";
+  int restored = is_ordered ? 0 : 1;
   for (const Recount& recount : kRecounts) {
     if (IsCounterIntact(connection, recount.counter)) {
       continue;

@@ -18,6 +18,7 @@
 #include "server/store/sqlite/tables/dirty_table.h"
 #include "server/store/sqlite/tables/event_table.h"
 #include "server/store/sqlite/tables/footprint_table.h"
+#include "server/store/sqlite/tables/keyframe_row.h"
 #include "server/store/sqlite/tables/keyframe_table.h"
 #include "server/store/sqlite/tables/pose_batch_table.h"
 #include "server/store/sqlite/tables/pose_table.h"
@@ -131,10 +132,14 @@ void GiveUp(Connection& connection, const KeyframeRepair& repair, const Status& 
 }
 
 std::uint32_t OrderTables(Connection& connection, OrderedTables which, const std::string& author) {
-  const std::vector<std::string> tables = PutTablesInOrder(connection, which);
-  for (const std::string& table : tables) {
-    AddEvent(connection, {EventKind::kTablesRepaired, author, StrCat("table ", table),
-                          "its rows were not found by their numbers: it was written anew"});
+  const std::vector<OrderedTable> tables =
+      PutTablesInOrder(connection, which, &TellKeyframeNumbers);
+  for (const OrderedTable& table : tables) {
+    const std::string without =
+        table.left_out == 0 ? "" : StrCat(", without ", table.left_out, " of its rows");
+    AddEvent(connection,
+             {EventKind::kTablesRepaired, author, StrCat("table ", table.name),
+              StrCat("its rows were not found by their numbers: it was written anew", without)});
   }
   return static_cast<std::uint32_t>(tables.size());
 }

@@ -10,7 +10,7 @@ namespace atlas {
 std::uint64_t MoveHorizon(Connection& connection, const std::string& author) {
   const std::uint64_t revision = NextRevision(connection);
   SetCounter(connection, Counter::kHistoryHorizon, revision);
-  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kCompactions, 1));
+  const std::int64_t id = TakeCompactionNumber(connection);
   WriteCompaction(connection, {id, revision, 0, author, 0, 0});
   return revision;
 }

@@ -8,6 +8,7 @@
 #include "server/store/sqlite/schema/table_order.h"
 #include "server/store/sqlite/schema/table_sums.h"
 #include "server/store/sqlite/tables/event_table.h"
+#include "server/store/sqlite/tables/keyframe_row.h"
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/tables/tile_table.h"
 #include "server/store/sqlite/transactions/key_repairs.h"
@@ -39,7 +40,8 @@ Result<std::uint32_t> RepairIndexes(Connection& connection,
                                     std::uint8_t levels,
                                     const std::string& author) {
   // All that a whole row of footprints was made of may be in one of two places.
-  const bool is_ordered = PutTablesInOrder(connection, OrderedTables::kFootprints).empty();
+  const bool is_ordered =
+      PutTablesInOrder(connection, OrderedTables::kFootprints, &TellKeyframeNumbers).empty();
   Status status = is_ordered ? Status() : CheckTableSum(connection, RowKind::kFootprint);
   if (status.ok()) {
     status = CheckRowsAreWhole(connection);

@@ -128,12 +128,12 @@ class KeyRepair {
     connection_.Execute("REINDEX keyframe_tiles; REINDEX tiles; REINDEX dirty_tiles");
     for (const KeyedTable* table : {&kStates, &kPoseLines, &kKeyframes}) {
       const ToleratedIndexes tolerated(connection_);
-      if (table == &kKeyframes) {
-        RestoreNumbers();
-      }
       RestoreKeys(*table);
       SettleTwinsOf(*table);
       connection_.Execute(table->reindex);
+      if (table == &kKeyframes) {
+        RestoreNumbers();
+      }
     }
     if (has_lost_history_) {
       MoveHorizon(connection_, author_);
@@ -142,17 +142,15 @@ class KeyRepair {
   }
 
  private:
-  // Of keyframes whose number alone has a turned bit. Those of lines mean nothing.
+  // Of keyframes whose number alone has a turned bit. Those of lines mean nothing. An index that
+  // has the key under the true number would let nobody write that: it is made anew before.
   void RestoreNumbers() {
     for (const std::int64_t id : ListDamagedKeyframeRows(connection_)) {
       for (int bit = 0; bit < 63; ++bit) {
         const std::int64_t other = id ^ (std::int64_t{1} << bit);
         if (IsKeyframeRowOf(connection_, id, other)) {
-          connection_.Prepare("UPDATE OR IGNORE keyframes SET id = ? WHERE id = ?")
-              .Bind(other)
-              .Bind(id)
-              .Run();
-          ++repaired_;
+          Query update = connection_.Prepare("UPDATE OR IGNORE keyframes SET id = ? WHERE id = ?");
+          repaired_ += update.Bind(other).Bind(id).Run() > 0 ? 1U : 0U;
           break;
         }
       }

@@ -47,7 +47,8 @@ PoseStep::PoseStep(Connection& connection,
                    const std::optional<PlausibilityLimits>& limits)
     : connection_(connection), author_(std::move(author)), limits_(limits) {
   result_.revision = ReadCounter(connection, Counter::kRevision) + 1;
-  result_.batch = ReadCounter(connection, Counter::kBatch) + 1;
+  result_.batch =
+      NextNumber(connection, Counter::kBatch, "SELECT 1 FROM pose_batches WHERE id = ?");
 }
 
 Status PoseStep::Move(const NewPose& update) {
@@ -99,7 +100,7 @@ PoseBatchResult PoseStep::Finish(const Account& account) {
     return std::move(result_);
   }
   NextRevision(connection_);
-  AddToCounter(connection_, Counter::kBatch, 1);
+  SetCounter(connection_, Counter::kBatch, result_.batch);
   result_.tiles_marked = static_cast<std::uint32_t>(marked_.size());
   for (const TileId& tile : marked_) {
     MarkTile(connection_, tile, result_.revision, result_.revision);

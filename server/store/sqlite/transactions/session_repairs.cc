@@ -107,9 +107,7 @@ class SessionRepair {
   // Of each id and each name one, that is whole.
   Status RepairRows() {
     const ToleratedIndexes tolerated(connection_);
-    for (const std::int64_t id : ListDamagedSessions(connection_)) {
-      RestoreId(id);
-    }
+    RestoreIds();
     for (const std::int64_t id : ListLostSessions(connection_)) {
       NameLost(id);
     }
@@ -122,16 +120,27 @@ class SessionRepair {
     return {};
   }
 
+  // An index that has the name under the true id would let nobody write that.
+  void RestoreIds() {
+    const std::vector<std::int64_t> damaged = ListDamagedSessions(connection_);
+    const bool has_twins = connection_.Ask(
+                               "SELECT EXISTS (SELECT 1 FROM sessions NOT INDEXED "
+                               "GROUP BY vehicle, session HAVING count(*) > 1)") != 0;
+    if (!damaged.empty() && !has_twins) {
+      connection_.Execute("REINDEX sessions");
+    }
+    for (const std::int64_t id : damaged) {
+      RestoreId(id);
+    }
+  }
+
   // Of which one bit turned.
   void RestoreId(std::int64_t id) {
     for (int bit = 0; bit < 63; ++bit) {
       const std::int64_t other = id ^ (std::int64_t{1} << bit);
       if (IsSessionRowOf(connection_, id, other)) {
-        connection_.Prepare("UPDATE OR IGNORE sessions SET id = ? WHERE id = ?")
-            .Bind(other)
-            .Bind(id)
-            .Run();
-        ++repaired_;
+        Query update = connection_.Prepare("UPDATE OR IGNORE sessions SET id = ? WHERE id = ?");
+        repaired_ += update.Bind(other).Bind(id).Run() > 0 ? 1U : 0U;
         return;
       }
     }

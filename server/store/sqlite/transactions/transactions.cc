@@ -72,7 +72,8 @@ PutKeyframeResult AddKeyframe(Connection& connection,
                               const NewKeyframe& keyframe,
                               const SessionRow& session) {
   const std::uint64_t revision = NextRevision(connection);
-  const auto id = static_cast<std::int64_t>(AddToCounter(connection, Counter::kLastKeyframeId, 1));
+  const auto id = static_cast<std::int64_t>(
+      TakeNumber(connection, Counter::kLastKeyframeId, "SELECT 1 FROM keyframes WHERE id = ?"));
   InsertKeyframe(connection, keyframe, id, session.id, revision);
   const std::string& author = keyframe.key.session.vehicle;
   WritePose(connection, {id, keyframe.pose, revision, 0, author});
