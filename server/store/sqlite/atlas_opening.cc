@@ -310,6 +310,10 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
   if (Status status = FindOrCreateAtlas(directory, options); !status.ok()) {
     return Error(std::move(status));
   }
+  if (std::error_code ignored; std::filesystem::is_directory(directory.database_file(), ignored)) {
+    return Error(StatusCode::kPermissionDenied,
+                 StrCat(directory.database_file().string(), ": is a folder, not a database"));
+  }
   const Result<DamagedLog> log = MendLog(LogOf(directory));
   if (!log) {
     return Error(log.error());

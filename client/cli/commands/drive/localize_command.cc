@@ -59,11 +59,6 @@ boost::json::object SummaryJson(const DriveLocalizationReport& report,
       {"hz", Rounded(report.hz(), 2)},
       {"bytes_received", bytes_received}};
   if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
-  for (const UnreadableScan& scan : report.unreadable) {
-    if (!json.contains("unreadable")) json["unreadable"] = boost::json::array();
-    json["unreadable"].as_array().push_back(
-        boost::json::object{{"scan", scan.scan}, {"error", scan.why.message()}});
-  }
   return json;
 }
 
@@ -89,15 +84,16 @@ void PrintSummary(const DriveLocalizationReport& report,
   facts.Print(out);
 }
 
-// What was asked for is done; that scans were damaged is an error all the same.
+// The others were localized and written; a summary on stdout would be one of what was asked for.
 Status StatusOf(const DriveLocalizationReport& report) {
   if (report.unreadable.empty()) return {};
   const Status& first = report.unreadable.front().why;
   const std::size_t count = report.unreadable.size();
   return {first.code(), StrCat(count, count == 1 ? " scan" : " scans",
-                               " could not be read and counted as lost, the others were localized; "
-                               "the first: ",
-                               first.message())};
+                               " could not be read, the first: ", first.message(), "; of all ",
+                               report.scans, " scans ", report.score.failures(),
+                               " failed with that, of the others the error is ",
+                               FixedText(report.score.translation_rmse_m(), 3), " m RMSE")};
 }
 
 class LocalizeCommand : public Command {
@@ -144,8 +140,9 @@ class LocalizeCommand : public Command {
     monitor.Finish();
     ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
     ATLAS_RETURN_IF_ERROR(contradictions_.Write(map->profile().cell_size_m()));
+    ATLAS_RETURN_IF_ERROR(StatusOf(*report));
     PrintReport(*report, monitor, map->bytes_received(), context);
-    return StatusOf(*report);
+    return {};
   }
 
  private:
