@@ -132,7 +132,9 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
   }
   Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
   result.covariance = motion_.covariance();
-  if (!confirmation_.is_confirmed() || lost_ >= options_.relocalized_after) {
+  const bool is_poor =
+      result.health == LocalizationHealth::kWeak && result.registration.fit < options_.good_fit;
+  if (!confirmation_.is_confirmed() || is_poor || lost_ >= options_.relocalized_after) {
     result.covariance += confirmation_.Spread();
   }
   return result;
