@@ -32,7 +32,7 @@ struct ConfirmationOptions {
   // most, of single scans on ramps; the median was 0.2 behind.
   double min_margin = 0.08;
 
-  int compared_after = 10;  // scans, where nothing is in doubt
+  int compared_after = 25;  // scans, where nothing is in doubt
 
   // How far off a place may be that is not confirmed, standard deviations.
   double sigma_m = 10.0;
