@@ -141,7 +141,7 @@ def other_atlas_cases(report, bin_dir, drives, work):
             report.equal("before", service.wait_for("nothing", "applied")["sessions"], ["garage/day"])
             merges.run("backup", "monday")
             daemon.stop()
-            merges.call("restore", next((work / "backups").iterdir()), "--to", work / "one/atlas.db")
+            merges.run("restore", next((work / "backups").iterdir()), "--to", work / "one/atlas.db", "--replace")
             daemon = Daemon(bin_dir, work / "one", *flags, listen=merges.server)
             report.equal("a restored backup", service.wait_for("nothing", "applied")["sessions"], ["garage/day"])
             daemon.stop()
