@@ -101,7 +101,7 @@ ALLOWED = {
                                        "core/localization/window", "client/merge/plan"],
     "client/merge/report": FLOOR_1 + ["core/tile", "client/merge/changes", "client/merge/plan", "client/render", "client/render/plot"],
     "client/merge/source": FLOOR_1 + ["core/keyframe", "client/atlas_file", "client/connection", "client/merge/plan"],
-    "client/merge/output": FLOOR_1 + ["client/atlas_file", "client/connection", "client/vehicle/folder_lock.h"],
+    "client/merge/output": FLOOR_1 + ["client/atlas_file", "client/connection", "client/merge/memory/temporary_folder.h"],
     "client/merge/serve": FLOOR_1 + ["client/connection", "client/merge", "client/merge/plan", "client/merge/source",
                                      "client/merge/memory", "client/vehicle/atlas_link.h"],
     "client/merge": FLOOR_1 + ["core/tile", "client/connection", "client/merge/changes", "client/merge/plan", "client/merge/report", "client/merge/source",

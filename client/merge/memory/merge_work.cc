@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -265,7 +266,7 @@ Result<MergeWork> MergeWork::Temporary() {
   std::error_code error;
   const fs::path among = fs::temp_directory_path(error);
   if (error) return Error(DiskError("cannot find", "the temporary folder", error.value()));
-  auto made = MakeTemporaryFolder(among);
+  auto made = MakeTemporaryFolder({among, "atlas-merge.", std::chrono::hours(1)});
   if (!made) return Error(made.error());
   auto folder = std::make_unique<Folder>();
   folder->path = made->path;

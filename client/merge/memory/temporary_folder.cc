@@ -1,10 +1,7 @@
 #include "client/merge/memory/temporary_folder.h"
 
 #include <cerrno>
-#include <chrono>
 #include <cstdlib>
-#include <string>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -19,26 +16,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kPrefix = "atlas-merge.";
-// Before it is locked a new one is as an abandoned one.
-constexpr std::chrono::hours kLeastAge{1};
-
 // A folder of ours, no link to one, that was locked once.
-bool MayBeAbandoned(const fs::path& path) {
+bool MayBeAbandoned(const fs::path& path, std::chrono::seconds least_age) {
   struct stat found {};
   if (::lstat(path.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) return false;
   if (found.st_uid != ::geteuid()) return false;
   std::error_code error;
   const fs::file_time_type made = fs::last_write_time(path / "lock", error);
-  return !error && fs::file_time_type::clock::now() - made > kLeastAge;
+  return !error && fs::file_time_type::clock::now() - made > least_age;
 }
 
-void RemoveAbandoned(const fs::path& among) {
+void RemoveAbandoned(const TemporaryPlace& place) {
   std::error_code error;
-  for (fs::directory_iterator entry(among, error), end; !error && entry != end;
+  for (fs::directory_iterator entry(place.among, error), end; !error && entry != end;
        entry.increment(error)) {
     const fs::path& path = entry->path();
-    if (!path.filename().native().starts_with(kPrefix) || !MayBeAbandoned(path)) continue;
+    const bool is_named_so = path.filename().native().starts_with(place.prefix);
+    if (!is_named_so || !MayBeAbandoned(path, place.least_age)) continue;
     const auto lock = FolderLock::Take(path);
     std::error_code ignored;
     if (lock) fs::remove_all(path, ignored);
@@ -47,9 +41,9 @@ void RemoveAbandoned(const fs::path& among) {
 
 }  // namespace
 
-Result<TemporaryFolder> MakeTemporaryFolder(const fs::path& among) {
-  RemoveAbandoned(among);
-  std::string path = (among / StrCat(kPrefix, "XXXXXX")).string();
+Result<TemporaryFolder> MakeTemporaryFolder(const TemporaryPlace& place) {
+  RemoveAbandoned(place);
+  std::string path = (place.among / StrCat(place.prefix, "XXXXXX")).string();
   if (::mkdtemp(path.data()) == nullptr) {
     return Error(DiskError("cannot make folder", path, errno));
   }

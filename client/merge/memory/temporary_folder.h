@@ -1,8 +1,10 @@
-// A folder among temporary ones for as long as somebody works in it. What a program that was killed
-// left there goes with the next that makes one.
+// A folder for as long as somebody works in it. What a program that was killed left goes with the
+// next that makes one there.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
+#include <string>
 
 #include "client/vehicle/folder_lock.h"
 #include "core/base/status.h"
@@ -14,8 +16,16 @@ struct TemporaryFolder {
   FolderLock lock;             // it is in use
 };
 
-// `among`: as the system's temporary folder. Removes those that this user made there more than an
-// hour ago and nobody has locked; what cannot be removed stays. Errors are those of the disk.
-Result<TemporaryFolder> MakeTemporaryFolder(const std::filesystem::path& among);
+struct TemporaryPlace {
+  std::filesystem::path among;  // the folder that it is made in
+  std::string prefix;           // of its name
+  // Left by somebody is what was made so long ago and nobody has locked: a new one is not locked
+  // for a moment.
+  std::chrono::seconds least_age{0};
+};
+
+// Removes those of that place that this user left; what cannot be removed stays. Errors are those
+// of the disk.
+Result<TemporaryFolder> MakeTemporaryFolder(const TemporaryPlace& place);
 
 }  // namespace atlas

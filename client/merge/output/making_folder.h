@@ -4,8 +4,9 @@
 
 #include <filesystem>
 #include <memory>
+#include <utility>
 
-#include "client/vehicle/folder_lock.h"
+#include "client/merge/memory/temporary_folder.h"
 #include "core/base/status.h"
 
 namespace atlas {
@@ -22,15 +23,13 @@ class MakingFolder {
   // With everything in it.
   ~MakingFolder();
 
-  std::filesystem::path data() const { return path_ / "data"; }
-  std::filesystem::path backups() const { return path_ / "backups"; }
+  std::filesystem::path data() const { return folder_.path / "data"; }
+  std::filesystem::path backups() const { return folder_.path / "backups"; }
 
  private:
-  MakingFolder(std::filesystem::path path, FolderLock lock)
-      : path_(std::move(path)), lock_(std::move(lock)) {}
+  explicit MakingFolder(TemporaryFolder folder) : folder_(std::move(folder)) {}
 
-  std::filesystem::path path_;
-  FolderLock lock_;
+  TemporaryFolder folder_;
 };
 
 }  // namespace atlas

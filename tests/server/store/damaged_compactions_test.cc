@@ -33,16 +33,6 @@ class DamagedCompactionsTest : public StoreTest {
     }
     return text;
   }
-  std::uint32_t Repair() {
-    std::uint32_t repaired = 0;
-    for (const TableRepair what : {TableRepair::kRows, TableRepair::kSums}) {
-      const auto result = Await<std::uint32_t>(
-          [&](auto done) { store_->RepairTables(what, "tester", std::move(done)); });
-      EXPECT_TRUE(result) << result.error().message();
-      repaired += result.value_or(0U);
-    }
-    return repaired;
-  }
 };
 
 TEST_F(DamagedCompactionsTest, ARepairLeavesNothingThatIsFoundAgain) {

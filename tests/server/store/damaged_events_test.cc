@@ -17,16 +17,6 @@ class DamagedEventsTest : public StoreTest {
     EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
     sqlite3_close(db);
   }
-  std::uint32_t Repair() {
-    std::uint32_t repaired = 0;
-    for (const TableRepair what : {TableRepair::kRows, TableRepair::kSums}) {
-      const auto result = Await<std::uint32_t>(
-          [&](auto done) { store_->RepairTables(what, "tester", std::move(done)); });
-      EXPECT_TRUE(result) << result.error().message();
-      repaired += result.value_or(0U);
-    }
-    return repaired;
-  }
   // A correction and a retraction.
   void Live() {
     Open();

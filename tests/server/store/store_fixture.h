@@ -82,6 +82,17 @@ class StoreTest : public ::testing::Test {
   static TileContent Content(std::uint8_t value) {
     return {Bytes{value, 1, 2, 3}, value, 10, value};
   }
+  // All of both kinds; how much was not as it should be.
+  std::uint32_t Repair() {
+    std::uint32_t repaired = 0;
+    for (const TableRepair what : {TableRepair::kRows, TableRepair::kSums}) {
+      const auto result = Await<std::uint32_t>(
+          [&](auto done) { store_->RepairTables(what, "tester", std::move(done)); });
+      EXPECT_TRUE(result) << result.error().message();
+      repaired += result.value_or(0U);
+    }
+    return repaired;
+  }
   DirtyState Dirty() { return store_->ReadDirtyState().value(); }
   std::filesystem::path Database() const { return options_.directory / "atlas.db"; }
   // Closes the store and runs SQL on its database.

@@ -32,16 +32,6 @@ class TurnedNumbersTest : public PurgeTest {
   Status Check() {
     return store_->CheckIndexes([] { return Status(); });
   }
-  std::uint32_t Repair() {
-    std::uint32_t repaired = 0;
-    for (const TableRepair what : {TableRepair::kRows, TableRepair::kSums}) {
-      const auto result = Await<std::uint32_t>(
-          [&](auto done) { store_->RepairTables(what, "tester", std::move(done)); });
-      EXPECT_TRUE(result) << result.error().message();
-      repaired += result.value_or(0U);
-    }
-    return repaired;
-  }
   Result<CompactionResult> Compact(std::vector<std::int64_t> ids) {
     return Await<CompactionResult>([&](auto done) {
       store_->Compact({Dirty().revision, 5'000, std::move(ids), "tester"}, std::move(done));

@@ -14,6 +14,9 @@ namespace fs = std::filesystem;
 
 class TemporaryFolderTest : public ::testing::Test {
  protected:
+  static Result<TemporaryFolder> Make(const fs::path& among) {
+    return MakeTemporaryFolder({among, "atlas-merge.", std::chrono::hours(1)});
+  }
   // As somebody left it that long ago.
   fs::path Left(const std::string& name, std::chrono::minutes ago) const {
     const fs::path path = folder_.path() / name;
@@ -31,7 +34,7 @@ constexpr std::chrono::minutes kLongAgo{90};
 
 TEST_F(TemporaryFolderTest, WhatAKilledMergeLeftGoesWithTheNext) {
   const fs::path left = Left("atlas-merge.AAAAAA", kLongAgo);
-  const auto made = MakeTemporaryFolder(folder_.path());
+  const auto made = Make(folder_.path());
   ASSERT_TRUE(made.has_value()) << made.error().message();
   EXPECT_FALSE(fs::exists(left));
   EXPECT_TRUE(fs::is_directory(made->path));
@@ -46,14 +49,20 @@ TEST_F(TemporaryFolderTest, WhatIsInUseOrNewOrAnothersStays) {
   fs::create_directory_symlink(other, folder_.path() / "atlas-merge.CCCCCC");
   const fs::path never_locked = Left("atlas-merge.DDDDDD", kLongAgo);
   fs::remove(never_locked / "lock");
-  ASSERT_TRUE(MakeTemporaryFolder(folder_.path()).has_value());
+  ASSERT_TRUE(Make(folder_.path()).has_value());
   for (const fs::path& path : {used, fresh, other, never_locked}) {
     EXPECT_TRUE(fs::exists(path / "found.log")) << path;
   }
 }
 
+TEST_F(TemporaryFolderTest, APlaceMayCallEverythingLeftThatIsNotLocked) {
+  const fs::path left = Left("atlas-merge.AAAAAA", std::chrono::minutes(1));
+  ASSERT_TRUE(MakeTemporaryFolder({folder_.path(), "atlas-merge."}).has_value());
+  EXPECT_FALSE(fs::exists(left));
+}
+
 TEST_F(TemporaryFolderTest, ItIsLockedWhileSomebodyHasIt) {
-  auto made = MakeTemporaryFolder(folder_.path());
+  auto made = Make(folder_.path());
   ASSERT_TRUE(made.has_value());
   EXPECT_FALSE(FolderLock::Take(made->path).has_value());
   const fs::path path = made->path;
@@ -62,7 +71,7 @@ TEST_F(TemporaryFolderTest, ItIsLockedWhileSomebodyHasIt) {
 }
 
 TEST_F(TemporaryFolderTest, NowhereIsAnError) {
-  EXPECT_FALSE(MakeTemporaryFolder(folder_.path() / "none").has_value());
+  EXPECT_FALSE(Make(folder_.path() / "none").has_value());
 }
 
 }  // namespace
