@@ -41,6 +41,33 @@ class WriteQueueTest : public StoreTest {
     return count;
   }
 
+  // What `submit` does is one group; returns what it returned.
+  Status SubmitAsOne(const std::function<std::future<Status>()>& submit) {
+    std::promise<void> is_busy;
+    std::promise<void> may_go_on;
+    auto first = Submit([&](Connection&) {
+      is_busy.set_value();
+      may_go_on.get_future().wait();
+      return Status();
+    });
+    is_busy.get_future().wait();
+    auto submitted = submit();
+    may_go_on.set_value();
+    first.wait();
+    return submitted.get();
+  }
+  // By who opens copies of the files.
+  std::int64_t ThingsAfterAKill() const {
+    const std::filesystem::path copy = options_.directory / "killed.db";
+    for (const char* const suffix : {"", "-wal"}) {
+      std::filesystem::copy_file(Database().string() + suffix, copy.string() + suffix,
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+    std::filesystem::remove(copy.string() + "-shm");
+    Connection connection({copy, DatabaseOptions::Mode::kReadOnly, 1'024, 0});
+    return connection.Ask("SELECT count(*) FROM things");
+  }
+
   SyncGuard guard_;
   std::unique_ptr<WriteQueue> queue_;
 };
@@ -74,6 +101,44 @@ TEST_F(WriteQueueTest, NobodyIsToldOfWhatSqliteGaveUp) {
   EXPECT_EQ(Things(), 0);
   EXPECT_EQ(Submit(AddThing).get().message(), "");
   EXPECT_EQ(Things(), 1);
+}
+
+// SQLite would leave what comes behind the second one in the log without checksums: acknowledged,
+// seen by all, and gone with the process.
+TEST_F(WriteQueueTest, WhatIsAcknowledgedBesideALargeFailureIsThereAfterAKill) {
+  Submit([](Connection& connection) {
+    connection.Execute("CREATE TABLE large(id INTEGER PRIMARY KEY, bytes BLOB)");
+    for (int i = 0; i < 200; ++i) {
+      connection.Execute("INSERT INTO large(bytes) VALUES (zeroblob(7000))");
+    }
+    return Status();
+  }).wait();
+  const auto fail_largely = [](Connection& connection) {
+    for (int i = 0; i < 3; ++i) {
+      connection.Execute("UPDATE large SET bytes = randomblob(7000)");
+    }
+    return Status(StatusCode::kConflict, "as it comes");
+  };
+  std::vector<std::future<Status>> things;
+  const auto failed = SubmitAsOne([&] {
+    things.push_back(Submit(AddThing));
+    auto large = Submit(fail_largely);
+    things.push_back(Submit([](Connection& connection) {
+      connection.Execute("INSERT INTO large(bytes) VALUES (zeroblob(70000))");
+      return AddThing(connection);
+    }));
+    return large;
+  });
+  EXPECT_FALSE(failed.ok());
+  std::int64_t acknowledged = 0;
+  for (auto& thing : things) {
+    acknowledged += thing.get().ok() ? 1 : 0;
+  }
+  EXPECT_EQ(Things(), acknowledged);
+  EXPECT_EQ(ThingsAfterAKill(), acknowledged);
+  EXPECT_EQ(Submit(fail_largely).get().code(), StatusCode::kConflict) << "alone it is told why";
+  EXPECT_EQ(Submit(AddThing).get().message(), "");
+  EXPECT_EQ(ThingsAfterAKill(), acknowledged + 1);
 }
 
 }  // namespace

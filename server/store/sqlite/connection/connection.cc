@@ -63,6 +63,14 @@ std::string UntouchedUri(const std::string& file) {
   return uri + "?immutable=1";
 }
 
+// Since this was asked before.
+int TakeSpilledPages(sqlite3* handle) {
+  int pages = 0;
+  int unused = 0;
+  sqlite3_db_status(handle, SQLITE_DBSTATUS_CACHE_SPILL, &pages, &unused, 1);
+  return pages;
+}
+
 std::string NameToOpen(const DatabaseOptions& options) {
   CountNoMemory();
   const std::string file = options.file.string();
@@ -182,6 +190,7 @@ void Connection::RollBack() {
 
 void Connection::Save() {
   Prepare("SAVEPOINT saved").Run();
+  TakeSpilledPages(database_.getHandle());
   for (const auto& deferred : deferred_) {
     deferred->Save();
   }
@@ -196,6 +205,10 @@ void Connection::RestoreSaved() {
 
 void Connection::ReleaseSaved() {
   Prepare("RELEASE saved").Run();
+}
+
+bool Connection::HasSpilled() {
+  return TakeSpilledPages(database_.getHandle()) > 0;
 }
 
 void Connection::WriteDeferred() {

@@ -125,6 +125,11 @@ class Connection {
   void Save();
   void RestoreSaved();
   void ReleaseSaved();
+  // Whether pages were written to the log since Save(), for the cache was full. Such a savepoint
+  // must not be gone back to and then committed: if such a page was written twice, SQLite (3.40)
+  // leaves what goes to the log behind that without checksums. The commit is seen as long as
+  // somebody has the database open, and is none for who opens it after a kill.
+  bool HasSpilled();
   // From now on `deferred` is written before each commit: the last one added first.
   template <typename T>
   T& Defer(std::unique_ptr<T> deferred) {

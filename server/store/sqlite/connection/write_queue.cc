@@ -83,7 +83,8 @@ void WriteQueue::Loop() {
 std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
   std::unique_lock lock(mutex_);
   has_work_.wait(lock, [this] { return is_stopping_ || !queue_.empty(); });
-  const std::size_t size = std::min(queue_.size(), options_.max_group);
+  const std::size_t size = std::min(queue_.size(), singles_ > 0 ? 1 : options_.max_group);
+  singles_ -= singles_ > 0 ? 1 : 0;
   auto end = queue_.begin() + static_cast<std::ptrdiff_t>(size);
   end = std::find_if(queue_.begin(), end, [](const Operation& next) { return next.is_alone; });
   if (end == queue_.begin() && size > 0) {
@@ -151,8 +152,8 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
                                         "store: SQLite gave up the transaction of this write")
                                : results[i];
       }
-      if (group[i].is_alone && !results[i].ok()) {
-        return RollBack(results[i]);
+      if (!results[i].ok() && (group[i].is_alone || connection_->HasSpilled())) {
+        return GiveUp(group, results[i]);
       }
     }
     if (Status status = guard_.status(); !status.ok()) {
@@ -173,6 +174,16 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     guard_.Note(error);
     return RollBack(StatusFromException(error));
   }
+}
+
+Status WriteQueue::GiveUp(const std::vector<Operation>& group, Status failure) {
+  if (group.size() == 1) {
+    return RollBack(std::move(failure));
+  }
+  singles_ = options_.max_group;  // whoever asks again is told of its own write
+  return RollBack({StatusCode::kUnavailable,
+                   "store: another write of this transaction failed after it had written much; try "
+                   "again"});
 }
 
 Status WriteQueue::RollBack(Status failure) {

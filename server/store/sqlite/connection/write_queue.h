@@ -1,6 +1,7 @@
 // The one thread that writes the store: takes what is queued, up to a group of 64 operations, into
 // one transaction, and reports to each when that transaction is on disk. An operation that fails
-// leaves no trace and does not disturb the others of its group.
+// leaves no trace and does not disturb the others of its group, unless it had written more than the
+// cache takes: then all of the group are refused, and those behind it get a transaction each.
 #pragma once
 
 #include <atomic>
@@ -77,6 +78,8 @@ class WriteQueue {
   Status RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results);
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
+  // Nothing of `group` is written, for one of it failed that cannot be taken out alone.
+  Status GiveUp(const std::vector<Operation>& group, Status failure);
   Status RunOne(Operation& operation);
 
   std::unique_ptr<Connection> connection_;
@@ -84,6 +87,7 @@ class WriteQueue {
   SyncGuard& guard_;
   std::atomic<std::uint64_t> revision_;
   DurationHistogram commits_;
+  std::size_t singles_ = 0;  // so many get a transaction each, behind one that was given up
   mutable std::mutex mutex_;
   std::condition_variable has_work_;
   std::deque<Operation> queue_;
