@@ -103,6 +103,33 @@ TEST_F(WriteQueueTest, NobodyIsToldOfWhatSqliteGaveUp) {
   EXPECT_EQ(Things(), 1);
 }
 
+// What one of them makes of it is of that one.
+TEST_F(WriteQueueTest, OthersAreNotToldThatTheyAreWrong) {
+  for (const StatusCode code : {StatusCode::kInvalidData, StatusCode::kConflict,
+                                StatusCode::kResourceExhausted, StatusCode::kUnavailable}) {
+    std::future<Status> gives_up;
+    std::vector<std::future<Status>> others;
+    const Status behind = SubmitAsOne([&] {
+      others.push_back(Submit(AddThing));
+      others.push_back(
+          Submit([](Connection&) { return Status(StatusCode::kNotFound, "its own"); }));
+      gives_up = Submit([code](Connection& connection) {
+        connection.Execute("ROLLBACK");
+        return Status(code, "as it comes");
+      });
+      return Submit(AddThing);
+    });
+    EXPECT_EQ(gives_up.get().code(), code);
+    const bool is_full = code == StatusCode::kResourceExhausted;
+    const StatusCode of_all = is_full ? code : StatusCode::kUnavailable;
+    EXPECT_EQ(behind.code(), of_all);
+    for (auto& other : others) {
+      EXPECT_EQ(other.get().code(), of_all);
+    }
+    EXPECT_EQ(Things(), 0);
+  }
+}
+
 // SQLite would leave what comes behind the second one in the log without checksums: acknowledged,
 // seen by all, and gone with the process.
 TEST_F(WriteQueueTest, WhatIsAcknowledgedBesideALargeFailureIsThereAfterAKill) {

@@ -10,6 +10,19 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 
 namespace atlas {
+namespace {
+
+// What all of a group are told whose transaction SQLite gave up in an operation that ended as
+// `result`: only what the disk lacks or refuses is the same for all.
+Status WhyGivenUp(const Status& result) {
+  const bool is_of_all =
+      result.code() == StatusCode::kUnavailable || result.code() == StatusCode::kResourceExhausted;
+  return is_of_all ? result
+                   : Status(StatusCode::kUnavailable,
+                            "store: SQLite gave up the transaction of this write");
+}
+
+}  // namespace
 
 WriteQueue::WriteQueue(std::unique_ptr<Connection> connection,
                        const Options& options,
@@ -97,18 +110,18 @@ std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
 }
 
 void WriteQueue::RunGroup(std::vector<Operation>& group) {
-  std::vector<Status> results(group.size());
+  Ends ends{std::vector<Status>(group.size()), std::nullopt};
   Status transaction = guard_.status();
   if (transaction.ok()) {
-    transaction = RunInTransaction(group, results);
+    transaction = RunInTransaction(group, ends);
   }
   if (!transaction.ok()) {
     NoteRefusal(transaction);
     Settle(group);  // whether a commit that failed wrote something is not known
-    std::fill(results.begin(), results.end(), transaction);
   }
   for (std::size_t i = 0; i < group.size(); ++i) {
-    group[i].finish(results[i]);
+    const bool is_own = transaction.ok() || ends.gave_up == i;
+    group[i].finish(is_own ? ends.results[i] : transaction);
   }
 }
 
@@ -140,20 +153,20 @@ WriteFigures WriteQueue::ReadFigures() const {
 }
 
 // Not ok: nothing of the group was written.
-Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results) {
+Status WriteQueue::RunInTransaction(std::vector<Operation>& group, Ends& ends) {
   try {
     const auto begin = std::chrono::steady_clock::now();
     const int changes_before = connection_->total_changes();
     connection_->Begin();
     for (std::size_t i = 0; i < group.size(); ++i) {
-      results[i] = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
+      Status& result = ends.results[i];
+      result = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
       if (!connection_->is_in_transaction()) {  // SQLite gave the whole of it up
-        return results[i].ok() ? Status(StatusCode::kUnavailable,
-                                        "store: SQLite gave up the transaction of this write")
-                               : results[i];
+        ends.gave_up = result.ok() ? std::nullopt : std::optional(i);
+        return WhyGivenUp(result);
       }
-      if (!results[i].ok() && (group[i].is_alone || connection_->HasSpilled())) {
-        return GiveUp(group, results[i]);
+      if (!result.ok() && (group[i].is_alone || connection_->HasSpilled())) {
+        return GiveUp(group, result);
       }
     }
     if (Status status = guard_.status(); !status.ok()) {

@@ -75,7 +75,13 @@ class WriteQueue {
   std::vector<Operation> TakeGroup();
   void RunGroup(std::vector<Operation>& group);
   static void Settle(const std::vector<Operation>& group);
-  Status RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results);
+  // How each operation ended, and which of them is told so although nothing of its group is
+  // written.
+  struct Ends {
+    std::vector<Status> results;
+    std::optional<std::size_t> gave_up;
+  };
+  Status RunInTransaction(std::vector<Operation>& group, Ends& ends);
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
   // Nothing of `group` is written, for one of it failed that cannot be taken out alone.
