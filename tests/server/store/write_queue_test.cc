@@ -4,6 +4,8 @@
 #include <future>
 #include <memory>
 
+#include <SQLiteCpp/Exception.h>
+
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "tests/server/store/store_fixture.h"
 
@@ -166,6 +168,61 @@ TEST_F(WriteQueueTest, WhatIsAcknowledgedBesideALargeFailureIsThereAfterAKill) {
   EXPECT_EQ(Submit(fail_largely).get().code(), StatusCode::kConflict) << "alone it is told why";
   EXPECT_EQ(Submit(AddThing).get().message(), "");
   EXPECT_EQ(ThingsAfterAKill(), acknowledged + 1);
+}
+
+// A statement of several rows that fails at its last one is gone back on, too, whoever bears it.
+Status FailInAStatement(Connection& connection) {
+  try {
+    connection
+        .Prepare(
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 10000) "
+            "INSERT INTO keys SELECT randomblob(200), CASE WHEN i = 10000 THEN 1 ELSE i END FROM n")
+        .Run();
+  } catch (const SQLite::Exception&) {
+    return AddThing(connection);
+  }
+  return {StatusCode::kInternal, "it did not fail"};
+}
+
+TEST_F(WriteQueueTest, WhatIsAcknowledgedBehindALargeStatementThatFailedIsThereAfterAKill) {
+  Submit([](Connection& connection) {
+    connection.Execute("CREATE TABLE keys(random BLOB UNIQUE, number INTEGER UNIQUE)");
+    return Status();
+  }).wait();
+  std::vector<std::future<Status>> things;
+  const Status behind = SubmitAsOne([&] {
+    things.push_back(Submit(AddThing));
+    things.push_back(Submit(FailInAStatement));
+    return Submit(AddThing);
+  });
+  EXPECT_NE(behind.code(), StatusCode::kInternal);
+  things.push_back(Submit(FailInAStatement));
+  things.push_back(Submit(AddThing));
+  std::int64_t acknowledged = behind.ok() ? 1 : 0;
+  for (auto& thing : things) {
+    const Status status = thing.get();
+    acknowledged += status.ok() ? 1 : 0;
+    EXPECT_TRUE(status.ok() || status.code() == StatusCode::kUnavailable) << status.message();
+  }
+  EXPECT_GE(acknowledged, 1);
+  EXPECT_EQ(Things(), acknowledged);
+  EXPECT_EQ(ThingsAfterAKill(), acknowledged);
+}
+
+// In no queue: nobody commits it.
+TEST_F(WriteQueueTest, NoCommitIsLeftWithoutChecksums) {
+  queue_.reset();
+  Connection connection({Database(), DatabaseOptions::Mode::kReadWrite, 1'024, 5'000});
+  connection.Execute("CREATE TABLE keys(random BLOB UNIQUE, number INTEGER UNIQUE)");
+  connection.Begin();
+  EXPECT_TRUE(FailInAStatement(connection).ok());
+  EXPECT_TRUE(connection.must_be_rolled_back());
+  EXPECT_THROW(connection.Commit(), SQLite::Exception);
+  connection.Begin();
+  EXPECT_FALSE(connection.must_be_rolled_back());
+  EXPECT_TRUE(AddThing(connection).ok());
+  connection.Commit();
+  EXPECT_EQ(ThingsAfterAKill(), 1);
 }
 
 }  // namespace

@@ -165,7 +165,7 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, Ends& ends) {
         ends.gave_up = result.ok() ? std::nullopt : std::optional(i);
         return WhyGivenUp(result);
       }
-      if (!result.ok() && (group[i].is_alone || connection_->HasSpilled())) {
+      if ((group[i].is_alone && !result.ok()) || connection_->must_be_rolled_back()) {
         return GiveUp(group, result);
       }
     }
@@ -189,14 +189,14 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, Ends& ends) {
   }
 }
 
-Status WriteQueue::GiveUp(const std::vector<Operation>& group, Status failure) {
-  if (group.size() == 1) {
-    return RollBack(std::move(failure));
+Status WriteQueue::GiveUp(const std::vector<Operation>& group, const Status& failure) {
+  if (group.size() == 1 && !failure.ok()) {
+    return RollBack(failure);
   }
   singles_ = options_.max_group;  // whoever asks again is told of its own write
-  return RollBack({StatusCode::kUnavailable,
-                   "store: another write of this transaction failed after it had written much; try "
-                   "again"});
+  return RollBack(
+      {StatusCode::kUnavailable,
+       "store: a write of this transaction failed after it had written much; try again"});
 }
 
 Status WriteQueue::RollBack(Status failure) {

@@ -84,8 +84,9 @@ class WriteQueue {
   Status RunInTransaction(std::vector<Operation>& group, Ends& ends);
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
-  // Nothing of `group` is written, for one of it failed that cannot be taken out alone.
-  Status GiveUp(const std::vector<Operation>& group, Status failure);
+  // Nothing of `group` is written, for one of it, which ended as `failure`, cannot be taken out
+  // alone; or it ended well, and a statement of it did not.
+  Status GiveUp(const std::vector<Operation>& group, const Status& failure);
   Status RunOne(Operation& operation);
 
   std::unique_ptr<Connection> connection_;
