@@ -4,11 +4,11 @@
 
 namespace atlas {
 
-bool DamageList::Add(const TileId& id, const Status& why) {
+bool DamageList::Add(const TileId& id, const Status& why, bool is_noted) {
   const std::lock_guard lock(mutex_);
-  Status& listed = tiles_[id];
-  const bool is_new = !(listed == why);
-  listed = why;
+  Damage& listed = tiles_[id];
+  const bool is_new = !(listed.why == why);
+  listed = {why, is_noted};
   return is_new;
 }
 
@@ -22,6 +22,12 @@ bool DamageList::Contains(const TileId& id) const {
   return tiles_.contains(id);
 }
 
+bool DamageList::IsNoted(const TileId& id, const Status& why) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = tiles_.find(id);
+  return found != tiles_.end() && found->second.is_noted && found->second.why == why;
+}
+
 std::size_t DamageList::size() const {
   const std::lock_guard lock(mutex_);
   return tiles_.size();
@@ -32,11 +38,11 @@ Status DamageList::Summary() const {
   if (tiles_.empty()) {
     return {};
   }
-  const auto& [id, why] = *tiles_.begin();
+  const auto& [id, damage] = *tiles_.begin();
   return Status(
       StatusCode::kInvalidData,
       StrCat(tiles_.size(), " tiles cannot be fused and keep the content they have; tile ", id,
-             ": ", why.message()));
+             ": ", damage.why.message()));
 }
 
 }  // namespace atlas

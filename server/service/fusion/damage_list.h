@@ -14,19 +14,27 @@ namespace atlas {
 
 class DamageList {
  public:
-  // True when the tile was not listed with this reason before.
-  bool Add(const TileId& id, const Status& why);
+  // True when the tile was not listed with this reason before. `is_noted`: what it is made of was
+  // looked at, and what is damaged of it is noted in the store.
+  bool Add(const TileId& id, const Status& why, bool is_noted);
   // The tile was fused, or failed for another reason.
   void Remove(const TileId& id);
 
   bool Contains(const TileId& id) const;
+  // With this reason.
+  bool IsNoted(const TileId& id, const Status& why) const;
   std::size_t size() const;
   // kInvalidData naming how many tiles there are, and of the first what is damaged; ok without any.
   Status Summary() const;
 
  private:
+  struct Damage {
+    Status why;
+    bool is_noted = false;
+  };
+
   mutable std::mutex mutex_;
-  std::map<TileId, Status> tiles_;
+  std::map<TileId, Damage> tiles_;
 };
 
 }  // namespace atlas

@@ -18,6 +18,8 @@ namespace {
 constexpr std::chrono::seconds kLookAgain{1};
 // Of a tile that fails of damage and has no damaged keyframe: one was deleted under the worker.
 constexpr std::uint32_t kQuietTries = 3;
+// Of a tile that goes on failing so: about an hour, at the longest back-off.
+constexpr std::uint32_t kTriesToLookAgain = 64;
 
 struct Unfinished {
   TileClaim claim;
@@ -293,7 +295,9 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
   const std::int64_t backoff =
       std::min(options_.max_backoff_ms, options_.min_backoff_ms << std::min(claim.attempts, 20u));
   const bool is_invalid = why.code() == StatusCode::kInvalidData;
-  if (is_invalid && claim.id.level == 0 && !HasDamage(claim.id) && claim.attempts < kQuietTries) {
+  const bool has_keyframes = is_invalid && claim.id.level == 0;
+  const std::optional<bool> has_damage = has_keyframes ? LookForDamage(claim, why) : std::nullopt;
+  if (has_damage == false && claim.attempts < kQuietTries) {
     log_(LogLevel::kDebug, StrCat("fusion: tile ", claim.id, " is tried again: ", why.message()));
     worker.returns.push_back({claim, clock_() + 1});
     return;
@@ -301,7 +305,7 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
   const bool is_damage = is_invalid && !(claim.id.level > 0 && MarkDamagedChildren(claim.id));
   bool is_news = true;
   if (is_damage) {
-    is_news = damage_.Add(claim.id, why);
+    is_news = damage_.Add(claim.id, why, has_damage.has_value());
   } else {
     damage_.Remove(claim.id);
   }
@@ -313,14 +317,18 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
 
 // Which of the tile's keyframes are damaged is looked up, and noted for good. None is where one was
 // purged or healed while the tile was built. All are read here: the write that notes them, which
-// holds up all others, looks only at those that cannot be.
-bool FusionScheduler::HasDamage(const TileId& tile) {
-  const auto keyframes = store_.ListKeyframesOfTile(tile);
+// holds up all others, looks only at those that cannot be; and they are not read at each attempt of
+// a tile that fails as it did when they were. Empty: it cannot be noted.
+std::optional<bool> FusionScheduler::LookForDamage(const TileClaim& claim, const Status& why) {
+  if (claim.attempts % kTriesToLookAgain != 0 && damage_.IsNoted(claim.id, why)) {
+    return true;
+  }
+  const auto keyframes = store_.ListKeyframesOfTile(claim.id);
   const Status noted = keyframes ? NoteUnreadable(*keyframes) : keyframes.error();
   if (!noted.ok()) {
     log_(LogLevel::kError,
-         StrCat("fusion: cannot note what is damaged of tile ", tile, ": ", noted.message()));
-    return true;
+         StrCat("fusion: cannot note what is damaged of tile ", claim.id, ": ", noted.message()));
+    return std::nullopt;
   }
   const auto damaged = store_.ListDamagedKeyframes();
   return !damaged || std::any_of(damaged->begin(), damaged->end(), [&](const DamagedKeyframe& d) {

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -91,7 +92,7 @@ class FusionScheduler {
   bool GiveBack(Worker& worker);
   void NoteSuccess(RepeatedLine& line, const char* what);
   void PostponeFailed(Worker& worker, const TileClaim& claim, const Status& why);
-  bool HasDamage(const TileId& tile);
+  std::optional<bool> LookForDamage(const TileClaim& claim, const Status& why);
   Status NoteUnreadable(std::vector<std::int64_t> keyframes);
   bool MarkDamagedChildren(const TileId& parent);
 

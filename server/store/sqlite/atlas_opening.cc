@@ -275,27 +275,49 @@ Status Refusal(const DataDirectory& directory, const Status& status, bool has_no
       .WithContext(directory.database_file().string());
 }
 
+// What was never acknowledged goes before anything is written, and stays with a start that is
+// refused.
+void DropUnfinished(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
+  if (log.damage.has_rest && !log.is_lossy()) {
+    WhereThereIsRoom([&] { DropRest(writer, origin.log_file()); });
+  }
+}
+
 // Nothing is read by a schema that is damaged. What was put right of it, for people.
 Result<std::string> MakeReadable(Connection& writer,
                                  const DamagedLog& log,
                                  const LogOrigin& origin,
                                  const SqliteStoreOptions& options) {
-  Status status = CheckFiles(writer, log, origin);
-  if (status.ok() && log.damage.has_rest && !log.is_lossy()) {  // before anything is written
-    WhereThereIsRoom([&] { DropRest(writer, origin.log_file()); });
-  }
-  if (!status.ok()) {
+  if (Status status = CheckFiles(writer, log, origin); !status.ok()) {
     return Error(std::move(status));
   }
-  Result<std::string> schema = RepairSchema(writer);
+  const bool has_rest = log.damage.has_rest && !log.is_lossy();
+  const std::function<void()> drop = [&] {
+    DropUnfinished(writer, log, origin);
+  };
+  Result<std::string> schema = RepairSchema(writer, has_rest ? drop : nullptr);
   if (!schema) {
     return schema;
   }
-  status = MigrateStore(writer, options.on_upgrade);
+  Status status = MigrateStore(writer, [&](std::int64_t from) {
+    if (from < kFirstReadableVersion) {  // the others are written later
+      drop();
+    }
+    if (options.on_upgrade) {
+      options.on_upgrade(from);
+    }
+  });
   if (status.ok()) {
     status = CheckPagesAreTheirs(writer);
   }
   return status.ok() ? std::move(schema) : Error(std::move(status));
+}
+
+void BeginWriting(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
+  DropUnfinished(writer, log, origin);
+  writer.Execute("PRAGMA journal_mode = WAL");
+  KeepTableSums(writer);
+  MarkAtTheEnd(writer);
 }
 
 void Tell(const std::function<void(const std::string&)>& whom, const std::string& what) {
@@ -340,9 +362,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     if (!loss) {
       return Error(Refusal(directory, loss.error(), has_note_alone));
     }
-    writer->Execute("PRAGMA journal_mode = WAL");
-    KeepTableSums(*writer);
-    MarkAtTheEnd(*writer);
+    BeginWriting(*writer, *log, origin);
     if (!loss->empty()) {  // before a revision is given again
       Tell(options.on_damaged_log, NoteLoss(*writer, *identity, *loss, log->kept, noted));
     }

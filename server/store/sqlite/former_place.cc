@@ -1,6 +1,7 @@
 #include "server/store/sqlite/former_place.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <exception>
 #include <string>
 #include <system_error>
@@ -8,6 +9,7 @@
 #include "core/base/str_cat.h"
 #include "server/store/sqlite/backup/replaced_atlas.h"
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/connection/log_pages.h"
 #include "server/store/sqlite/database_files.h"
 #include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
@@ -72,6 +74,23 @@ PlaceInLine FindFormerPlace(const fs::path& database, const StoreIdentity& ident
     }
   }
   return place;
+}
+
+bool DoesLogFollow(const fs::path& database, const fs::path& kept) {
+  const std::uint64_t salts = ReadLogSalts(database.string() + "-wal");
+  if (salts == 0) {
+    return true;
+  }
+  const fs::path note = NoteOf(database);
+  std::error_code error;
+  const auto noted = ReadRevisionNote(fs::exists(note, error) ? note : NoteOf(kept));
+  if (!noted || noted->log.salts != salts) {
+    return false;
+  }
+  StoreIdentity identity;
+  identity.atlas_id = noted->atlas_id;
+  const PlaceInLine place = PlaceOfDatabase(kept, identity);
+  return place.epoch > 0 && place.revision >= noted->log.revision;
 }
 
 }  // namespace atlas

@@ -15,4 +15,8 @@ namespace atlas {
 // none of them, but that SQLite may make the index of a log. The caller holds the directory.
 PlaceInLine FindFormerPlace(const std::filesystem::path& database, const StoreIdentity& identity);
 
+// Whether it is sure that the log that `database` left goes on from `kept`, which has none: by the
+// note of either, and by how far `kept` is. A log with nothing in it does no harm.
+bool DoesLogFollow(const std::filesystem::path& database, const std::filesystem::path& kept);
+
 }  // namespace atlas

@@ -120,7 +120,8 @@ Status MakeCopy(const RestoreOrder& order, const fs::path& target, RestoredAtlas
 
 Status Replace(const fs::path& target, bool was_interrupted, RestoredAtlas& restored) {
   ATLAS_RETURN_IF_ERROR(SyncFolder(target.parent_path()));  // the copy is found by its name
-  Result<fs::path> kept = MoveAside(target, was_interrupted);
+  Result<fs::path> kept = MoveAside(
+      target, [&](const fs::path& last) { return was_interrupted && DoesLogFollow(target, last); });
   if (!kept) {
     return kept.error();
   }

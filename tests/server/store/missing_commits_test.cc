@@ -1,6 +1,9 @@
 // A log or a database that was removed, cut off or replaced by an older copy while the daemon was
 // away: a shorter history that nothing in it contradicts. The note beside it does.
+#include <chrono>
+
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/connection/log_damage.h"
 #include "tests/server/store/missing_commits_fixture.h"
 
 namespace atlas {
@@ -231,6 +234,48 @@ TEST_F(MissingCommitsTest, WhatIsLeftIsNoAtlas) {
   EXPECT_NE(refused.error().message().find("what is left is no atlas"), std::string::npos)
       << refused.error().message();
   EXPECT_EQ(Look(), mixed) << "nothing was changed";
+}
+
+// The end of the log was damaged, and a start of the system behind it lets that pass for what a
+// power cut leaves; its pages are in the database, but for that of the revision.
+TEST_F(MissingCommitsTest, WhatIsLeftBesideATornEndIsNoAtlas) {
+  const auto tiles_of = [](std::int32_t keyframe) {
+    std::vector<TileId> tiles;
+    for (std::int32_t x = 0; x < 150; ++x) {
+      tiles.push_back({0, 150 * keyframe + x, 0});
+    }
+    return tiles;
+  };
+  Open();
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    ASSERT_TRUE(Put(MakeKeyframe(i, tiles_of(static_cast<std::int32_t>(i)))));
+  }
+  store_.reset();
+  Open();
+  ASSERT_TRUE(Put(MakeKeyframe(10, {{0, 0, 0}})));
+  ASSERT_TRUE(Update({{{{"bus", "day"}, 5}, PoseAt(5'000'000), tiles_of(5)}}));
+  Files torn = Look();
+  Connection copier({Database(), DatabaseOptions::Mode::kReadWrite});
+  ASSERT_GT(copier.CopyLog().value_or(0), 0);
+  const auto counters = static_cast<std::ptrdiff_t>(
+      kPage * static_cast<std::size_t>(
+                  copier.Ask("SELECT rootpage - 1 FROM sqlite_master WHERE name = 'counters'")));
+  Bytes copied = ReadFile(Database());
+  std::copy_n(torn.at("atlas.db").begin() + counters, kPage, copied.begin() + counters);
+  torn["atlas.db"] = copied;
+  Bytes& log = torn["atlas.db-wal"];
+  log[log.size() - kFrame - 100] ^= 0x18;  // not the last of that commit
+  log[log.size() - kFrame - 99] ^= 0x21;
+  PutThere(torn);
+  fs::last_write_time(Log(), std::chrono::file_clock::from_sys(std::chrono::sys_seconds()));
+  ASSERT_EQ(FindLogDamage(Log(), false)->lost_commits, 0U);
+  ASSERT_TRUE(FindLogDamage(Log(), false)->has_rest);
+  const auto refused = OpenSqliteStore(options_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code(), StatusCode::kInvalidData);
+  EXPECT_NE(refused.error().message().find("what is left is no atlas"), std::string::npos)
+      << refused.error().message();
+  EXPECT_TRUE(Look() == torn) << "something was changed";
 }
 
 }  // namespace

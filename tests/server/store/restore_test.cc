@@ -2,6 +2,7 @@
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <tuple>
 
 #include "server/store/sqlite/schema/schema.h"
 #include "tests/server/store/backup_fixture.h"
@@ -262,6 +263,45 @@ TEST_F(RestoreTest, NothingThatIsKeptIsWrittenOver) {
     ASSERT_TRUE(again.has_value()) << again.error().message();
     EXPECT_EQ(again->kept.filename(), "atlas.db.replaced-3") << "a log alone takes a number, too";
     EXPECT_EQ(Read(done->kept.string() + "-wal"), "a log of today");
+  }
+}
+
+// The atlas of today was moved away by hand, a copy was left by an earlier restore, and the one
+// that was kept last is another one: its pages and those of the log would become one.
+TEST_F(RestoreTest, ALogFollowsTheAtlasThatItGoesOnFromAlone) {
+  BackUp();
+  ASSERT_TRUE(Restore().has_value());
+  const std::string atlas = restored().string();
+  std::string older;
+  for (const std::uint32_t sequence : {50U, 51U, 52U}) {
+    OpenRestored();
+    ASSERT_TRUE(Put(Keyframe(sequence)));
+    if (sequence == 50) {
+      store_.reset();
+      older = Read(restored());
+    }
+  }
+  const std::string own = Read(restored());
+  const std::string log = Read(atlas + "-wal");
+  const std::string note = Read(atlas + "-revision");
+  store_.reset();
+  for (const auto& [kept, has_note, follows] :
+       {std::tuple(own, true, true), std::tuple(own, false, false), std::tuple(older, true, false),
+        std::tuple(older, false, false)}) {
+    std::filesystem::remove_all(restored().parent_path());
+    std::filesystem::create_directories(restored().parent_path());
+    Write(atlas + ".replaced-1", kept);
+    Write(atlas + "-wal", log);
+    if (has_note) {
+      Write(atlas + "-revision", note);
+    }
+    Write(atlas + ".partial", "half a copy");
+    const auto done = Restore();
+    ASSERT_TRUE(done.has_value()) << done.error().message();
+    EXPECT_EQ(done->kept.filename(), follows ? "atlas.db.replaced-1" : "atlas.db.replaced-2");
+    EXPECT_EQ(Read(done->kept.string() + "-wal"), log);
+    EXPECT_EQ(std::filesystem::exists(atlas + ".replaced-1-wal"), follows);
+    EXPECT_EQ(Read(atlas + ".replaced-1"), kept);
   }
 }
 

@@ -4,6 +4,8 @@
 #include <future>
 #include <memory>
 
+#include <SQLiteCpp/Exception.h>
+
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "tests/server/store/store_fixture.h"
 
@@ -41,6 +43,33 @@ class WriteQueueTest : public StoreTest {
     return count;
   }
 
+  // What `submit` does is one group; returns what it returned.
+  Status SubmitAsOne(const std::function<std::future<Status>()>& submit) {
+    std::promise<void> is_busy;
+    std::promise<void> may_go_on;
+    auto first = Submit([&](Connection&) {
+      is_busy.set_value();
+      may_go_on.get_future().wait();
+      return Status();
+    });
+    is_busy.get_future().wait();
+    auto submitted = submit();
+    may_go_on.set_value();
+    first.wait();
+    return submitted.get();
+  }
+  // By who opens copies of the files.
+  std::int64_t ThingsAfterAKill() const {
+    const std::filesystem::path copy = options_.directory / "killed.db";
+    for (const char* const suffix : {"", "-wal"}) {
+      std::filesystem::copy_file(Database().string() + suffix, copy.string() + suffix,
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+    std::filesystem::remove(copy.string() + "-shm");
+    Connection connection({copy, DatabaseOptions::Mode::kReadOnly, 1'024, 0});
+    return connection.Ask("SELECT count(*) FROM things");
+  }
+
   SyncGuard guard_;
   std::unique_ptr<WriteQueue> queue_;
 };
@@ -74,6 +103,126 @@ TEST_F(WriteQueueTest, NobodyIsToldOfWhatSqliteGaveUp) {
   EXPECT_EQ(Things(), 0);
   EXPECT_EQ(Submit(AddThing).get().message(), "");
   EXPECT_EQ(Things(), 1);
+}
+
+// What one of them makes of it is of that one.
+TEST_F(WriteQueueTest, OthersAreNotToldThatTheyAreWrong) {
+  for (const StatusCode code : {StatusCode::kInvalidData, StatusCode::kConflict,
+                                StatusCode::kResourceExhausted, StatusCode::kUnavailable}) {
+    std::future<Status> gives_up;
+    std::vector<std::future<Status>> others;
+    const Status behind = SubmitAsOne([&] {
+      others.push_back(Submit(AddThing));
+      others.push_back(
+          Submit([](Connection&) { return Status(StatusCode::kNotFound, "its own"); }));
+      gives_up = Submit([code](Connection& connection) {
+        connection.Execute("ROLLBACK");
+        return Status(code, "as it comes");
+      });
+      return Submit(AddThing);
+    });
+    EXPECT_EQ(gives_up.get().code(), code);
+    const bool is_full = code == StatusCode::kResourceExhausted;
+    const StatusCode of_all = is_full ? code : StatusCode::kUnavailable;
+    EXPECT_EQ(behind.code(), of_all);
+    for (auto& other : others) {
+      EXPECT_EQ(other.get().code(), of_all);
+    }
+    EXPECT_EQ(Things(), 0);
+  }
+}
+
+// SQLite would leave what comes behind the second one in the log without checksums: acknowledged,
+// seen by all, and gone with the process.
+TEST_F(WriteQueueTest, WhatIsAcknowledgedBesideALargeFailureIsThereAfterAKill) {
+  Submit([](Connection& connection) {
+    connection.Execute("CREATE TABLE large(id INTEGER PRIMARY KEY, bytes BLOB)");
+    for (int i = 0; i < 200; ++i) {
+      connection.Execute("INSERT INTO large(bytes) VALUES (zeroblob(7000))");
+    }
+    return Status();
+  }).wait();
+  const auto fail_largely = [](Connection& connection) {
+    for (int i = 0; i < 3; ++i) {
+      connection.Execute("UPDATE large SET bytes = randomblob(7000)");
+    }
+    return Status(StatusCode::kConflict, "as it comes");
+  };
+  std::vector<std::future<Status>> things;
+  const auto failed = SubmitAsOne([&] {
+    things.push_back(Submit(AddThing));
+    auto large = Submit(fail_largely);
+    things.push_back(Submit([](Connection& connection) {
+      connection.Execute("INSERT INTO large(bytes) VALUES (zeroblob(70000))");
+      return AddThing(connection);
+    }));
+    return large;
+  });
+  EXPECT_FALSE(failed.ok());
+  std::int64_t acknowledged = 0;
+  for (auto& thing : things) {
+    acknowledged += thing.get().ok() ? 1 : 0;
+  }
+  EXPECT_EQ(Things(), acknowledged);
+  EXPECT_EQ(ThingsAfterAKill(), acknowledged);
+  EXPECT_EQ(Submit(fail_largely).get().code(), StatusCode::kConflict) << "alone it is told why";
+  EXPECT_EQ(Submit(AddThing).get().message(), "");
+  EXPECT_EQ(ThingsAfterAKill(), acknowledged + 1);
+}
+
+// A statement of several rows that fails at its last one is gone back on, too, whoever bears it.
+Status FailInAStatement(Connection& connection) {
+  try {
+    connection
+        .Prepare(
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 10000) "
+            "INSERT INTO keys SELECT randomblob(200), CASE WHEN i = 10000 THEN 1 ELSE i END FROM n")
+        .Run();
+  } catch (const SQLite::Exception&) {
+    return AddThing(connection);
+  }
+  return {StatusCode::kInternal, "it did not fail"};
+}
+
+TEST_F(WriteQueueTest, WhatIsAcknowledgedBehindALargeStatementThatFailedIsThereAfterAKill) {
+  Submit([](Connection& connection) {
+    connection.Execute("CREATE TABLE keys(random BLOB UNIQUE, number INTEGER UNIQUE)");
+    return Status();
+  }).wait();
+  std::vector<std::future<Status>> things;
+  const Status behind = SubmitAsOne([&] {
+    things.push_back(Submit(AddThing));
+    things.push_back(Submit(FailInAStatement));
+    return Submit(AddThing);
+  });
+  EXPECT_NE(behind.code(), StatusCode::kInternal);
+  things.push_back(Submit(FailInAStatement));
+  things.push_back(Submit(AddThing));
+  std::int64_t acknowledged = behind.ok() ? 1 : 0;
+  for (auto& thing : things) {
+    const Status status = thing.get();
+    acknowledged += status.ok() ? 1 : 0;
+    EXPECT_TRUE(status.ok() || status.code() == StatusCode::kUnavailable) << status.message();
+  }
+  EXPECT_GE(acknowledged, 1);
+  EXPECT_EQ(Things(), acknowledged);
+  EXPECT_EQ(ThingsAfterAKill(), acknowledged);
+}
+
+// In no queue: nobody commits it.
+TEST_F(WriteQueueTest, NoCommitIsLeftWithoutChecksums) {
+  queue_.reset();
+  Connection connection({Database(), DatabaseOptions::Mode::kReadWrite, 1'024, 5'000});
+  connection.Execute("CREATE TABLE keys(random BLOB UNIQUE, number INTEGER UNIQUE)");
+  connection.Begin();
+  EXPECT_TRUE(FailInAStatement(connection).ok());
+  EXPECT_TRUE(connection.must_be_rolled_back());
+  EXPECT_THROW(connection.Commit(), SQLite::Exception);
+  connection.Begin();
+  EXPECT_FALSE(connection.must_be_rolled_back());
+  EXPECT_TRUE(AddThing(connection).ok());
+  connection.Commit();
+  EXPECT_EQ(ThingsAfterAKill(), 1);
 }
 
 }  // namespace

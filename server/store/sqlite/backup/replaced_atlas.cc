@@ -47,9 +47,9 @@ int LastNumber(const fs::path& database) {
   return last;
 }
 
-// Whether what is left of `database` may be that of `kept`, which lacks it. SQLite makes the index
-// of a log anew.
-bool MayFollow(const fs::path& database, const fs::path& kept) {
+// Whether `database` is not there, and `kept` is, without what is left of that one. SQLite makes
+// the index of a log anew.
+bool LacksWhatIsLeft(const fs::path& database, const fs::path& kept) {
   return !IsThere(database) && IsThere(kept) &&
          std::none_of(kSuffixes.begin(), kSuffixes.end(), [&](const std::string& suffix) {
            return suffix != "-shm" && IsThere(database.string() + suffix) &&
@@ -57,10 +57,10 @@ bool MayFollow(const fs::path& database, const fs::path& kept) {
          });
 }
 
-fs::path NameFor(const fs::path& database, bool was_interrupted) {
+fs::path NameFor(const fs::path& database, const MayFollowKept& may_follow) {
   const int last = LastNumber(database);
   const fs::path kept = Numbered(database, last);
-  return was_interrupted && MayFollow(database, kept) ? kept : Numbered(database, last + 1);
+  return LacksWhatIsLeft(database, kept) && may_follow(kept) ? kept : Numbered(database, last + 1);
 }
 
 using Renames = std::vector<std::pair<fs::path, fs::path>>;
@@ -74,8 +74,8 @@ void Undo(const Renames& done) {
 
 }  // namespace
 
-Result<fs::path> MoveAside(const fs::path& database, bool was_interrupted) {
-  const fs::path kept = NameFor(database, was_interrupted);
+Result<fs::path> MoveAside(const fs::path& database, const MayFollowKept& may_follow) {
+  const fs::path kept = NameFor(database, may_follow);
   Renames done;
   for (const char* suffix : kSuffixes) {
     const fs::path from = database.string() + suffix;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string_view>
 
 #include "core/base/status.h"
@@ -11,12 +12,15 @@ namespace atlas {
 // Between the name of a database and the number of one that is kept.
 inline constexpr std::string_view kReplaced = ".replaced-";
 
+// Whether what an interrupted restore left of an atlas is of the one that is kept under this name.
+using MayFollowKept = std::function<bool(const std::filesystem::path& kept)>;
+
 // `database` and what SQLite keeps beside it are called database.replaced-N, by the first number
 // behind all that there are, durably; the name is returned, empty where there was nothing. Nothing
-// that is kept is written over. Where a restore `was_interrupted`, what it left of the atlas that
-// it moved follows that one, if it lacks it. After an error all is where it was, as far as the disk
-// lets it. The caller holds the directory.
+// that is kept is written over. Where the database itself is not there, what is left of it follows
+// the last one that is kept, if that lacks it, and `may_follow`. After an error all is where it
+// was, as far as the disk lets it. The caller holds the directory.
 Result<std::filesystem::path> MoveAside(const std::filesystem::path& database,
-                                        bool was_interrupted);
+                                        const MayFollowKept& may_follow);
 
 }  // namespace atlas

@@ -71,9 +71,33 @@ std::string NameToOpen(const DatabaseOptions& options) {
 
 }  // namespace
 
+Query::Query(Connection& connection, SQLite::Statement& statement)
+    : connection_(&connection),
+      statement_(&statement),
+      spilled_before_(connection.CountSpilled()) {}
+
 Query::~Query() {
   // An error of the last step was thrown by it already; reset only repeats it.
   statement_->tryReset();
+}
+
+bool Query::Step() {
+  try {
+    return statement_->executeStep();
+  } catch (const SQLite::Exception&) {
+    const bool is_read = std::string_view(statement_->getQuery()).starts_with("SELECT");
+    connection_->NoteFailure(is_read ? connection_->CountSpilled() : spilled_before_);
+    throw;
+  }
+}
+
+int Query::Run() {
+  try {
+    return statement_->exec();
+  } catch (const SQLite::Exception&) {
+    connection_->NoteFailure(spilled_before_);
+    throw;
+  }
 }
 
 Query& Query::Bind(std::int64_t value) {
@@ -147,7 +171,28 @@ Query Connection::Prepare(const char* sql) {
     statement = std::make_unique<SQLite::Statement>(database_, sql);
   }
   statement->clearBindings();
-  return Query(*statement);
+  return {*this, *statement};
+}
+
+void Connection::Execute(const char* sql) {
+  const int spilled_before = CountSpilled();
+  try {
+    database_.exec(sql);
+  } catch (const SQLite::Exception&) {
+    NoteFailure(spilled_before);
+    throw;
+  }
+}
+
+int Connection::CountSpilled() const {
+  int pages = 0;
+  int unused = 0;
+  sqlite3_db_status(database_.getHandle(), SQLITE_DBSTATUS_CACHE_SPILL, &pages, &unused, 0);
+  return pages;
+}
+
+void Connection::NoteFailure(int spilled_before) {
+  must_be_rolled_back_ = must_be_rolled_back_ || CountSpilled() != spilled_before;
 }
 
 std::int64_t Connection::Ask(const char* sql) {
@@ -164,10 +209,14 @@ void Connection::Begin() {
     deferred->Forget();  // of one that SQLite gave up
   }
   Execute("BEGIN IMMEDIATE");
+  must_be_rolled_back_ = false;
 }
 
 void Connection::Commit() {
   WriteDeferred();
+  if (must_be_rolled_back_) {
+    throw SQLite::Exception("a write failed after it had written much; try again", SQLITE_BUSY);
+  }
   Execute("COMMIT");
   for (const auto& deferred : deferred_) {
     deferred->Forget();
@@ -182,6 +231,7 @@ void Connection::RollBack() {
 
 void Connection::Save() {
   Prepare("SAVEPOINT saved").Run();
+  spilled_before_save_ = CountSpilled();
   for (const auto& deferred : deferred_) {
     deferred->Save();
   }
@@ -189,6 +239,7 @@ void Connection::Save() {
 
 void Connection::RestoreSaved() {
   Execute("ROLLBACK TO saved");
+  NoteFailure(spilled_before_save_);
   for (const auto& deferred : deferred_) {
     deferred->Restore();
   }

@@ -25,11 +25,13 @@
 
 namespace atlas {
 
+class Connection;
+
 // A prepared statement in use: bind in order, step, read columns. Frees it for the next use, and
 // the read snapshot it may hold, when it goes out of scope.
 class Query {
  public:
-  explicit Query(SQLite::Statement& statement) : statement_(&statement) {}
+  Query(Connection& connection, SQLite::Statement& statement);
   Query(const Query&) = delete;
   Query& operator=(const Query&) = delete;
   ~Query();
@@ -43,9 +45,9 @@ class Query {
   Query& BindNull();
 
   // The next row; false after the last one.
-  bool Step() { return statement_->executeStep(); }
+  bool Step();
   // Runs a statement without rows; the number of rows it changed.
-  int Run() { return statement_->exec(); }
+  int Run();
 
   // The next column of the row, in order. What is of another type, or out of range, is noted and
   // cut.
@@ -79,7 +81,9 @@ class Query {
     return static_cast<Integer>(value);
   }
 
+  Connection* connection_;
   SQLite::Statement* statement_;
+  int spilled_before_;  // of the connection
   int parameter_ = 0;
   int column_ = 0;
   bool fits_ = true;  // every column so far
@@ -108,7 +112,7 @@ class Connection {
 
   // `sql` is a string literal: statements are kept by its address. Not to be nested in itself.
   Query Prepare(const char* sql);
-  void Execute(const char* sql) { database_.exec(sql); }
+  void Execute(const char* sql);
   // The first column of the first row of a statement that is run once.
   std::int64_t Ask(const char* sql);
   // Random, of this connection.
@@ -125,6 +129,12 @@ class Connection {
   void Save();
   void RestoreSaved();
   void ReleaseSaved();
+  // Whether part of the transaction was gone back on, a savepoint or a statement that failed, that
+  // had written pages to the log, for the cache was full. It must be rolled back, and Commit()
+  // refuses it (kUnavailable): if such a page was written twice, SQLite (3.40) leaves what goes to
+  // the log behind that without checksums. The commit would be seen as long as somebody has the
+  // database open, and be none for who opens it after a kill.
+  bool must_be_rolled_back() const { return must_be_rolled_back_; }
   // From now on `deferred` is written before each commit: the last one added first.
   template <typename T>
   T& Defer(std::unique_ptr<T> deferred) {
@@ -168,8 +178,16 @@ class Connection {
 
  private:
   friend class PageCopy;
+  friend class Query;
+
+  // Pages that were written to the log before their commit, since it was opened.
+  int CountSpilled() const;
+  // A statement failed that began when so many were.
+  void NoteFailure(int spilled_before);
 
   std::array<std::uint8_t, 16> id_{};
+  bool must_be_rolled_back_ = false;
+  int spilled_before_save_ = 0;
   std::function<void(int)> on_commit_;
   std::function<bool()> is_over_;
   std::vector<std::unique_ptr<Deferred>> deferred_;

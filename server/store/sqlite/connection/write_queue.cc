@@ -10,6 +10,19 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 
 namespace atlas {
+namespace {
+
+// What all of a group are told whose transaction SQLite gave up in an operation that ended as
+// `result`: only what the disk lacks or refuses is the same for all.
+Status WhyGivenUp(const Status& result) {
+  const bool is_of_all =
+      result.code() == StatusCode::kUnavailable || result.code() == StatusCode::kResourceExhausted;
+  return is_of_all ? result
+                   : Status(StatusCode::kUnavailable,
+                            "store: SQLite gave up the transaction of this write");
+}
+
+}  // namespace
 
 WriteQueue::WriteQueue(std::unique_ptr<Connection> connection,
                        const Options& options,
@@ -83,7 +96,8 @@ void WriteQueue::Loop() {
 std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
   std::unique_lock lock(mutex_);
   has_work_.wait(lock, [this] { return is_stopping_ || !queue_.empty(); });
-  const std::size_t size = std::min(queue_.size(), options_.max_group);
+  const std::size_t size = std::min(queue_.size(), singles_ > 0 ? 1 : options_.max_group);
+  singles_ -= singles_ > 0 ? 1 : 0;
   auto end = queue_.begin() + static_cast<std::ptrdiff_t>(size);
   end = std::find_if(queue_.begin(), end, [](const Operation& next) { return next.is_alone; });
   if (end == queue_.begin() && size > 0) {
@@ -96,18 +110,18 @@ std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
 }
 
 void WriteQueue::RunGroup(std::vector<Operation>& group) {
-  std::vector<Status> results(group.size());
+  Ends ends{std::vector<Status>(group.size()), std::nullopt};
   Status transaction = guard_.status();
   if (transaction.ok()) {
-    transaction = RunInTransaction(group, results);
+    transaction = RunInTransaction(group, ends);
   }
   if (!transaction.ok()) {
     NoteRefusal(transaction);
     Settle(group);  // whether a commit that failed wrote something is not known
-    std::fill(results.begin(), results.end(), transaction);
   }
   for (std::size_t i = 0; i < group.size(); ++i) {
-    group[i].finish(results[i]);
+    const bool is_own = transaction.ok() || ends.gave_up == i;
+    group[i].finish(is_own ? ends.results[i] : transaction);
   }
 }
 
@@ -139,20 +153,20 @@ WriteFigures WriteQueue::ReadFigures() const {
 }
 
 // Not ok: nothing of the group was written.
-Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results) {
+Status WriteQueue::RunInTransaction(std::vector<Operation>& group, Ends& ends) {
   try {
     const auto begin = std::chrono::steady_clock::now();
     const int changes_before = connection_->total_changes();
     connection_->Begin();
     for (std::size_t i = 0; i < group.size(); ++i) {
-      results[i] = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
+      Status& result = ends.results[i];
+      result = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
       if (!connection_->is_in_transaction()) {  // SQLite gave the whole of it up
-        return results[i].ok() ? Status(StatusCode::kUnavailable,
-                                        "store: SQLite gave up the transaction of this write")
-                               : results[i];
+        ends.gave_up = result.ok() ? std::nullopt : std::optional(i);
+        return WhyGivenUp(result);
       }
-      if (group[i].is_alone && !results[i].ok()) {
-        return RollBack(results[i]);
+      if ((group[i].is_alone && !result.ok()) || connection_->must_be_rolled_back()) {
+        return GiveUp(group, result);
       }
     }
     if (Status status = guard_.status(); !status.ok()) {
@@ -173,6 +187,16 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, std::vector<S
     guard_.Note(error);
     return RollBack(StatusFromException(error));
   }
+}
+
+Status WriteQueue::GiveUp(const std::vector<Operation>& group, const Status& failure) {
+  if (group.size() == 1 && !failure.ok()) {
+    return RollBack(failure);
+  }
+  singles_ = options_.max_group;  // whoever asks again is told of its own write
+  return RollBack(
+      {StatusCode::kUnavailable,
+       "store: a write of this transaction failed after it had written much; try again"});
 }
 
 Status WriteQueue::RollBack(Status failure) {

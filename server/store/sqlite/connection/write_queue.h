@@ -1,6 +1,7 @@
 // The one thread that writes the store: takes what is queued, up to a group of 64 operations, into
 // one transaction, and reports to each when that transaction is on disk. An operation that fails
-// leaves no trace and does not disturb the others of its group.
+// leaves no trace and does not disturb the others of its group, unless it had written more than the
+// cache takes: then all of the group are refused, and those behind it get a transaction each.
 #pragma once
 
 #include <atomic>
@@ -74,9 +75,18 @@ class WriteQueue {
   std::vector<Operation> TakeGroup();
   void RunGroup(std::vector<Operation>& group);
   static void Settle(const std::vector<Operation>& group);
-  Status RunInTransaction(std::vector<Operation>& group, std::vector<Status>& results);
+  // How each operation ended, and which of them is told so although nothing of its group is
+  // written.
+  struct Ends {
+    std::vector<Status> results;
+    std::optional<std::size_t> gave_up;
+  };
+  Status RunInTransaction(std::vector<Operation>& group, Ends& ends);
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
+  // Nothing of `group` is written, for one of it, which ended as `failure`, cannot be taken out
+  // alone; or it ended well, and a statement of it did not.
+  Status GiveUp(const std::vector<Operation>& group, const Status& failure);
   Status RunOne(Operation& operation);
 
   std::unique_ptr<Connection> connection_;
@@ -84,6 +94,7 @@ class WriteQueue {
   SyncGuard& guard_;
   std::atomic<std::uint64_t> revision_;
   DurationHistogram commits_;
+  std::size_t singles_ = 0;  // so many get a transaction each, behind one that was given up
   mutable std::mutex mutex_;
   std::condition_variable has_work_;
   std::deque<Operation> queue_;

@@ -33,7 +33,8 @@ Status PutBackAndCheck(Connection& connection, std::string& damages) {
 
 }  // namespace
 
-Result<std::string> RepairSchema(Connection& connection) {
+Result<std::string> RepairSchema(Connection& connection,
+                                 const std::function<void()>& before_writing) {
   std::string damages;
   if (!IsOfAVersionThatIsRead(connection)) {
     connection.TakeWholeSchemasOnly();
@@ -48,6 +49,13 @@ Result<std::string> RepairSchema(Connection& connection) {
   if (damage.can_be_put_back) {
     connection.Begin();
     left = PutBackAndCheck(connection, damages);
+    if (left.ok() && before_writing) {
+      connection.RollBack();
+      connection.Execute("PRAGMA writable_schema = ON");  // as it was opened
+      before_writing();
+      connection.Begin();
+      left = PutBackAndCheck(connection, damages);
+    }
     if (left.ok()) {
       connection.Commit();
       return damages;

@@ -2,6 +2,7 @@
 // every atlas.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "core/base/status.h"
@@ -14,8 +15,12 @@ namespace atlas {
 // schema that was put back. Takes a connection that takes any schema and knows row_hash
 // (row_hash.h); behind it, without an error, it takes whole ones only.
 //
+// `before_writing`, where it is set, is called, in no transaction, when the repair was tried, and
+// before it is made.
+//
 // kInvalidData says what differs and why it stays: a table is gone, say, or there is other damage.
 // Nothing was changed then. Throws as the connection does.
-Result<std::string> RepairSchema(Connection& connection);
+Result<std::string> RepairSchema(Connection& connection,
+                                 const std::function<void()>& before_writing);
 
 }  // namespace atlas
