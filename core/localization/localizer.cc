@@ -64,10 +64,12 @@ Localizer::Localizer(const MapProfile& profile,
       features_(options.features),
       map_(profile, std::move(tiles), options.map),
       motion_(options.motion),
+      confirmation_(options.confirmation, options.registration),
       relocalizer_(std::move(relocalizer)) {}
 
 void Localizer::Start(const Pose& T_world_sensor) {
   motion_.Start(T_world_sensor);
+  confirmation_.Trust();
   is_first_ = true;
   usual_fit_ = 0.0;
   lost_ = 0;
@@ -98,19 +100,25 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
       is_found = true;
     }
   }
-  result.health = Judge(result.registration);
+  bool is_expected = IsExpected(result.registration, features, is_found);
+  result.health = Judge(result.registration, features, is_expected);
   const auto elsewhere = Relocalize(scan, R_level_sensor, result.health);
   if (!elsewhere) {
     motion_ = before;
     return Error(elsewhere.error());
   }
-  if (*elsewhere) {
+  if (*elsewhere && result.health != LocalizationHealth::kLost &&
+      !AreApart((*elsewhere)->T_world_level, result.registration.T_world_level, options_.search)) {
+    confirmation_.Agree();
+  } else if (*elsewhere) {
     result.registration = **elsewhere;
-    result.health = Judge(result.registration);
+    is_expected = false;
+    result.health = Judge(result.registration, features, is_expected);
     lost_ = std::max(lost_, 1);  // its motion until now says nothing
     tracked.rival.reset();
     is_found = true;
   }
+  Confirm(features, is_expected, result);
   result.T_world_sensor = result.health == LocalizationHealth::kLost
                               ? Prior().T_world_level
                               : result.registration.T_world_level;
@@ -124,6 +132,11 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
   }
   Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
   result.covariance = motion_.covariance();
+  const bool is_poor =
+      result.health == LocalizationHealth::kWeak && result.registration.fit < options_.good_fit;
+  if (!confirmation_.is_confirmed() || is_poor || lost_ >= options_.relocalized_after) {
+    result.covariance += confirmation_.Spread();
+  }
   return result;
 }
 
@@ -323,7 +336,7 @@ std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features
 
 Result<std::optional<RegistrationResult>> Localizer::Relocalize(
     const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor, LocalizationHealth health) {
-  const bool is_astray = health == LocalizationHealth::kLost ||
+  const bool is_astray = health == LocalizationHealth::kLost || !confirmation_.is_confirmed() ||
                          SpreadOf(motion_.covariance()).along_m > options_.relocalized_sigma_m;
   astray_ = is_astray ? astray_ + 1 : 0;
   if (!relocalizer_ || astray_ == 0 || astray_ % options_.relocalized_after != 0) {
@@ -354,8 +367,50 @@ bool Localizer::StandsOut(const std::vector<Place>& places, const Place& best) c
          });
 }
 
-LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {
-  if (result.fit < options_.min_fit) {
+// What was tracked is: nothing else was found. After scans that were lost the vehicle may be
+// anywhere, unless what is seen is what was expected.
+bool Localizer::IsExpected(const RegistrationResult& result,
+                           const ScanFeatures& features,
+                           bool is_found) const {
+  if (is_first_ || (lost_ == 0 && !is_found)) {
+    return true;
+  }
+  const PosePrior prior = Prior();
+  const Eigen::Vector4d off = PoseDifference(prior.T_world_level, result.T_world_level);
+  const bool is_near =
+      off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;
+  const bool is_likely = LogDensity(prior, result.T_world_level) > options_.surprising_log_density;
+  return (lost_ == 0 && is_likely) || (lost_ <= options_.max_coasting && is_near &&
+                                       confirmation_.IsAsUsual(result, features, usual_fit_));
+}
+
+void Localizer::Confirm(const ScanFeatures& features,
+                        bool is_expected,
+                        LocalizationResult& result) {
+  if (result.health == LocalizationHealth::kLost) {
+    confirmation_.Miss();
+    return;
+  }
+  if (!is_expected) {
+    confirmation_.Doubt();
+  }
+  const double up_m = result.registration.T_world_level.translation().z();
+  if (auto there = confirmation_.Weigh(map_.window(), features, result.registration, usual_fit_,
+                                       IsDoubtful(result.registration))) {
+    result.registration = *std::move(there);
+    motion_.Raise(result.registration.T_world_level.translation().z() - up_m);
+  }
+  if (!confirmation_.is_confirmed()) {
+    result.health = LocalizationHealth::kWeak;
+  }
+}
+
+LocalizationHealth Localizer::Judge(const RegistrationResult& result,
+                                    const ScanFeatures& features,
+                                    bool is_expected) const {
+  if (!is_expected || !confirmation_.is_confirmed()
+          ? !confirmation_.IsEnough(result, features)
+          : result.fit < (is_first_ ? options_.good_fit : options_.min_fit)) {
     return LocalizationHealth::kLost;
   }
   return WorstSigma(result) > options_.max_weak_sigma_m || result.fit < options_.good_fit
