@@ -408,9 +408,8 @@ void Localizer::Confirm(const ScanFeatures& features,
 LocalizationHealth Localizer::Judge(const RegistrationResult& result,
                                     const ScanFeatures& features,
                                     bool is_expected) const {
-  if (!is_expected || !confirmation_.is_confirmed()
-          ? !confirmation_.IsEnough(result, features)
-          : result.fit < (is_first_ ? options_.good_fit : options_.min_fit)) {
+  if (!is_expected || !confirmation_.is_confirmed() ? !confirmation_.IsEnough(result, features)
+                                                    : result.fit < options_.min_fit) {
     return LocalizationHealth::kLost;
   }
   return WorstSigma(result) > options_.max_weak_sigma_m || result.fit < options_.good_fit
