@@ -176,6 +176,7 @@ class Localizer {
                   bool is_found) const;
   // Takes the place up, which may be a new one, or another deck's.
   void Confirm(const ScanFeatures& features, bool is_expected, LocalizationResult& result);
+  PoseCovariance Covariance(const LocalizationResult& result) const;
   LocalizationHealth Judge(const RegistrationResult& result,
                            const ScanFeatures& features,
                            bool is_expected) const;
