@@ -64,7 +64,7 @@ std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
   const auto better =
       std::min_element(rivals_.begin(), rivals_.end(),
                        [](const Rival& a, const Rival& b) { return a.margin() < b.margin(); });
-  const bool is_better = better != rivals_.end() && better->margin() <= -options_.min_margin;
+  const bool is_better = better != rivals_.end() && better->margin() <= -options_.taken_margin;
   if (is_confirmed_) {
     is_confirmed_ = !is_better;
     if (is_confirmed_) rivals_.clear();

@@ -31,6 +31,7 @@ struct ConfirmationOptions {
   // deck. Along simulated drives through a garage of four decks other decks were ahead by 0.04 at
   // most, of single scans on ramps; the median was 0.2 behind.
   double min_margin = 0.08;
+  double taken_margin = 0.12;  // of another deck, which takes the vehicle over
 
   int compared_after = 25;  // scans, where nothing is in doubt
 

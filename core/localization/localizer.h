@@ -99,8 +99,8 @@ struct LocalizerOptions {
   double surprising_log_density = -8.0;
   // ... and if that is further than this from where it was expected, or it was lost before, it has
   // to be confirmed.
-  double expected_m = 1.5;
-  double expected_rad = 0.7;
+  double expected_m = 3.0;
+  double expected_rad = 1.2;
 };
 
 // Made when it is first needed; null: there is none.
@@ -176,6 +176,7 @@ class Localizer {
                   bool is_found) const;
   // Takes the place up, which may be a new one, or another deck's.
   void Confirm(const ScanFeatures& features, bool is_expected, LocalizationResult& result);
+  PoseCovariance Covariance(const LocalizationResult& result) const;
   LocalizationHealth Judge(const RegistrationResult& result,
                            const ScanFeatures& features,
                            bool is_expected) const;
