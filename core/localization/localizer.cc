@@ -31,30 +31,6 @@ bool AreApart(const Pose& a, const Pose& b, const PoseSearchOptions& options) {
 
 }  // namespace
 
-std::string_view MapCoverName(MapCover cover) {
-  switch (cover) {
-    case MapCover::kNone:
-      return "none";
-    case MapCover::kCoarse:
-      return "coarse";
-    case MapCover::kFine:
-      return "fine";
-  }
-  return "none";
-}
-
-std::string_view LocalizationHealthName(LocalizationHealth health) {
-  switch (health) {
-    case LocalizationHealth::kGood:
-      return "good";
-    case LocalizationHealth::kWeak:
-      return "weak";
-    case LocalizationHealth::kLost:
-      return "lost";
-  }
-  return "lost";
-}
-
 Localizer::Localizer(const MapProfile& profile,
                      TilesAround tiles,
                      const LocalizerOptions& options,
@@ -64,10 +40,12 @@ Localizer::Localizer(const MapProfile& profile,
       features_(options.features),
       map_(profile, std::move(tiles), options.map),
       motion_(options.motion),
+      confirmation_(options.confirmation, options.registration),
       relocalizer_(std::move(relocalizer)) {}
 
 void Localizer::Start(const Pose& T_world_sensor) {
   motion_.Start(T_world_sensor);
+  confirmation_.Trust();
   is_first_ = true;
   usual_fit_ = 0.0;
   lost_ = 0;
@@ -98,19 +76,25 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
       is_found = true;
     }
   }
-  result.health = Judge(result.registration);
+  bool is_expected = IsExpected(result.registration, features, is_found);
+  result.health = Judge(result.registration, features, is_expected);
   const auto elsewhere = Relocalize(scan, R_level_sensor, result.health);
   if (!elsewhere) {
     motion_ = before;
     return Error(elsewhere.error());
   }
-  if (*elsewhere) {
+  if (*elsewhere && result.health != LocalizationHealth::kLost &&
+      !AreApart((*elsewhere)->T_world_level, result.registration.T_world_level, options_.search)) {
+    confirmation_.Agree();
+  } else if (*elsewhere) {
     result.registration = **elsewhere;
-    result.health = Judge(result.registration);
+    is_expected = false;
+    result.health = Judge(result.registration, features, is_expected);
     lost_ = std::max(lost_, 1);  // its motion until now says nothing
     tracked.rival.reset();
     is_found = true;
   }
+  Confirm(features, is_expected, result);
   result.T_world_sensor = result.health == LocalizationHealth::kLost
                               ? Prior().T_world_level
                               : result.registration.T_world_level;
@@ -123,7 +107,7 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
     result.health = LocalizationHealth::kWeak;
   }
   Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
-  result.covariance = motion_.covariance();
+  result.covariance = Covariance(result);
   return result;
 }
 
@@ -323,7 +307,7 @@ std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features
 
 Result<std::optional<RegistrationResult>> Localizer::Relocalize(
     const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor, LocalizationHealth health) {
-  const bool is_astray = health == LocalizationHealth::kLost ||
+  const bool is_astray = health == LocalizationHealth::kLost || !confirmation_.is_confirmed() ||
                          SpreadOf(motion_.covariance()).along_m > options_.relocalized_sigma_m;
   astray_ = is_astray ? astray_ + 1 : 0;
   if (!relocalizer_ || astray_ == 0 || astray_ % options_.relocalized_after != 0) {
@@ -352,15 +336,6 @@ bool Localizer::StandsOut(const std::vector<Place>& places, const Place& best) c
                   AreApart(other.registration.T_world_level, best.registration.T_world_level,
                            options_.search);
          });
-}
-
-LocalizationHealth Localizer::Judge(const RegistrationResult& result) const {
-  if (result.fit < options_.min_fit) {
-    return LocalizationHealth::kLost;
-  }
-  return WorstSigma(result) > options_.max_weak_sigma_m || result.fit < options_.good_fit
-             ? LocalizationHealth::kWeak
-             : LocalizationHealth::kGood;
 }
 
 }  // namespace atlas

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/status.h"
+#include "core/localization/confirmation.h"
 #include "core/localization/local_map.h"
 #include "core/localization/motion_model.h"
 #include "core/localization/pose_search.h"
@@ -22,7 +23,8 @@ namespace atlas {
 
 enum class LocalizationHealth : std::uint8_t {
   kGood,
-  kWeak,  // one horizontal direction is not held by anything seen, or in two places
+  kWeak,  // one horizontal direction is not held by anything seen, or in two places; or it was
+          // lost, and nothing has confirmed yet that this is the place
   kLost,  // the scan does not fit the map here: the pose is the predicted one
 };
 std::string_view LocalizationHealthName(LocalizationHealth health);
@@ -41,6 +43,7 @@ struct LocalizerOptions {
   RegistrationOptions registration;
   MotionOptions motion;
   PoseSearchOptions search;
+  ConfirmationOptions confirmation;
 
   // Of RegistrationResult; less is lost. Wrong places on real drives, found from starts up to 6 m
   // and 20 degrees off, fit 0.385 at most, right ones 0.48 and more but for two in a hundred.
@@ -88,12 +91,16 @@ struct LocalizerOptions {
   // too.
   int asked_again_after = 5;
 
-  // Lost for so many scans, or adrift this far, it is looked for in the whole map, again after as
-  // many scans as it was not found.
+  // Lost or in doubt for so many scans, or adrift this far, it is looked for in the whole map,
+  // again after as many scans as it was not found.
   int relocalized_after = 5;
   double relocalized_sigma_m = 8.0;
   // Found where the prior's log density is below this, the vehicle moved as nobody expected.
   double surprising_log_density = -8.0;
+  // ... and if that is further than this from where it was expected, or it was lost before, it has
+  // to be confirmed.
+  double expected_m = 3.0;
+  double expected_rad = 1.2;
 };
 
 // Made when it is first needed; null: there is none.
@@ -163,7 +170,16 @@ class Localizer {
   Result<std::optional<RegistrationResult>> Relocalize(const LeveledScan& scan,
                                                        const Eigen::Quaterniond& R_level_sensor,
                                                        LocalizationHealth health);
-  LocalizationHealth Judge(const RegistrationResult& result) const;
+  // Whether a place is where a vehicle that was known to be somewhere can be now.
+  bool IsExpected(const RegistrationResult& result,
+                  const ScanFeatures& features,
+                  bool is_found) const;
+  // Takes the place up, which may be a new one, or another deck's.
+  void Confirm(const ScanFeatures& features, bool is_expected, LocalizationResult& result);
+  PoseCovariance Covariance(const LocalizationResult& result) const;
+  LocalizationHealth Judge(const RegistrationResult& result,
+                           const ScanFeatures& features,
+                           bool is_expected) const;
   struct Cover {
     MapCover map = MapCover::kNone;
     double cell_m = 0.0;  // of what was mapped, on average
@@ -180,12 +196,13 @@ class Localizer {
   FeatureExtractor features_;
   LocalMap map_;
   MotionModel motion_;
+  Confirmation confirmation_;
   bool is_first_ = true;
   double usual_fit_ = 0.0;  // of good results, exponentially forgotten
   int lost_ = 0;            // scans in a row
   RelocalizerSource relocalizer_;
   int without_map_ = 0;  // scans in a row on which the map was not all there
-  int astray_ = 0;       // scans in a row in which it was lost or adrift too far
+  int astray_ = 0;       // scans in a row in which it was lost, in doubt, or adrift too far
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;

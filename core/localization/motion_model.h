@@ -51,6 +51,8 @@ class MotionModel {
 
   // The vehicle stopped as far as anyone knows; its place stays as uncertain as it is.
   void ForgetMotion();
+  // It is on another deck, so much higher; all else is as it was.
+  void Raise(double up_m) { pose_.translation().z() += up_m; }
   // The IMU's tilt; the place and the heading stay.
   void SetTilt(const Eigen::Matrix3d& R_world_sensor);
 

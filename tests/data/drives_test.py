@@ -139,6 +139,17 @@ def localization(bin_dir):
     assert near.translation() < 0.6 * paper.translation() and near.rotation() < 0.6 * paper.rotation()
 
 
+def carried_copy(folder, work, kept):
+    """Those of the drive's scans, as if nothing lay between them."""
+    copy = pathlib.Path(work) / "carried"
+    (copy / "velodyne").mkdir(parents=True)
+    poses = (folder / "poses.txt").read_text().splitlines()
+    for number, scan in enumerate(kept):
+        (copy / f"velodyne/{number:06}.bin").symlink_to(folder / f"velodyne/{scan:06}.bin")
+    (copy / "poses.txt").write_text("".join(poses[scan] + "\n" for scan in kept))
+    return copy
+
+
 def places(bin_dir):
     """Scans found alone, with no start; and a vehicle that is carried on, and told nothing."""
     with tempfile.TemporaryDirectory() as work:
@@ -154,13 +165,7 @@ def places(bin_dir):
         elsewhere = atlas.run("localize", drive("semantickitti_mini/02"), "--relocalize")
         print(f"another drive in that map: {elsewhere}")
         assert elsewhere["right"] == elsewhere["wrong"] == 0
-        carried = pathlib.Path(work) / "carried"
-        (carried / "velodyne").mkdir(parents=True)
-        poses = (folder / "poses.txt").read_text().splitlines()
-        kept = [*range(21, 51, 2), *range(111, 151, 2)]
-        for number, scan in enumerate(kept):
-            (carried / f"velodyne/{number:06}.bin").symlink_to(folder / f"velodyne/{scan:06}.bin")
-        (carried / "poses.txt").write_text("".join(poses[scan] + "\n" for scan in kept))
+        carried = carried_copy(folder, work, [*range(21, 51, 2), *range(111, 151, 2)])
         done = atlas.call("localize", carried, "--no-restart", "--max-range", 40)
         rows = [json.loads(line) for line in done.stdout.splitlines()]
         assert atlas.stop() == 0
@@ -249,6 +254,10 @@ def second(bin_dir):
             atlas.run("ingest", f"{work}/0")
             atlas.run("wait")
             summary = atlas.run("localize", f"{work}/1", "--output", f"{work}/track.csv")
+            # Carried to the deck below, after 30 scans.
+            folder = carried_copy(pathlib.Path(work) / "1", work, [*range(30), *range(80, 140)])
+            done = atlas.call("localize", folder, "--no-restart").stdout.splitlines()
+            carried = [json.loads(line) for line in done[:-1]]
             assert atlas.stop() == 0
             with open(f"{work}/track.csv", newline="", encoding="ascii") as file:
                 scans = list(csv.DictReader(file))
@@ -256,6 +265,10 @@ def second(bin_dir):
         print(f"{world}: {held} of {len(scans)} scans on their deck; {summary}")
         assert held == len(scans) == summary["scans"] and summary["failures"] == 0
         assert summary["translation_rmse_m"] <= goal_m
+        good = [scan for scan in carried if scan["health"] == "good"]
+        wrong = sum(scan["error_m"] > 1.0 for scan in good)
+        print(f"carried to another deck: {len(good)} of {len(carried)} scans good, {wrong} of them on another")
+        assert wrong <= 1 and len(good) >= 35 and carried[-1]["error_m"] < 0.2
 
 
 def ground(bin_dir):

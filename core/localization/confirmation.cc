@@ -1,0 +1,131 @@
+#include "core/localization/confirmation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace atlas {
+
+double ExplainedShare(const RegistrationResult& registration, const ScanFeatures& features) {
+  return registration.evidence /
+         static_cast<double>(std::max<std::size_t>(features.columns.size(), 1));
+}
+
+namespace {
+
+// A deck that was mapped better explains more; the right one is contradicted less.
+double Score(const RegistrationResult& registration, const ScanFeatures& features) {
+  return registration.fit + std::max(0.0, ExplainedShare(registration, features));
+}
+
+}  // namespace
+
+void Confirmation::Trust() {
+  Doubt();
+  is_confirmed_ = true;
+  uncompared_ = 0;
+}
+
+void Confirmation::Doubt() {
+  is_confirmed_ = false;
+  Miss();
+}
+
+void Confirmation::Miss() {
+  usual_scans_ = 0;
+  good_scans_ = 0;
+  rivals_.clear();
+}
+
+bool Confirmation::IsEnough(const RegistrationResult& here, const ScanFeatures& features) const {
+  return here.fit >= options_.good_fit && here.column_inliers >= options_.min_columns &&
+         ExplainedShare(here, features) >= options_.min_explained;
+}
+
+bool Confirmation::IsAsUsual(const RegistrationResult& here,
+                             const ScanFeatures& features,
+                             double usual_fit) const {
+  const double asked = usual_fit > 0.0
+                           ? std::min(options_.usual_share * usual_fit, options_.usual_fit)
+                           : options_.usual_fit;
+  return here.fit >= asked && IsEnough(here, features);
+}
+
+std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
+                                                      const ScanFeatures& features,
+                                                      const RegistrationResult& here,
+                                                      double usual_fit,
+                                                      bool is_doubtful) {
+  if (is_confirmed_ && !is_doubtful && ++uncompared_ < options_.compared_after) {
+    return std::nullopt;
+  }
+  uncompared_ = 0;
+  Compare(map, features, here);
+  const auto better =
+      std::min_element(rivals_.begin(), rivals_.end(),
+                       [](const Rival& a, const Rival& b) { return a.margin() < b.margin(); });
+  const bool is_better = better != rivals_.end() && better->margin() <= -options_.taken_margin;
+  if (is_confirmed_) {
+    is_confirmed_ = !is_better;
+    if (is_confirmed_) rivals_.clear();
+    return std::nullopt;
+  }
+  if (is_better && better->scans >= options_.usual_scans &&
+      IsEnough(better->registration, features)) {
+    RegistrationResult there = std::move(better->registration);
+    Doubt();
+    return there;
+  }
+  Count(IsEnough(here, features), IsAsUsual(here, features, usual_fit));
+  return std::nullopt;
+}
+
+void Confirmation::Count(bool is_good, bool is_usual) {
+  good_scans_ = is_good ? good_scans_ + 1 : 0;
+  usual_scans_ = is_usual ? usual_scans_ + 1 : 0;
+  const bool is_spoken_for =
+      usual_scans_ >= options_.usual_scans || good_scans_ >= options_.good_scans;
+  if (is_spoken_for && IsAhead()) Trust();
+}
+
+bool Confirmation::IsAhead() const {
+  return std::all_of(rivals_.begin(), rivals_.end(),
+                     [&](const Rival& rival) { return rival.margin() >= options_.min_margin; });
+}
+
+void Confirmation::Compare(const MapWindow& map,
+                           const ScanFeatures& features,
+                           const RegistrationResult& here) {
+  const double score = Score(here, features);
+  std::vector<Rival> rivals;
+  for (const double up_m : OtherDecks(map, features, here.T_world_level, options_.decks)) {
+    Pose start = here.T_world_level;
+    start.translation().z() += up_m;
+    Rival rival;
+    rival.registration = Register(map, features, start, registration_);
+    rival.up_m =
+        rival.registration.T_world_level.translation().z() - here.T_world_level.translation().z();
+    if (std::abs(rival.up_m) < 0.5 * options_.decks.apart_m) {
+      continue;  // it came back
+    }
+    const auto before = std::find_if(rivals_.begin(), rivals_.end(), [&](const Rival& other) {
+      return std::abs(other.up_m - rival.up_m) < 0.5 * options_.decks.apart_m;
+    });
+    if (before != rivals_.end()) {
+      rival.lead = before->lead;
+      rival.scans = before->scans;
+    }
+    rival.lead += score - Score(rival.registration, features);
+    ++rival.scans;
+    rivals.push_back(std::move(rival));
+  }
+  rivals_ = std::move(rivals);
+}
+
+PoseCovariance Confirmation::Spread() const {
+  const Eigen::Vector4d sigmas(options_.sigma_m, options_.sigma_m, options_.sigma_up_m,
+                               options_.sigma_rad);
+  return sigmas.cwiseAbs2().asDiagonal();
+}
+
+}  // namespace atlas
