@@ -15,6 +15,7 @@ import tempfile
 import bench_asked
 import bench_crowd
 import bench_follow
+import bench_kidnapped
 import bench_load
 import bench_localization
 import bench_memory
@@ -198,7 +199,7 @@ BENCHMARKS = {"segmentation": bench_segmentation, "frontend": bench_frontend,
                  for name, bench in {**bench_updates.BENCHMARKS, **bench_serving.BENCHMARKS,
                                    **bench_load.BENCHMARKS, **bench_follow.BENCHMARKS,
                                    **bench_memory.BENCHMARKS, **bench_planning.BENCHMARKS, **bench_unread.BENCHMARKS,
-                                   **bench_crowd.BENCHMARKS, **bench_localization.BENCHMARKS,
+                                   **bench_crowd.BENCHMARKS, **bench_kidnapped.BENCHMARKS, **bench_localization.BENCHMARKS,
                                    **bench_monitoring.BENCHMARKS, **bench_places.BENCHMARKS,
                                    **bench_tracking.BENCHMARKS}.items()},
               **{name: lambda bin_dir, name=name: bench_late(name, bin_dir) for name in LATE}}

@@ -4,21 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/localization/place_score.h"
+
 namespace atlas {
-
-double ExplainedShare(const RegistrationResult& registration, const ScanFeatures& features) {
-  return registration.evidence /
-         static_cast<double>(std::max<std::size_t>(features.columns.size(), 1));
-}
-
-namespace {
-
-// A deck that was mapped better explains more; the right one is contradicted less.
-double Score(const RegistrationResult& registration, const ScanFeatures& features) {
-  return registration.fit + std::max(0.0, ExplainedShare(registration, features));
-}
-
-}  // namespace
 
 void Confirmation::Trust() {
   Doubt();
@@ -28,7 +16,16 @@ void Confirmation::Trust() {
 
 void Confirmation::Doubt() {
   is_confirmed_ = false;
+  is_new_ = true;
   Miss();
+}
+
+void Confirmation::Question() {
+  if (!is_confirmed_) {
+    return;
+  }
+  Doubt();
+  is_new_ = false;
 }
 
 void Confirmation::Miss() {
@@ -67,6 +64,7 @@ std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
   const bool is_better = better != rivals_.end() && better->margin() <= -options_.taken_margin;
   if (is_confirmed_) {
     is_confirmed_ = !is_better;
+    is_new_ = is_better;
     if (is_confirmed_) rivals_.clear();
     return std::nullopt;
   }
@@ -89,14 +87,16 @@ void Confirmation::Count(bool is_good, bool is_usual) {
 }
 
 bool Confirmation::IsAhead() const {
-  return std::all_of(rivals_.begin(), rivals_.end(),
-                     [&](const Rival& rival) { return rival.margin() >= options_.min_margin; });
+  return std::all_of(rivals_.begin(), rivals_.end(), [&](const Rival& rival) {
+    return is_new_ ? options_.lead.IsClear(rival.lead, rival.scans)
+                   : rival.margin() >= -options_.tracked_margin;
+  });
 }
 
 void Confirmation::Compare(const MapWindow& map,
                            const ScanFeatures& features,
                            const RegistrationResult& here) {
-  const double score = Score(here, features);
+  const double score = PlaceScore(here, features);
   std::vector<Rival> rivals;
   for (const double up_m : OtherDecks(map, features, here.T_world_level, options_.decks)) {
     Pose start = here.T_world_level;
@@ -115,7 +115,7 @@ void Confirmation::Compare(const MapWindow& map,
       rival.lead = before->lead;
       rival.scans = before->scans;
     }
-    rival.lead += score - Score(rival.registration, features);
+    rival.lead += score - PlaceScore(rival.registration, features);
     ++rival.scans;
     rivals.push_back(std::move(rival));
   }

@@ -1,341 +1,195 @@
 #include "core/localization/localizer.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
+#include "core/localization/place_score.h"
+
 namespace atlas {
-namespace {
-
-// T_world_sensor without its tilt but with `R_level_sensor`'s: what the IMU says about the vertical
-// replaces what was predicted.
-Pose LevelFrame(const Pose& T_world_sensor) {
-  Pose level = Pose::Identity();
-  const double yaw_rad = SplitYaw(Eigen::Quaterniond(T_world_sensor.linear())).yaw_rad;
-  level.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  level.translation() = T_world_sensor.translation();
-  return level;
-}
-
-Eigen::Matrix4d PoseInformation(const Eigen::Matrix<double, 6, 6>& information) {
-  constexpr std::array<int, 4> kAxes{0, 1, 2, 5};
-  return information(kAxes, kAxes);
-}
-
-bool AreApart(const Pose& a, const Pose& b, const PoseSearchOptions& options) {
-  const Eigen::AngleAxisd turned(a.linear().transpose() * b.linear());
-  return (a.translation() - b.translation()).norm() > options.apart_m ||
-         turned.angle() > options.apart_rad;
-}
-
-}  // namespace
 
 Localizer::Localizer(const MapProfile& profile,
                      TilesAround tiles,
                      const LocalizerOptions& options,
                      RelocalizerSource relocalizer)
-    : options_(options),
-      cell_size_m_(profile.cell_size_m()),
+    : profile_(profile),
+      tiles_(std::move(tiles)),
+      options_(options),
       features_(options.features),
-      map_(profile, std::move(tiles), options.map),
-      motion_(options.motion),
-      confirmation_(options.confirmation, options.registration),
-      relocalizer_(std::move(relocalizer)) {}
+      relocalizer_(std::move(relocalizer)) {
+  places_.emplace_back(NewTracker());
+}
+
+PlaceTracker Localizer::NewTracker() const {
+  return {profile_, tiles_, options_.tracker, static_cast<double>(options_.features.max_range_m)};
+}
 
 void Localizer::Start(const Pose& T_world_sensor) {
-  motion_.Start(T_world_sensor);
-  confirmation_.Trust();
-  is_first_ = true;
-  usual_fit_ = 0.0;
-  lost_ = 0;
+  places_.erase(places_.begin() + 1, places_.end());
+  places_.front().tracker.Start(T_world_sensor);
   astray_ = 0;
-  without_map_ = 0;
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
                                                const Eigen::Quaterniond& R_level_sensor) {
-  const MotionModel before = motion_;
-  if (!is_first_) {
-    motion_.Predict();
-  }
-  const double radius_m = static_cast<double>(options_.features.max_range_m) + AdriftReach();
-  if (Status status = map_.Renew(motion_.T_world_sensor().translation(), radius_m); !status.ok()) {
-    motion_ = before;
-    return Error(std::move(status));
-  }
   const ScanFeatures& features = features_.Extract(scan);
-  LocalizationResult result;
-  Tracked tracked = Track(features);
-  result.registration = std::move(tracked.place.registration);
-  bool is_found = false;
-  if (IsDoubtful(result.registration) || IsAdrift()) {
-    if (auto found = Search(features, result.registration)) {
-      result.registration = *std::move(found);
-      tracked.rival.reset();
-      is_found = true;
+  std::vector<SupposedPlace> found;
+  if (IsLookedFor()) {
+    auto looked = Look(scan, R_level_sensor);
+    if (!looked) return Error(looked.error());
+    found = *std::move(looked);
+  }
+  for (std::vector<SupposedPlace>* places : {&places_, &found}) {
+    for (SupposedPlace& place : *places) {
+      if (Status status = place.tracker.Prepare(); !status.ok()) return Error(std::move(status));
     }
   }
-  bool is_expected = IsExpected(result.registration, features, is_found);
-  result.health = Judge(result.registration, features, is_expected);
-  const auto elsewhere = Relocalize(scan, R_level_sensor, result.health);
-  if (!elsewhere) {
-    motion_ = before;
-    return Error(elsewhere.error());
-  }
-  if (*elsewhere && result.health != LocalizationHealth::kLost &&
-      !AreApart((*elsewhere)->T_world_level, result.registration.T_world_level, options_.search)) {
-    confirmation_.Agree();
-  } else if (*elsewhere) {
-    result.registration = **elsewhere;
-    is_expected = false;
-    result.health = Judge(result.registration, features, is_expected);
-    lost_ = std::max(lost_, 1);  // its motion until now says nothing
-    tracked.rival.reset();
-    is_found = true;
-  }
-  Confirm(features, is_expected, result);
-  result.T_world_sensor = result.health == LocalizationHealth::kLost
-                              ? Prior().T_world_level
-                              : result.registration.T_world_level;
-  result.T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
-  const Cover cover = CoverAt(features, result.registration.T_world_level);
-  result.cover = cover.map;
-  NoteCover(cover.map);
-  if (result.health == LocalizationHealth::kGood &&
-      (tracked.rival || cover.map != MapCover::kFine)) {
-    result.health = LocalizationHealth::kWeak;
-  }
-  Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
-  result.covariance = Covariance(result);
-  return result;
+  std::move(found.begin(), found.end(), std::back_inserter(places_));
+  Follow(features, R_level_sensor);
+  return places_.front().result;
 }
 
-// Tiles that are on their way come to a vehicle that stands, too.
-void Localizer::NoteCover(MapCover cover) {
-  without_map_ = cover == MapCover::kFine ? 0 : without_map_ + 1;
-  if (without_map_ == options_.asked_again_after) {
-    without_map_ = 0;
-    map_.Expire();
-  }
+bool Localizer::IsLookedFor() const {
+  const int since = astray_ - options_.looked_after;
+  return relocalizer_ && since >= 0 && since % options_.looked_again_after == 0;
 }
 
-Localizer::Cover Localizer::CoverAt(const ScanFeatures& features, const Pose& T_world_level) const {
-  constexpr std::size_t kStride = 4;
-  constexpr double kMapped = 0.05;  // of the ground: less is the edge of a map elsewhere
-  const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
-  const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
-  int looked_at = 0;
-  int mapped = 0;
-  int fine = 0;
-  double cells_m = 0.0;
-  for (std::size_t i = 0; i < features.ground.size(); i += kStride) {
-    const std::optional<int> level = map_.window().LevelAt(R * features.ground[i] + t);
-    ++looked_at;
-    mapped += level ? 1 : 0;
-    fine += level == 0 ? 1 : 0;
-    cells_m += level ? cell_size_m_ * (1 << *level) : 0.0;
-  }
-  if (mapped == 0 || mapped < kMapped * looked_at) {
-    return {MapCover::kNone, cell_size_m_};
-  }
-  return {2 * fine >= mapped ? MapCover::kFine : MapCover::kCoarse, cells_m / mapped};
-}
-
-// What the scan says about (x, y, z, yaw); between two places it does not know which.
-Eigen::Matrix4d Localizer::Seen(const RegistrationResult& registration,
-                                const Cover& cover,
-                                const std::optional<Eigen::Vector2d>& rival) const {
-  Eigen::Matrix4d seen = options_.information_share * PoseInformation(registration.information);
-  const double cells =
-      cover.map == MapCover::kCoarse ? options_.coarse_sigma_cells : options_.map_sigma_cells;
-  const double place_m = std::hypot(options_.map_sigma_m, cells * cover.cell_m);
-  const Eigen::Vector4d map_sigmas(place_m, place_m, options_.map_sigma_m, options_.map_sigma_rad);
-  const Eigen::Matrix4d map = map_sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
-  seen -= (seen * (seen + map).inverse() * seen).eval();  // of the sum of both covariances
-  if (rival) {
-    Eigen::Vector4d towards = Eigen::Vector4d::Zero();
-    towards.head<2>() = rival->normalized();
-    const Eigen::Matrix4d beside = Eigen::Matrix4d::Identity() - towards * towards.transpose();
-    seen = (beside * seen * beside).eval();
-  }
-  return seen;
-}
-
-void Localizer::Remember(const LocalizationResult& result,
-                         const Eigen::Matrix4d& seen,
-                         bool is_found) {
-  const bool is_next = !is_first_ && lost_ == 0;
-  is_first_ = false;
-  if (result.health == LocalizationHealth::kGood) {
-    const double fit = result.registration.fit;
-    usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;
-  }
-  if (result.health == LocalizationHealth::kLost) {
-    motion_.SetTilt(result.T_world_sensor.linear());
-    if (++lost_ > options_.max_coasting) {
-      motion_.ForgetMotion();  // looked for where it got to
-    }
-    return;
-  }
-  if (!is_found ||
-      LogDensity(Prior(), result.registration.T_world_level) > options_.surprising_log_density) {
-    motion_.Correct(result.T_world_sensor, seen);
-  } else if (is_next) {
-    motion_.Turn(result.T_world_sensor, seen);
-  } else {
-    motion_.Relocate(result.T_world_sensor, seen);
-  }
-  lost_ = 0;
-}
-
-PosePrior Localizer::Prior() const {
-  return {LevelFrame(motion_.T_world_sensor()), motion_.covariance()};
-}
-
-Localizer::Place Localizer::At(const RegistrationResult& registration, bool has_prior) const {
-  const double prior = has_prior ? LogDensity(Prior(), registration.T_world_level) : 0.0;
-  return {registration, options_.evidence_share * registration.evidence + prior};
-}
-
-void Localizer::SpreadStarts(const PosePrior& prior) {
-  starts_.assign(1, prior.T_world_level);
-  const HorizontalSpread spread = SpreadOf(prior.covariance);
-  if (is_first_ || spread.along_m < options_.fan_sigma_m) {
-    return;
-  }
-  const double reach_m = 2.0 * std::min(spread.along_m, options_.adrift_sigma_m);
-  const int steps = static_cast<int>(reach_m / options_.fan_step_m);
-  for (int step = -steps; step <= steps; ++step) {
-    if (step == 0) {
-      continue;  // is the first of all
-    }
-    starts_.push_back(prior.T_world_level);
-    starts_.back().translation().head<2>() += step * options_.fan_step_m * spread.direction;
-  }
-}
-
-Localizer::Tracked Localizer::Track(const ScanFeatures& features) {
-  const PosePrior prior = Prior();
-  if (is_first_) {
-    return {
-        At(Register(map_.window(), features, prior.T_world_level, options_.registration), false),
-        std::nullopt};
-  }
-  const PosePrior among_features{prior.T_world_level,
-                                 options_.information_share * prior.covariance};
-  SpreadStarts(prior);
-  places_.clear();
-  for (const Pose& start : starts_) {
-    places_.push_back(
-        At(Register(map_.window(), features, start, among_features, options_.registration), true));
-  }
-  const auto best = std::max_element(places_.begin(), places_.end(), IsLessLikely);
-  return {*best, RivalOf(places_, *best)};
-}
-
-std::optional<Eigen::Vector2d> Localizer::RivalOf(const std::vector<Place>& places,
-                                                  const Place& best) const {
-  const Pose& pose = best.registration.T_world_level;
-  std::optional<Eigen::Vector2d> rival;
-  double likeliest = best.log_likelihood - options_.unique_log_ratio;
-  for (const Place& other : places) {
-    const Pose& elsewhere = other.registration.T_world_level;
-    if (other.log_likelihood > likeliest && AreApart(elsewhere, pose, options_.search)) {
-      likeliest = other.log_likelihood;
-      rival = (elsewhere.translation() - pose.translation()).head<2>();
-    }
-  }
-  return rival && rival->norm() > 0.0 ? rival : std::nullopt;
-}
-
-bool Localizer::IsDoubtful(const RegistrationResult& result) const {
-  return lost_ > 0 || result.fit < (is_first_ ? options_.good_fit : options_.min_fit) ||
-         result.fit < options_.doubtful_fit * usual_fit_ ||
-         result.column_fit < options_.doubtful_column_fit;
-}
-
-bool Localizer::IsAdrift() const {
-  return lost_ == 0 && SpreadOf(motion_.covariance()).along_m > options_.adrift_sigma_m;
-}
-
-double Localizer::AdriftReach() const {
-  constexpr double kStep_m = 20.0;  // the window is not made anew with every scan
-  if (!IsAdrift()) {
-    return 0.0;
-  }
-  const double reach_m = 2.0 * SpreadOf(motion_.covariance()).along_m;
-  return std::min(std::ceil(reach_m / kStep_m) * kStep_m, options_.max_adrift_m);
-}
-
-SearchReach Localizer::Reach() const {
-  if (IsAdrift()) {
-    const HorizontalSpread spread = SpreadOf(motion_.covariance());
-    return {std::min(2.0 * spread.along_m, options_.max_adrift_m),
-            std::min(2.0 * spread.beside_m, options_.max_adrift_beside_m), options_.adrift_yaw_rad,
-            std::atan2(spread.direction.y(), spread.direction.x())};
-  }
-  const auto widened = [&](double least, double most) {
-    return std::min((1 + lost_) * least, most);
-  };
-  const SearchReach& least = options_.search_reach;
-  const SearchReach& most = options_.max_search_reach;
-  return {widened(least.along_m, most.along_m), widened(least.beside_m, most.beside_m),
-          widened(least.yaw_rad, most.yaw_rad)};
-}
-
-std::optional<RegistrationResult> Localizer::Search(const ScanFeatures& features,
-                                                    const RegistrationResult& tracked) {
-  PoseSearchOptions search = options_.search;
-  if (IsAdrift()) {
-    search.max_columns = options_.adrift_columns;
-    search.candidates = options_.adrift_candidates;
-  }
-  const bool is_as_expected = !IsDoubtful(tracked);  // else the prior may be wrong, too
-  std::vector<Place> places{At(tracked, is_as_expected)};
-  for (const Pose& start : SearchPoses(map_.coarse(), map_.window().origin(), features,
-                                       Prior().T_world_level, Reach(), search)) {
-    places.push_back(
-        At(Register(map_.window(), features, start, options_.registration), is_as_expected));
-  }
-  const auto best = std::max_element(places.begin() + 1, places.end(), IsLessLikely);
-  if (best == places.end() || !StandsOut(places, *best)) {
-    return std::nullopt;
-  }
-  return best->registration;
-}
-
-Result<std::optional<RegistrationResult>> Localizer::Relocalize(
-    const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor, LocalizationHealth health) {
-  const bool is_astray = health == LocalizationHealth::kLost || !confirmation_.is_confirmed() ||
-                         SpreadOf(motion_.covariance()).along_m > options_.relocalized_sigma_m;
-  astray_ = is_astray ? astray_ + 1 : 0;
-  if (!relocalizer_ || astray_ == 0 || astray_ % options_.relocalized_after != 0) {
-    return std::optional<RegistrationResult>();
-  }
+Result<std::vector<Localizer::SupposedPlace>> Localizer::Look(
+    const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor) const {
+  std::vector<SupposedPlace> places;
   const auto relocalizer = relocalizer_();
   if (!relocalizer) return Error(relocalizer.error());
   if (*relocalizer == nullptr) {
-    return std::optional<RegistrationResult>();
+    return places;
   }
-  const auto found = (*relocalizer)->Find(scan, R_level_sensor);
-  if (!found) return Error(found.error());
-  if (!found->T_world_sensor) {
-    return std::optional<RegistrationResult>();
+  const auto looked = (*relocalizer)->Find(scan, R_level_sensor);
+  if (!looked) return Error(looked.error());
+  const double usual_fit = places_.front().tracker.usual_fit();
+  for (const RelocalizedPlace& place : looked->places) {
+    const double best = looked->places.front().score;
+    if (places.size() == options_.most_places ||
+        place.score < std::max(options_.min_found_score, best - options_.max_behind)) {
+      break;
+    }
+    Pose T_world_sensor = place.registration.T_world_level;
+    T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
+    if (IsFollowed(T_world_sensor)) {
+      continue;
+    }
+    places.emplace_back(NewTracker());
+    places.back().tracker.Suppose(T_world_sensor, usual_fit);
   }
-  astray_ = 0;
-  return std::optional(found->places.front().registration);
+  return places;
 }
 
-// The first of `places` is where the vehicle was tracked to.
-bool Localizer::StandsOut(const std::vector<Place>& places, const Place& best) const {
-  const bool is_likelier =
-      best.log_likelihood > places.front().log_likelihood + options_.believed_log_ratio;
-  return is_likelier && std::none_of(places.begin() + 1, places.end(), [&](const Place& other) {
-           return other.log_likelihood > best.log_likelihood - options_.unique_log_ratio &&
-                  AreApart(other.registration.T_world_level, best.registration.T_world_level,
-                           options_.search);
-         });
+bool Localizer::IsFollowed(const Pose& T_world_sensor) const {
+  return std::any_of(places_.begin(), places_.end(), [&](const SupposedPlace& place) {
+    return place.lost == 0 && !AreApart(place.tracker.T_world_expected(), T_world_sensor,
+                                        options_.same_m, options_.same_rad);
+  });
+}
+
+void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor) {
+  if (places_.size() == 1) {
+    places_.front().scores.clear();
+  }
+  for (SupposedPlace& place : places_) {
+    place.result = place.tracker.Track(features, R_level_sensor);
+    if (places_.size() > 1) Note(PlaceScore(place.result.registration, features), place.scores);
+    place.lost = place.result.health == LocalizationHealth::kLost ? place.lost + 1 : 0;
+  }
+  Join();
+  GiveUp();
+  Choose();
+  const SupposedPlace& told = places_.front();
+  const bool is_astray = places_.size() > 1 || told.lost > 0 || !told.tracker.is_confirmed() ||
+                         told.tracker.spread_m() > options_.adrift_m;
+  astray_ = is_astray ? astray_ + 1 : 0;
+}
+
+void Localizer::Note(double score, std::vector<double>& scores) const {
+  if (scores.size() == options_.most_scores) scores.erase(scores.begin());
+  scores.push_back(score);
+}
+
+void Localizer::Join() {
+  for (std::size_t i = 1; i < places_.size();) {
+    const auto same = std::find_if(
+        places_.begin(), places_.begin() + static_cast<std::ptrdiff_t>(i),
+        [&](const SupposedPlace& other) {
+          return other.lost == 0 && places_[i].lost == 0 &&
+                 !AreApart(other.result.T_world_sensor, places_[i].result.T_world_sensor,
+                           options_.tracker.search.apart_m, options_.tracker.search.apart_rad);
+        });
+    if (same == places_.begin() + static_cast<std::ptrdiff_t>(i)) {
+      ++i;
+      continue;
+    }
+    if (LeadOver(places_[i], *same).sum > 0.0) std::swap(*same, places_[i]);
+    places_.erase(places_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+void Localizer::GiveUp() {
+  for (std::size_t i = places_.size() - 1; i > 0; --i) {
+    if (IsGivenUp(places_[i])) places_.erase(places_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  while (places_.size() > options_.most_places) {
+    places_.erase(std::min_element(places_.begin() + 1, places_.end(),
+                                   [](const SupposedPlace& a, const SupposedPlace& b) {
+                                     return a.scores.back() < b.scores.back();
+                                   }));
+  }
+}
+
+bool Localizer::IsGivenUp(const SupposedPlace& place) const {
+  if (place.lost > options_.most_lost) {
+    return true;
+  }
+  return std::any_of(places_.begin(), places_.end(), [&](const SupposedPlace& other) {
+    const Lead lead = LeadOver(other, place);
+    return lead.scans >= options_.lead.scans && lead.sum > options_.max_behind * lead.scans;
+  });
+}
+
+Localizer::Lead Localizer::LeadOver(const SupposedPlace& place, const SupposedPlace& other) {
+  const auto both = static_cast<std::ptrdiff_t>(std::min(place.scores.size(), other.scores.size()));
+  const double sum = std::accumulate(place.scores.end() - both, place.scores.end(), 0.0) -
+                     std::accumulate(other.scores.end() - both, other.scores.end(), 0.0);
+  return {sum, static_cast<int>(both)};
+}
+
+// Where it was tracked to is one of all places only while there are others.
+bool Localizer::IsBelieved(const SupposedPlace& place) const {
+  const double sum = std::accumulate(place.scores.begin(), place.scores.end(), 0.0);
+  return place.lost == 0 && place.tracker.is_confirmed() && IsAhead(place) &&
+         sum >= options_.min_score * static_cast<double>(place.scores.size());
+}
+
+bool Localizer::IsAhead(const SupposedPlace& place) const {
+  return std::all_of(places_.begin(), places_.end(), [&](const SupposedPlace& other) {
+    if (&other == &place) {
+      return true;
+    }
+    const Lead lead = LeadOver(place, other);
+    return options_.lead.IsClear(lead.sum, lead.scans);
+  });
+}
+
+void Localizer::Choose() {
+  if (places_.size() == 1) {
+    return;
+  }
+  const auto believed = std::find_if(places_.begin(), places_.end(),
+                                     [&](const SupposedPlace& place) { return IsBelieved(place); });
+  if (believed == places_.end()) {
+    LocalizationResult& told = places_.front().result;
+    told = places_.front().tracker.Doubted(told);
+    return;
+  }
+  std::swap(*believed, places_.front());
+  places_.erase(places_.begin() + 1, places_.end());
 }
 
 }  // namespace atlas

@@ -15,6 +15,11 @@ Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to) {
   return difference;
 }
 
+bool AreApart(const Pose& a, const Pose& b, double apart_m, double apart_rad) {
+  const Eigen::AngleAxisd turned(a.linear().transpose() * b.linear());
+  return (a.translation() - b.translation()).norm() > apart_m || turned.angle() > apart_rad;
+}
+
 double LogDensity(const PosePrior& prior, const Pose& pose) {
   const Eigen::Vector4d offset = PoseDifference(prior.T_world_level, pose);
   return -0.5 * offset.dot(prior.covariance.ldlt().solve(offset));

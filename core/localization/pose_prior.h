@@ -18,6 +18,9 @@ struct PosePrior {
 // (x, y, z, yaw) that take `from` to `to`.
 Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to);
 
+// Whether they are further from each other than this in place, or turned by more.
+bool AreApart(const Pose& a, const Pose& b, double apart_m, double apart_rad);
+
 // Log of the prior's density at `pose`, up to its constant.
 double LogDensity(const PosePrior& prior, const Pose& pose);
 

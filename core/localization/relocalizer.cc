@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/localization/place_score.h"
+#include "core/localization/pose_prior.h"
+
 namespace atlas {
 namespace {
 
@@ -107,14 +110,14 @@ Result<Relocalization> Relocalizer::Find(const LeveledScan& scan,
   }
   const std::vector<PlaceCandidate> candidates = places_->Find(
       ProfileOf(scan, *ground_z_m), prior, options_.candidates, options_.candidates_apart_m);
-  auto places = Refine(features, Check(features, candidates, -*ground_z_m), -*ground_z_m);
+  auto places = Refine(features, Check(features, candidates, -*ground_z_m));
   if (!places) return Error(places.error());
   result.places = *std::move(places);
   if (result.places.empty()) {
     return result;
   }
-  const double next = result.places.size() > 1 ? std::max(0.0, result.places[1].explained) : 0.0;
-  result.margin = result.places[0].explained - next;
+  const double next = result.places.size() > 1 ? result.places[1].score : 0.0;
+  result.margin = result.places[0].score - next;
   if (IsBelieved(result)) {
     result.T_world_sensor = result.places[0].registration.T_world_level;
     result.T_world_sensor->linear() *= R_level_sensor.toRotationMatrix();
@@ -127,25 +130,30 @@ std::vector<Relocalizer::Start> Relocalizer::Check(const ScanFeatures& features,
                                                    const std::vector<PlaceCandidate>& candidates,
                                                    double sensor_height_m) const {
   constexpr double kStep_m = 0.8;
-  Correlation correlation(places_->blocks(), Chosen(features.columns, options_.checked_columns));
   std::vector<Start> starts;
+  Correlation rough(places_->blocks(), Chosen(features.columns, options_.checked_columns / 2));
   for (const PlaceCandidate& candidate : candidates) {
     Pose pose = Pose::Identity();
     pose.linear() =
         Eigen::AngleAxisd(candidate.yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     pose.translation() = candidate.ground + Eigen::Vector3d(0.0, 0.0, sensor_height_m);
-    const auto near =
-        correlation.Search(pose, Correlation::Width::kNear, 2, kStep_m, 3, 2.0 * kDegree);
-    const auto exact = correlation.Search(near.T_world_level, Correlation::Width::kExact, 2,
-                                          0.5 * kStep_m, 2, 1.0 * kDegree);
-    starts.push_back({exact.T_world_level, exact.score});
+    const auto near = rough.Search(pose, Correlation::Width::kNear, 2, kStep_m, 3, 2.0 * kDegree);
+    starts.push_back({near.T_world_level, near.score});
   }
-  std::stable_sort(starts.begin(), starts.end(),
-                   [](const Start& a, const Start& b) { return a.score > b.score; });
+  std::stable_sort(starts.begin(), starts.end(), HasMore);
+  starts.resize(std::min(starts.size(), options_.checked_closely));
+  Correlation close(places_->blocks(), Chosen(features.columns, options_.checked_columns));
+  for (Start& start : starts) {
+    const auto exact = close.Search(start.T_world_level, Correlation::Width::kExact, 2,
+                                    0.5 * kStep_m, 2, 1.0 * kDegree);
+    start = {exact.T_world_level, exact.score};
+  }
+  std::stable_sort(starts.begin(), starts.end(), HasMore);
   std::vector<Start> apart;
   for (const Start& start : starts) {
     const bool is_near = std::any_of(apart.begin(), apart.end(), [&](const Start& other) {
-      return !AreApart(start.T_world_level, other.T_world_level);
+      return !AreApart(start.T_world_level, other.T_world_level, options_.refined_apart_m,
+                       options_.refined_apart_rad);
     });
     if (!is_near && apart.size() < options_.refined) apart.push_back(start);
   }
@@ -154,8 +162,7 @@ std::vector<Relocalizer::Start> Relocalizer::Check(const ScanFeatures& features,
 
 // One map window serves all decks of a place, and all of them are tried: they look alike.
 Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& features,
-                                                          const std::vector<Start>& starts,
-                                                          double sensor_height_m) const {
+                                                          const std::vector<Start>& starts) const {
   const auto radius_m = static_cast<double>(options_.features.max_range_m) + 3.0;
   std::vector<RelocalizedPlace> places;
   MapWindow window(profile_, options_.window);
@@ -164,16 +171,17 @@ Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& fe
     const auto tiles = tiles_(center, radius_m);
     if (!tiles) return Error(tiles.error());
     window.Renew(*tiles, center, radius_m);
-    Add(Placed(window, features, start.T_world_level), places);
-    for (const double ground_m :
-         places_->OtherDecks(center.head<2>(), center.z() - sensor_height_m)) {
-      Pose pose = start.T_world_level;
-      pose.translation().z() = ground_m + sensor_height_m;
+    RelocalizedPlace place = Placed(window, features, start.T_world_level);
+    const Pose T_world_level = place.registration.T_world_level;
+    Add(std::move(place), places);
+    for (const double up_m : OtherDecks(window, features, T_world_level, options_.decks)) {
+      Pose pose = T_world_level;
+      pose.translation().z() += up_m;
       Add(Placed(window, features, pose), places);
     }
   }
   std::stable_sort(places.begin(), places.end(),
-                   [](const auto& a, const auto& b) { return a.explained > b.explained; });
+                   [](const auto& a, const auto& b) { return a.score > b.score; });
   return places;
 }
 
@@ -182,15 +190,17 @@ RelocalizedPlace Relocalizer::Placed(const MapWindow& window,
                                      const Pose& start) const {
   RelocalizedPlace place;
   place.registration = Register(window, features, start, options_.registration);
-  place.explained = place.registration.evidence / static_cast<double>(features.columns.size());
+  place.explained = ExplainedShare(place.registration, features);
+  place.score = PlaceScore(place.registration, features);
   return place;
 }
 
 // Of two that came to the same place the likelier one stays.
 void Relocalizer::Add(RelocalizedPlace place, std::vector<RelocalizedPlace>& places) const {
   for (RelocalizedPlace& other : places) {
-    if (!AreApart(place.registration.T_world_level, other.registration.T_world_level)) {
-      if (place.explained > other.explained) other = std::move(place);
+    if (!AreApart(place.registration.T_world_level, other.registration.T_world_level,
+                  options_.refined_apart_m, options_.refined_apart_rad)) {
+      if (place.score > other.score) other = std::move(place);
       return;
     }
   }
@@ -203,12 +213,6 @@ bool Relocalizer::IsBelieved(const Relocalization& found) const {
          WorstSigma(best.registration) <= options_.max_sigma_m &&
          best.registration.column_inliers >= options_.min_columns &&
          best.explained >= options_.min_explained && found.margin >= options_.min_margin;
-}
-
-bool Relocalizer::AreApart(const Pose& a, const Pose& b) const {
-  const Eigen::AngleAxisd turned(a.linear().transpose() * b.linear());
-  return (a.translation() - b.translation()).norm() > options_.refined_apart_m ||
-         turned.angle() > options_.refined_apart_rad;
 }
 
 }  // namespace atlas

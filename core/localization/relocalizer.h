@@ -11,6 +11,7 @@
 
 #include "core/base/status.h"
 #include "core/localization/local_map.h"
+#include "core/localization/other_decks.h"
 #include "core/localization/places/place_index.h"
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
@@ -22,35 +23,38 @@ struct RelocalizerOptions {
   FeatureOptions features;
   PlaceOptions window;
   RegistrationOptions registration;
+  DeckOptions decks{.reach_m = 30.0, .most = 8};
 
-  std::size_t candidates = 80;  // places that are checked ...
+  std::size_t candidates = 300;  // places that are checked ...
   double candidates_apart_m = 1.5;
-  std::size_t checked_columns = 160;  // ... by so many of the scan's columns ...
+  std::size_t checked_columns = 160;  // ... by half of so many of the scan's columns; by all ...
+  std::size_t checked_closely = 100;  // ... of which the best so many are checked ...
   std::size_t refined = 5;            // ... and of which the best so many are registered
   double refined_apart_m = 1.0;
   double refined_apart_rad = 0.1;
 
   // A place is believed when it fits this well, when this share of the scan's columns stands on
   // structure there and so much of it is explained, when what is seen holds the vehicle in all
-  // directions this well, and when any other place explains this much less.
+  // directions this well, and when any other place scores this much less.
   double min_fit = 0.6;
   double min_columns = 0.3;
   double min_explained = 0.15;
   double max_sigma_m = 0.015;  // of the worst horizontal direction
-  double min_margin = 0.04;
+  double min_margin = 0.08;
 };
 
 // A place that was registered.
 struct RelocalizedPlace {
   RegistrationResult registration;
-  double explained = 0.0;  // share of the scan's columns that the map explains, less contradictions
+  double explained = 0.0;  // ExplainedShare
+  double score = 0.0;      // PlaceScore
 };
 
 struct Relocalization {
   // None: don't know.
   std::optional<Pose> T_world_sensor;
-  std::vector<RelocalizedPlace> places;  // that were registered, the likeliest first
-  double margin = 0.0;                   // of the first over the next, in what they explain
+  std::vector<RelocalizedPlace> places;  // that were registered, the one that scores most first
+  double margin = 0.0;                   // of the first over the next
 };
 
 class Relocalizer {
@@ -71,19 +75,18 @@ class Relocalizer {
     Pose T_world_level;
     int score = 0;
   };
+  static bool HasMore(const Start& a, const Start& b) { return a.score > b.score; }
 
   std::vector<Start> Check(const ScanFeatures& features,
                            const std::vector<PlaceCandidate>& candidates,
                            double sensor_height_m) const;
   Result<std::vector<RelocalizedPlace>> Refine(const ScanFeatures& features,
-                                               const std::vector<Start>& starts,
-                                               double sensor_height_m) const;
+                                               const std::vector<Start>& starts) const;
   RelocalizedPlace Placed(const MapWindow& window,
                           const ScanFeatures& features,
                           const Pose& start) const;
   void Add(RelocalizedPlace place, std::vector<RelocalizedPlace>& places) const;
   bool IsBelieved(const Relocalization& found) const;
-  bool AreApart(const Pose& a, const Pose& b) const;
 
   MapProfile profile_;
   std::shared_ptr<const PlaceIndex> places_;

@@ -89,29 +89,6 @@ std::size_t PlaceIndex::memory_bytes() const {
   return blocks_.memory_bytes() + places_.capacity() * sizeof(Place);
 }
 
-std::vector<double> PlaceIndex::OtherDecks(const Eigen::Vector2d& p, double ground_m) const {
-  const double side_m = static_cast<double>(place_cells_) * profile_.cell_size_m();
-  const auto square_x = static_cast<std::int64_t>(std::floor(p.x() / side_m));
-  const auto square_y = static_cast<std::int64_t>(std::floor(p.y() / side_m));
-  std::vector<double> decks;
-  for (std::int64_t j = -1; j <= 1; ++j) {
-    for (std::int64_t i = -1; i <= 1; ++i) {
-      const auto found = in_square_.find(SquareKey(square_x + i, square_y + j));
-      if (found == in_square_.end()) continue;
-      for (const std::size_t place : found->second) {
-        const double z_m = places_[place].ground.z();
-        const bool is_known = std::abs(z_m - ground_m) < options_.deck_m ||
-                              std::any_of(decks.begin(), decks.end(), [&](double other_m) {
-                                return std::abs(z_m - other_m) < options_.deck_m;
-                              });
-        if (!is_known) decks.push_back(z_m);
-      }
-    }
-  }
-  std::sort(decks.begin(), decks.end());
-  return decks;
-}
-
 std::vector<PlaceCandidate> PlaceIndex::Find(const RangeProfile& scan,
                                              const std::optional<PlacePrior>& prior,
                                              std::size_t count,

@@ -49,9 +49,6 @@ class PlaceIndex {
   std::size_t places() const { return places_.size(); }
   std::size_t memory_bytes() const;
 
-  // Heights of the ground of places above or below (x, y), but for the one at `ground_m`.
-  std::vector<double> OtherDecks(const Eigen::Vector2d& p, double ground_m) const;
-
   // The `count` places and headings that look most like `scan`, the best first, no two of them
   // within `apart_m` and 20 degrees of each other. Requires Finish.
   std::vector<PlaceCandidate> Find(const RangeProfile& scan,

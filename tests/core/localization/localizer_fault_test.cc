@@ -113,7 +113,7 @@ TEST_F(LocalizerFaultTest, AWrongMapIsNotBelieved) {
 
 TEST_F(LocalizerFaultTest, OnAWrongMapItDoesNotSpin) {
   LocalizerOptions options = QuickOptions();
-  options.map.margin_m = 0.0;  // asks for tiles with every scan
+  options.tracker.map.margin_m = 0.0;  // asks for tiles with every scan
   localizer_ = Localizer(StreetMap().profile(), source_.Function(), options);
   localizer_.Start(OnStreet(-10.0));
   for (int i = 0; i < 4; ++i) {

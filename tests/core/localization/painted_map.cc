@@ -189,6 +189,13 @@ MapWindow PaintedMap::Window(const Eigen::Vector3d& center, double radius_m) con
   return testing::Window(profile_, Tiles(), center, radius_m);
 }
 
+std::shared_ptr<const PlaceIndex> PlacesOf(const PaintedMap& map) {
+  auto places = std::make_shared<PlaceIndex>(map.profile());
+  for (const auto& tile : map.Tiles()) places->Add(*tile);
+  places->Finish();
+  return places;
+}
+
 TileLayer GroundLayer(double altitude_m) {
   TileLayer layer;
   layer.altitude_mm = static_cast<std::int32_t>(std::lround(1000.0 * altitude_m));
@@ -261,7 +268,7 @@ SyntheticSensor QuickSensor() {
 LocalizerOptions QuickOptions() {
   LocalizerOptions options;
   options.features.max_range_m = 25.0F;
-  options.map.margin_m = 10.0;
+  options.tracker.map.margin_m = 10.0;
   return options;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/localization/localizer.h"
+#include "core/localization/places/place_index.h"
 #include "core/tile/tile.h"
 #include "tests/core/support/shape_world.h"
 
@@ -42,6 +43,9 @@ MapWindow Window(const MapProfile& profile,
                  MapWindow::Tiles tiles,
                  const Eigen::Vector3d& center,
                  double radius_m);
+
+// The finished index of its places.
+std::shared_ptr<const PlaceIndex> PlacesOf(const PaintedMap& map);
 
 // Free ground that was measured.
 TileLayer GroundLayer(double altitude_m);

@@ -19,19 +19,13 @@ using testing::ErrorOf;
 using testing::GarageMap;
 using testing::kDegree;
 using testing::PaintedMap;
+using testing::PlacesOf;
 using testing::PoseError;
 using testing::ShapeWorld;
 using testing::StreetMap;
 using testing::UprightPose;
 
 const Eigen::Quaterniond kLevel = Eigen::Quaterniond::Identity();
-
-std::shared_ptr<const PlaceIndex> PlacesOf(const PaintedMap& map) {
-  auto places = std::make_shared<PlaceIndex>(map.profile());
-  for (const auto& tile : map.Tiles()) places->Add(*tile);
-  places->Finish();
-  return places;
-}
 
 Relocalizer RelocalizerIn(const PaintedMap& map) {
   RelocalizerOptions options;
@@ -158,9 +152,6 @@ TEST(RelocalizerTest, ErrorsOfTheTilesAreItsOwn) {
 
 TEST(PlaceIndexTest, PlacesStandOnEachDeckAndLookLikeWhatIsSeenThere) {
   const auto places = PlacesOf(GarageMap());
-  EXPECT_EQ(places->OtherDecks({0.5, 2.0}, 0.0), std::vector<double>{3.0});
-  EXPECT_EQ(places->OtherDecks({0.5, 2.0}, 3.0), std::vector<double>{0.0});
-  EXPECT_TRUE(places->OtherDecks({500.0, 2.0}, 0.0).empty());
   const auto street = PlacesOf(StreetMap());
   for (const double yaw_rad : {0.0, 1.3}) {
     const Pose truth = UprightPose({3.0, 0.5, 1.83}, yaw_rad);

@@ -1,0 +1,37 @@
+// What a localizer says of a scan.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "core/geometry/pose.h"
+#include "core/localization/pose_prior.h"
+#include "core/localization/registration.h"
+
+namespace atlas {
+
+enum class LocalizationHealth : std::uint8_t {
+  kGood,
+  kWeak,  // one horizontal direction is not held by anything seen, or in two places; or it was
+          // lost, and nothing has confirmed yet that this is the place
+  kLost,  // the scan does not fit the map here: the pose is the predicted one
+};
+std::string_view LocalizationHealthName(LocalizationHealth health);
+
+// What the map has of the ground that a scan saw.
+enum class MapCover : std::uint8_t {
+  kNone,    // (nearly) nothing: it was never mapped, or its tiles have not arrived
+  kCoarse,  // most of it from tiles above level 0: the finer ones have not arrived
+  kFine,
+};
+std::string_view MapCoverName(MapCover cover);
+
+struct LocalizationResult {
+  Pose T_world_sensor = Pose::Identity();
+  LocalizationHealth health = LocalizationHealth::kLost;
+  MapCover cover = MapCover::kNone;                    // anything but fine is never good
+  PoseCovariance covariance = PoseCovariance::Zero();  // of the pose, all that is known considered
+  RegistrationResult registration;
+};
+
+}  // namespace atlas

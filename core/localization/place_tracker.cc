@@ -1,0 +1,311 @@
+#include "core/localization/place_tracker.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace atlas {
+namespace {
+
+// T_world_sensor without its tilt but with `R_level_sensor`'s: what the IMU says about the vertical
+// replaces what was predicted.
+Pose LevelFrame(const Pose& T_world_sensor) {
+  Pose level = Pose::Identity();
+  const double yaw_rad = SplitYaw(Eigen::Quaterniond(T_world_sensor.linear())).yaw_rad;
+  level.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  level.translation() = T_world_sensor.translation();
+  return level;
+}
+
+Eigen::Matrix4d PoseInformation(const Eigen::Matrix<double, 6, 6>& information) {
+  constexpr std::array<int, 4> kAxes{0, 1, 2, 5};
+  return information(kAxes, kAxes);
+}
+
+}  // namespace
+
+PlaceTracker::PlaceTracker(const MapProfile& profile,
+                           TilesAround tiles,
+                           const PlaceTrackerOptions& options,
+                           double max_range_m)
+    : options_(options),
+      max_range_m_(max_range_m),
+      cell_size_m_(profile.cell_size_m()),
+      map_(profile, std::move(tiles), options.map),
+      motion_(options.motion),
+      confirmation_(options.confirmation, options.registration) {}
+
+void PlaceTracker::Start(const Pose& T_world_sensor) {
+  motion_.Start(T_world_sensor);
+  confirmation_.Trust();
+  is_first_ = true;
+  usual_fit_ = 0.0;
+  lost_ = 0;
+  unheld_ = 0;
+  without_map_ = 0;
+}
+
+void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
+  Start(T_world_sensor);
+  confirmation_.Doubt();
+  usual_fit_ = usual_fit;
+}
+
+MotionModel PlaceTracker::Next() const {
+  MotionModel next = motion_;
+  if (!is_first_) next.Predict();
+  return next;
+}
+
+Status PlaceTracker::Prepare() {
+  const MotionModel next = Next();
+  return map_.Renew(next.T_world_sensor().translation(),
+                    max_range_m_ + AdriftReach(next.covariance()));
+}
+
+LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
+                                       const Eigen::Quaterniond& R_level_sensor) {
+  if (!is_first_) {
+    motion_.Predict();
+  }
+  LocalizationResult result;
+  Tracked tracked = Follow(features);
+  result.registration = std::move(tracked.place.registration);
+  bool is_found = false;
+  if (IsDoubtful(result.registration) || IsAdrift()) {
+    if (auto found = Search(features, result.registration)) {
+      result.registration = *std::move(found);
+      tracked.rival.reset();
+      is_found = true;
+    }
+  }
+  const Surprise surprise = SurpriseOf(result.registration, features, is_found);
+  result.health = Judge(result.registration, features, surprise);
+  Confirm(features, surprise, result);
+  unheld_ = IsHeld(result.registration, features) ? 0 : unheld_ + 1;
+  result.T_world_sensor = result.health == LocalizationHealth::kLost
+                              ? Prior().T_world_level
+                              : result.registration.T_world_level;
+  result.T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
+  const Cover cover = CoverAt(features, result.registration.T_world_level);
+  result.cover = cover.map;
+  NoteCover(cover.map);
+  if (result.health == LocalizationHealth::kGood &&
+      (tracked.rival || cover.map != MapCover::kFine)) {
+    result.health = LocalizationHealth::kWeak;
+  }
+  Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
+  result.covariance = Covariance(result);
+  return result;
+}
+
+// Tiles that are on their way come to a vehicle that stands, too.
+void PlaceTracker::NoteCover(MapCover cover) {
+  without_map_ = cover == MapCover::kFine ? 0 : without_map_ + 1;
+  if (without_map_ == options_.asked_again_after) {
+    without_map_ = 0;
+    map_.Expire();
+  }
+}
+
+PlaceTracker::Cover PlaceTracker::CoverAt(const ScanFeatures& features,
+                                          const Pose& T_world_level) const {
+  constexpr std::size_t kStride = 4;
+  constexpr double kMapped = 0.05;  // of the ground: less is the edge of a map elsewhere
+  const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
+  const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
+  int looked_at = 0;
+  int mapped = 0;
+  int fine = 0;
+  double cells_m = 0.0;
+  for (std::size_t i = 0; i < features.ground.size(); i += kStride) {
+    const std::optional<int> level = map_.window().LevelAt(R * features.ground[i] + t);
+    ++looked_at;
+    mapped += level ? 1 : 0;
+    fine += level == 0 ? 1 : 0;
+    cells_m += level ? cell_size_m_ * (1 << *level) : 0.0;
+  }
+  if (mapped == 0 || mapped < kMapped * looked_at) {
+    return {MapCover::kNone, cell_size_m_};
+  }
+  return {2 * fine >= mapped ? MapCover::kFine : MapCover::kCoarse, cells_m / mapped};
+}
+
+// What the scan says about (x, y, z, yaw); between two places it does not know which.
+Eigen::Matrix4d PlaceTracker::Seen(const RegistrationResult& registration,
+                                   const Cover& cover,
+                                   const std::optional<Eigen::Vector2d>& rival) const {
+  Eigen::Matrix4d seen = options_.information_share * PoseInformation(registration.information);
+  const double cells =
+      cover.map == MapCover::kCoarse ? options_.coarse_sigma_cells : options_.map_sigma_cells;
+  const double place_m = std::hypot(options_.map_sigma_m, cells * cover.cell_m);
+  const Eigen::Vector4d map_sigmas(place_m, place_m, options_.map_sigma_m, options_.map_sigma_rad);
+  const Eigen::Matrix4d map = map_sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+  seen -= (seen * (seen + map).inverse() * seen).eval();  // of the sum of both covariances
+  if (rival) {
+    Eigen::Vector4d towards = Eigen::Vector4d::Zero();
+    towards.head<2>() = rival->normalized();
+    const Eigen::Matrix4d beside = Eigen::Matrix4d::Identity() - towards * towards.transpose();
+    seen = (beside * seen * beside).eval();
+  }
+  return seen;
+}
+
+void PlaceTracker::Remember(const LocalizationResult& result,
+                            const Eigen::Matrix4d& seen,
+                            bool is_found) {
+  const bool is_next = !is_first_ && lost_ == 0;
+  is_first_ = false;
+  if (result.health == LocalizationHealth::kGood) {
+    const double fit = result.registration.fit;
+    usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;
+  }
+  if (result.health == LocalizationHealth::kLost) {
+    motion_.SetTilt(result.T_world_sensor.linear());
+    if (++lost_ > options_.max_coasting) {
+      motion_.ForgetMotion();  // looked for where it got to
+    }
+    return;
+  }
+  if (!is_found ||
+      LogDensity(Prior(), result.registration.T_world_level) > options_.surprising_log_density) {
+    motion_.Correct(result.T_world_sensor, seen);
+  } else if (is_next) {
+    motion_.Turn(result.T_world_sensor, seen);
+  } else {
+    motion_.Relocate(result.T_world_sensor, seen);
+  }
+  lost_ = 0;
+}
+
+PosePrior PlaceTracker::Prior() const {
+  return {LevelFrame(motion_.T_world_sensor()), motion_.covariance()};
+}
+
+PlaceTracker::Place PlaceTracker::At(const RegistrationResult& registration, bool has_prior) const {
+  const double prior = has_prior ? LogDensity(Prior(), registration.T_world_level) : 0.0;
+  return {registration, options_.evidence_share * registration.evidence + prior};
+}
+
+void PlaceTracker::SpreadStarts(const PosePrior& prior) {
+  starts_.assign(1, prior.T_world_level);
+  const HorizontalSpread spread = SpreadOf(prior.covariance);
+  if (is_first_ || spread.along_m < options_.fan_sigma_m) {
+    return;
+  }
+  const double reach_m = 2.0 * std::min(spread.along_m, options_.adrift_sigma_m);
+  const int steps = static_cast<int>(reach_m / options_.fan_step_m);
+  for (int step = -steps; step <= steps; ++step) {
+    if (step == 0) {
+      continue;  // is the first of all
+    }
+    starts_.push_back(prior.T_world_level);
+    starts_.back().translation().head<2>() += step * options_.fan_step_m * spread.direction;
+  }
+}
+
+PlaceTracker::Tracked PlaceTracker::Follow(const ScanFeatures& features) {
+  const PosePrior prior = Prior();
+  if (is_first_) {
+    return {
+        At(Register(map_.window(), features, prior.T_world_level, options_.registration), false),
+        std::nullopt};
+  }
+  const PosePrior among_features{prior.T_world_level,
+                                 options_.information_share * prior.covariance};
+  SpreadStarts(prior);
+  places_.clear();
+  for (const Pose& start : starts_) {
+    places_.push_back(
+        At(Register(map_.window(), features, start, among_features, options_.registration), true));
+  }
+  const auto best = std::max_element(places_.begin(), places_.end(), IsLessLikely);
+  return {*best, RivalOf(places_, *best)};
+}
+
+std::optional<Eigen::Vector2d> PlaceTracker::RivalOf(const std::vector<Place>& places,
+                                                     const Place& best) const {
+  const Pose& pose = best.registration.T_world_level;
+  std::optional<Eigen::Vector2d> rival;
+  double likeliest = best.log_likelihood - options_.unique_log_ratio;
+  for (const Place& other : places) {
+    const Pose& elsewhere = other.registration.T_world_level;
+    if (other.log_likelihood > likeliest &&
+        AreApart(elsewhere, pose, options_.search.apart_m, options_.search.apart_rad)) {
+      likeliest = other.log_likelihood;
+      rival = (elsewhere.translation() - pose.translation()).head<2>();
+    }
+  }
+  return rival && rival->norm() > 0.0 ? rival : std::nullopt;
+}
+
+bool PlaceTracker::IsDoubtful(const RegistrationResult& result) const {
+  return lost_ > 0 || result.fit < (is_first_ ? options_.good_fit : options_.min_fit) ||
+         result.fit < options_.doubtful_fit * usual_fit_ ||
+         result.column_fit < options_.doubtful_column_fit;
+}
+
+bool PlaceTracker::IsAdrift() const {
+  return lost_ == 0 && SpreadOf(motion_.covariance()).along_m > options_.adrift_sigma_m;
+}
+
+double PlaceTracker::AdriftReach(const PoseCovariance& covariance) const {
+  constexpr double kStep_m = 20.0;  // the window is not made anew with every scan
+  const double along_m = SpreadOf(covariance).along_m;
+  if (lost_ > 0 || along_m <= options_.adrift_sigma_m) {
+    return 0.0;
+  }
+  const double reach_m = 2.0 * along_m;
+  return std::min(std::ceil(reach_m / kStep_m) * kStep_m, options_.max_adrift_m);
+}
+
+SearchReach PlaceTracker::Reach() const {
+  if (IsAdrift()) {
+    const HorizontalSpread spread = SpreadOf(motion_.covariance());
+    return {std::min(2.0 * spread.along_m, options_.max_adrift_m),
+            std::min(2.0 * spread.beside_m, options_.max_adrift_beside_m), options_.adrift_yaw_rad,
+            std::atan2(spread.direction.y(), spread.direction.x())};
+  }
+  const auto widened = [&](double least, double most) {
+    return std::min((1 + lost_) * least, most);
+  };
+  const SearchReach& least = options_.search_reach;
+  const SearchReach& most = options_.max_search_reach;
+  return {widened(least.along_m, most.along_m), widened(least.beside_m, most.beside_m),
+          widened(least.yaw_rad, most.yaw_rad)};
+}
+
+std::optional<RegistrationResult> PlaceTracker::Search(const ScanFeatures& features,
+                                                       const RegistrationResult& tracked) {
+  PoseSearchOptions search = options_.search;
+  if (IsAdrift()) {
+    search.max_columns = options_.adrift_columns;
+    search.candidates = options_.adrift_candidates;
+  }
+  const bool is_as_expected = !IsDoubtful(tracked);  // else the prior may be wrong, too
+  std::vector<Place> places{At(tracked, is_as_expected)};
+  for (const Pose& start : SearchPoses(map_.coarse(), map_.window().origin(), features,
+                                       Prior().T_world_level, Reach(), search)) {
+    places.push_back(
+        At(Register(map_.window(), features, start, options_.registration), is_as_expected));
+  }
+  const auto best = std::max_element(places.begin() + 1, places.end(), IsLessLikely);
+  if (best == places.end() || !StandsOut(places, *best)) {
+    return std::nullopt;
+  }
+  return best->registration;
+}
+
+// The first of `places` is where the vehicle was tracked to.
+bool PlaceTracker::StandsOut(const std::vector<Place>& places, const Place& best) const {
+  const bool is_likelier =
+      best.log_likelihood > places.front().log_likelihood + options_.believed_log_ratio;
+  return is_likelier && std::none_of(places.begin() + 1, places.end(), [&](const Place& other) {
+           return other.log_likelihood > best.log_likelihood - options_.unique_log_ratio &&
+                  AreApart(other.registration.T_world_level, best.registration.T_world_level,
+                           options_.search.apart_m, options_.search.apart_rad);
+         });
+}
+
+}  // namespace atlas

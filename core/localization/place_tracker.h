@@ -1,0 +1,205 @@
+// A vehicle that is taken to be at one place: keeps a map window around it, predicts its motion,
+// matches each scan and says how far the answer can be believed. It looks no further than the
+// vehicle may have come.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "core/base/status.h"
+#include "core/localization/confirmation.h"
+#include "core/localization/local_map.h"
+#include "core/localization/localization_result.h"
+#include "core/localization/motion_model.h"
+#include "core/localization/pose_search.h"
+#include "core/localization/registration.h"
+#include "core/localization/scan_features.h"
+
+namespace atlas {
+
+struct PlaceTrackerOptions {
+  LocalMapOptions map;
+  RegistrationOptions registration;
+  MotionOptions motion;
+  PoseSearchOptions search;
+  ConfirmationOptions confirmation;
+
+  // Of RegistrationResult; less is lost. Wrong places on real drives, found from starts up to 6 m
+  // and 20 degrees off, fit 0.385 at most, right ones 0.48 and more but for two in a hundred.
+  double min_fit = 0.4;
+  double good_fit = 0.45;  // less is weak
+  // A scan with so many columns of which fewer than this share stand on structure is weak: ground
+  // alone is much the same everywhere. On whole drives right places had 0.11 at least, one deck off
+  // on an overpass, where next to nothing was mapped, 0.02 at most.
+  double min_columns = 0.05;
+  std::size_t few_columns = 30;
+  int most_unheld =
+      2;  // such scans in a row; after more its covariance is that of an unknown place
+  double max_weak_sigma_m = 0.10;  // of the worst horizontal direction; more is weak
+  int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did
+
+  // Neighbouring features err together: a scan informs as this share of its features would, and a
+  // feature counts as much in a log likelihood. However many there are, no place is known better
+  // than the map is: standard deviations, of a place also as a share of a cell. Fitted to the
+  // errors of single shots with 16 and 64 rings and along a simulated drive.
+  double information_share = 0.08;
+  double map_sigma_m = 0.01;
+  double map_sigma_cells = 0.04;
+  double coarse_sigma_cells = 0.4;  // a coarse cell stands where any of its fine ones does
+  double map_sigma_rad = 0.0006;
+  double evidence_share = 0.2;
+
+  // Where the place is less certain than this, starts are tried along the least certain direction,
+  // two sigmas either way ...
+  double fan_sigma_m = 0.4;
+  double fan_step_m = 0.5;
+  // ... up to here. From here on the vehicle is adrift: it is looked for in two sigmas along and
+  // across that direction and in these headings, by more of the scan and with more candidates.
+  double adrift_sigma_m = 2.5;
+  double max_adrift_m = 80.0;
+  double max_adrift_beside_m = 4.0;
+  double adrift_yaw_rad = 0.15;
+  std::size_t adrift_columns = 128;
+  std::size_t adrift_candidates = 16;
+
+  // A fit below this share of the usual one, or this fit of columns: the vehicle may have turned or
+  // braked more than predicted, so other places and headings are tried, further off with every scan
+  // that is lost. One is believed when it is this much likelier than where the vehicle was tracked
+  // to, and than any other place.
+  double doubtful_fit = 0.85;
+  double doubtful_column_fit = 0.3;
+  double believed_log_ratio = 2.0;
+  double unique_log_ratio = 1.0;
+  SearchReach search_reach;  // of the first search; each lost scan adds as much
+  SearchReach max_search_reach{8.0, 8.0, std::numbers::pi};
+
+  // Where the map is not all there, it is asked for again after so many scans, at a standstill,
+  // too.
+  int asked_again_after = 5;
+
+  int told_lost_after = 5;  // scans, from which on its covariance is that of an unknown place
+
+  // Found where the prior's log density is below this, the vehicle moved as nobody expected.
+  double surprising_log_density = -8.0;
+  // ... and if that is further than this from where it was expected, or it was lost before, it has
+  // to be confirmed.
+  double expected_m = 3.0;
+  double expected_rad = 1.2;
+};
+
+class PlaceTracker {
+ public:
+  // `max_range_m`: of the features that scans are matched by.
+  PlaceTracker(const MapProfile& profile,
+               TilesAround tiles,
+               const PlaceTrackerOptions& options,
+               double max_range_m);
+
+  // Forgets the motion; the next scan is near `T_world_sensor`: known to be there, or supposed,
+  // until scans confirm it by fitting as those before did (`usual_fit`; 0 where none did).
+  void Start(const Pose& T_world_sensor);
+  void Suppose(const Pose& T_world_sensor, double usual_fit);
+
+  // How the sensor is taken to move from one scan to the next, in its own frame. Identity as long
+  // as nothing is known of it.
+  Pose T_now_later() const { return motion_.T_now_later(); }
+
+  // Where the next scan is expected.
+  Pose T_world_expected() const { return Next().T_world_sensor(); }
+
+  // Has the map that the next scan needs. Errors are those of the tiles' source; nothing has
+  // changed then.
+  Status Prepare();
+  // Requires Start() or Suppose(), and Prepare() for each scan. `features` are those of a scan
+  // levelled by `R_level_sensor`.
+  LocalizationResult Track(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor);
+
+  // Whether it is known that the vehicle is where it is tracked (core/localization/confirmation).
+  bool is_confirmed() const { return confirmation_.is_confirmed(); }
+  // The last answer, when another place may be the right one as well.
+  LocalizationResult Doubted(LocalizationResult result) const;
+  double usual_fit() const { return usual_fit_; }
+  // How uncertain its place is in the direction in which it is least known, standard deviation.
+  double spread_m() const { return SpreadOf(motion_.covariance()).along_m; }
+
+ private:
+  // An answer, and how likely it is, up to a constant.
+  struct Place {
+    RegistrationResult registration;
+    double log_likelihood = 0.0;
+  };
+  static bool IsLessLikely(const Place& a, const Place& b) {
+    return a.log_likelihood < b.log_likelihood;
+  }
+  struct Tracked {
+    Place place;
+    // From there to another place that is about as likely: the vehicle may have moved on by one of
+    // a row of posts.
+    std::optional<Eigen::Vector2d> rival;
+  };
+
+  MotionModel Next() const;  // at the next scan
+  PosePrior Prior() const;
+  Place At(const RegistrationResult& registration, bool has_prior) const;
+  // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
+  void SpreadStarts(const PosePrior& prior);
+  Tracked Follow(const ScanFeatures& features);
+  std::optional<Eigen::Vector2d> RivalOf(const std::vector<Place>& places, const Place& best) const;
+  bool IsDoubtful(const RegistrationResult& result) const;
+  bool IsAdrift() const;
+  double AdriftReach(const PoseCovariance& covariance) const;
+  SearchReach Reach() const;
+  // The likeliest place around where the scan was expected, if it stands out from `tracked` and all
+  // others.
+  std::optional<RegistrationResult> Search(const ScanFeatures& features,
+                                           const RegistrationResult& tracked);
+  bool StandsOut(const std::vector<Place>& places, const Place& best) const;
+  // Whether a place is where a vehicle that was known to be somewhere can be now.
+  enum class Surprise : std::uint8_t {
+    kNone,
+    kOdd,  // near where it was expected, but the scan does not fit as usual
+    kNew,
+  };
+  Surprise SurpriseOf(const RegistrationResult& result,
+                      const ScanFeatures& features,
+                      bool is_found) const;
+  // Takes the place up, which may be a new one, or another deck's.
+  void Confirm(const ScanFeatures& features, Surprise surprise, LocalizationResult& result);
+  PoseCovariance Covariance(const LocalizationResult& result) const;
+  bool IsHeld(const RegistrationResult& result, const ScanFeatures& features) const;
+  LocalizationHealth Judge(const RegistrationResult& result,
+                           const ScanFeatures& features,
+                           Surprise surprise) const;
+  struct Cover {
+    MapCover map = MapCover::kNone;
+    double cell_m = 0.0;  // of what was mapped, on average
+  };
+  void NoteCover(MapCover cover);
+  Cover CoverAt(const ScanFeatures& features, const Pose& T_world_level) const;
+  Eigen::Matrix4d Seen(const RegistrationResult& registration,
+                       const Cover& cover,
+                       const std::optional<Eigen::Vector2d>& rival) const;
+  void Remember(const LocalizationResult& result, const Eigen::Matrix4d& seen, bool is_found);
+
+  PlaceTrackerOptions options_;
+  double max_range_m_;
+  double cell_size_m_;
+  LocalMap map_;
+  MotionModel motion_;
+  Confirmation confirmation_;
+  bool is_first_ = true;
+  double usual_fit_ = 0.0;  // of good results, exponentially forgotten
+  int lost_ = 0;            // scans in a row
+  int unheld_ = 0;          // scans in a row
+  int without_map_ = 0;     // scans in a row on which the map was not all there
+  // Of the scan at hand; kept for their memory.
+  std::vector<Pose> starts_;
+  std::vector<Place> places_;
+};
+
+}  // namespace atlas

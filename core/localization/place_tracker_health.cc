@@ -1,0 +1,86 @@
+// How far a localizer's answer can be believed.
+#include <cmath>
+#include <utility>
+
+#include "core/localization/place_tracker.h"
+
+namespace atlas {
+
+// What was tracked is expected: nothing else was found. After scans that were lost the vehicle may
+// be anywhere, unless what is seen is what was expected.
+PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result,
+                                                const ScanFeatures& features,
+                                                bool is_found) const {
+  if (is_first_ || (lost_ == 0 && !is_found)) {
+    return Surprise::kNone;
+  }
+  const PosePrior prior = Prior();
+  const Eigen::Vector4d off = PoseDifference(prior.T_world_level, result.T_world_level);
+  const bool is_near =
+      off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;
+  const bool is_likely = LogDensity(prior, result.T_world_level) > options_.surprising_log_density;
+  if ((lost_ == 0 && is_likely) || (lost_ <= options_.max_coasting && is_near &&
+                                    confirmation_.IsAsUsual(result, features, usual_fit_))) {
+    return Surprise::kNone;
+  }
+  return lost_ == 0 && is_near ? Surprise::kOdd : Surprise::kNew;
+}
+
+void PlaceTracker::Confirm(const ScanFeatures& features,
+                           Surprise surprise,
+                           LocalizationResult& result) {
+  if (result.health == LocalizationHealth::kLost) {
+    confirmation_.Miss();
+    return;
+  }
+  if (surprise == Surprise::kNew) {
+    confirmation_.Doubt();
+  } else if (surprise == Surprise::kOdd) {
+    confirmation_.Question();
+  }
+  const double up_m = result.registration.T_world_level.translation().z();
+  if (auto there = confirmation_.Weigh(map_.window(), features, result.registration, usual_fit_,
+                                       IsDoubtful(result.registration))) {
+    result.registration = *std::move(there);
+    motion_.Raise(result.registration.T_world_level.translation().z() - up_m);
+  }
+  if (!confirmation_.is_confirmed()) {
+    result.health = LocalizationHealth::kWeak;
+  }
+}
+
+bool PlaceTracker::IsHeld(const RegistrationResult& result, const ScanFeatures& features) const {
+  return features.columns.size() < options_.few_columns ||
+         result.column_inliers >= options_.min_columns;
+}
+
+LocalizationHealth PlaceTracker::Judge(const RegistrationResult& result,
+                                       const ScanFeatures& features,
+                                       Surprise surprise) const {
+  if (surprise != Surprise::kNone || !confirmation_.is_confirmed()
+          ? !confirmation_.IsEnough(result, features)
+          : result.fit < options_.min_fit) {
+    return LocalizationHealth::kLost;
+  }
+  return WorstSigma(result) > options_.max_weak_sigma_m || result.fit < options_.good_fit ||
+                 !IsHeld(result, features)
+             ? LocalizationHealth::kWeak
+             : LocalizationHealth::kGood;
+}
+
+LocalizationResult PlaceTracker::Doubted(LocalizationResult result) const {
+  if (result.health == LocalizationHealth::kGood) result.health = LocalizationHealth::kWeak;
+  result.covariance = motion_.covariance() + confirmation_.Spread();
+  return result;
+}
+
+// Wider where it is not known that this is the place.
+PoseCovariance PlaceTracker::Covariance(const LocalizationResult& result) const {
+  const bool is_poor =
+      result.health == LocalizationHealth::kWeak && result.registration.fit < options_.good_fit;
+  const bool is_known = confirmation_.is_confirmed() && !is_poor &&
+                        unheld_ <= options_.most_unheld && lost_ < options_.told_lost_after;
+  return is_known ? motion_.covariance() : motion_.covariance() + confirmation_.Spread();
+}
+
+}  // namespace atlas
