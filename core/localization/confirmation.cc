@@ -70,7 +70,7 @@ std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
   }
   if (is_better && better->scans >= options_.usual_scans &&
       IsEnough(better->registration, features)) {
-    RegistrationResult there = std::move(better->registration);
+    const RegistrationResult there = better->registration;
     Doubt();
     return there;
   }
@@ -97,8 +97,9 @@ void Confirmation::Compare(const MapWindow& map,
                            const ScanFeatures& features,
                            const RegistrationResult& here) {
   const double score = PlaceScore(here, features);
-  std::vector<Rival> rivals;
-  for (const double up_m : OtherDecks(map, features, here.T_world_level, options_.decks)) {
+  before_.swap(rivals_);
+  rivals_.clear();
+  for (const double up_m : decks_.Find(map, features, here.T_world_level)) {
     Pose start = here.T_world_level;
     start.translation().z() += up_m;
     Rival rival;
@@ -108,18 +109,17 @@ void Confirmation::Compare(const MapWindow& map,
     if (std::abs(rival.up_m) < 0.5 * options_.decks.apart_m) {
       continue;  // it came back
     }
-    const auto before = std::find_if(rivals_.begin(), rivals_.end(), [&](const Rival& other) {
+    const auto before = std::find_if(before_.begin(), before_.end(), [&](const Rival& other) {
       return std::abs(other.up_m - rival.up_m) < 0.5 * options_.decks.apart_m;
     });
-    if (before != rivals_.end()) {
+    if (before != before_.end()) {
       rival.lead = before->lead;
       rival.scans = before->scans;
     }
     rival.lead += score - PlaceScore(rival.registration, features);
     ++rival.scans;
-    rivals.push_back(std::move(rival));
+    rivals_.push_back(rival);
   }
-  rivals_ = std::move(rivals);
 }
 
 PoseCovariance Confirmation::Spread() const {

@@ -59,7 +59,10 @@ struct ConfirmationOptions {
 class Confirmation {
  public:
   Confirmation(const ConfirmationOptions& options, const RegistrationOptions& registration)
-      : options_(options), registration_(registration) {}
+      : options_(options), registration_(registration), decks_(options.decks) {
+    rivals_.reserve(options.decks.most);
+    before_.reserve(options.decks.most);
+  }
 
   bool is_confirmed() const { return is_confirmed_; }
   // The place is known: it was told.
@@ -115,7 +118,9 @@ class Confirmation {
   int usual_scans_ = 0;  // in a row that spoke for the place
   int good_scans_ = 0;
   int uncompared_ = 0;  // scans, while it is confirmed
+  DeckFinder decks_;
   std::vector<Rival> rivals_;
+  std::vector<Rival> before_;  // rivals_ at the scan before; kept for its memory
 };
 
 }  // namespace atlas

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/geometry/pose.h"
 #include "core/localization/scan_features.h"
 #include "core/localization/window/map_window.h"
@@ -19,11 +21,31 @@ struct DeckOptions {
   std::size_t most = 4;
 };
 
-// How far up (metres, down is negative) the scan would lie on another surface, the one that carries
-// most of its ground first. `T_world_level` is where it is taken to be.
-std::vector<double> OtherDecks(const MapWindow& map,
-                               const ScanFeatures& features,
-                               const Pose& T_world_level,
-                               const DeckOptions& options);
+class DeckFinder {
+ public:
+  explicit DeckFinder(const DeckOptions& options) : options_(options) {}
+
+  // How far up (metres, down is negative) the scan would lie on another surface, the one that
+  // carries most of its ground first. `T_world_level` is where it is taken to be. Valid until the
+  // next call.
+  const std::vector<double>& Find(const MapWindow& map,
+                                  const ScanFeatures& features,
+                                  const Pose& T_world_level);
+
+ private:
+  struct Deck {
+    double up_m = 0.0;
+    int carried = 0;  // of ground_
+  };
+
+  Deck DeckAt(const MapWindow& map, double up_m) const;
+
+  DeckOptions options_;
+  // Of the scan's ground that lies near the sensor, in the window's frame. All kept for their
+  // memory.
+  std::vector<Eigen::Vector3f> ground_;
+  std::vector<Deck> decks_;
+  std::vector<double> ups_m_;
+};
 
 }  // namespace atlas

@@ -166,6 +166,7 @@ Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& fe
   const auto radius_m = static_cast<double>(options_.features.max_range_m) + 3.0;
   std::vector<RelocalizedPlace> places;
   MapWindow window(profile_, options_.window);
+  DeckFinder decks(options_.decks);
   for (const Start& start : starts) {
     const Eigen::Vector3d& center = start.T_world_level.translation();
     const auto tiles = tiles_(center, radius_m);
@@ -174,7 +175,7 @@ Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& fe
     RelocalizedPlace place = Placed(window, features, start.T_world_level);
     const Pose T_world_level = place.registration.T_world_level;
     Add(std::move(place), places);
-    for (const double up_m : OtherDecks(window, features, T_world_level, options_.decks)) {
+    for (const double up_m : decks.Find(window, features, T_world_level)) {
       Pose pose = T_world_level;
       pose.translation().z() += up_m;
       Add(Placed(window, features, pose), places);

@@ -37,17 +37,17 @@ ScanFeatures FeaturesAt(const ShapeWorld& world, const Pose& pose) {
 }
 
 TEST(OtherDecksTest, AreThoseAboveAndBelowAndAStreetHasNone) {
+  DeckFinder finder{DeckOptions()};
   const MapWindow garage = GarageMap().Window({0.0, 0.0, 1.8}, 25.0);
   for (const double floor_m : {0.0, kFloor_m}) {
     const Pose pose = OnDeck(floor_m, -2.0, -3.0, 0.4);
-    const auto decks =
-        OtherDecks(garage, FeaturesAt(testing::GarageCorner(), pose), pose, DeckOptions());
+    const auto decks = finder.Find(garage, FeaturesAt(testing::GarageCorner(), pose), pose);
     ASSERT_EQ(decks.size(), 1U) << floor_m;
     EXPECT_NEAR(decks.front(), kFloor_m - 2.0 * floor_m, 0.25);
   }
   const Pose pose = UprightPose({0.0, 0.0, 1.8}, 0.0);
   const MapWindow street = StreetMap().Window(pose.translation(), 25.0);
-  EXPECT_TRUE(OtherDecks(street, FeaturesAt(testing::Street(), pose), pose, {}).empty());
+  EXPECT_TRUE(finder.Find(street, FeaturesAt(testing::Street(), pose), pose).empty());
 }
 
 TEST(ConfirmationTest, AVehicleCarriedToAnotherDeckIsFoundOnItAndNotCalledGoodBefore) {

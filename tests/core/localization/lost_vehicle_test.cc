@@ -129,8 +129,8 @@ TEST(LostVehicleTest, WhatIsAlikeForGoodIsNeverGood) {
 TEST(LostVehicleTest, InTheMapOfAnotherPlaceItStaysLost) {
   Localizer localizer = LocalizerIn(StreetMap(), QuickOptions());
   localizer.Start(OnStreet(0.0));
-  for (int i = 0; i < 30; ++i) {
-    const Pose elsewhere = UprightPose({-6.0 + 0.4 * i, -1.0, 1.8}, 0.2);
+  for (int i = 0; i < 14; ++i) {
+    const Pose elsewhere = UprightPose({-6.0 + 0.8 * i, -1.0, 1.8}, 0.2);
     const LocalizationResult result = At(localizer, testing::GarageCorner(), elsewhere);
     EXPECT_NE(result.health, LocalizationHealth::kGood) << i;
     if (result.health == LocalizationHealth::kWeak) {
