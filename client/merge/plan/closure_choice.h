@@ -29,13 +29,13 @@ struct ClosureChoice {
   std::vector<SessionMeeting> meetings;  // rising, those of which anything was found
 };
 
-// Whether the others have the two submaps of a closure nearly where it has them: they hang together
-// without it.
+// Whether the two submaps of a closure are nearly where it has them, as far as that is known.
 using IsAsKnown = std::function<bool(const FoundClosure&)>;
 
 // `ways` of each session, as its own links have it. A set counts by the fewer of the two sessions'
-// submaps that have a part in it: `min_closures`, or, where all of it is as known, two closures.
-// `is_as_known` may be empty: nothing is.
+// submaps that have a part in it: `min_closures`, or two closures, where all of it is as known and
+// sessions that meet often enough lead from the one to the other. `is_as_known` may be empty:
+// nothing is.
 ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
                              const std::vector<SessionWay>& ways,
                              const MergeOptions& options,

@@ -1,6 +1,8 @@
 // Closures of two sessions are believed together or not at all.
 #include "client/merge/plan/closure_choice.h"
 
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "tests/client/merge/plan/blind_session.h"
@@ -66,17 +68,38 @@ TEST_F(ClosureChoiceTest, EnoughThatAgreeAreBelieved) {
 }
 
 TEST_F(ClosureChoiceTest, TwoAreEnoughWhereTheOthersHaveThemThere) {
-  const std::vector<FoundClosure> found{Meeting({0, 1}, {1, 1}), Meeting({0, 1}, {1, 2})};
+  const std::vector<FoundClosure> two{Meeting({0, 1}, {1, 1}), Meeting({0, 1}, {1, 2})};
+  std::vector<FoundClosure> found = two;
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    found.push_back(Meeting({0, i}, {2, i}));
+    found.push_back(Meeting({1, i}, {2, i}));
+  }
   const IsAsKnown all = [](const FoundClosure&) {
     return true;
   };
   const IsAsKnown one = [](const FoundClosure& closure) {
     return closure.b.submap == 1;
   };
-  EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 2U);
-  EXPECT_TRUE(ChooseClosures(found, ways_, options_, one).believed.empty());
-  EXPECT_TRUE(ChooseClosures(found, ways_, options_).believed.empty());
-  EXPECT_TRUE(ChooseClosures({found[0]}, ways_, options_, all).believed.empty()) << "one is chance";
+  EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 8U);
+  EXPECT_EQ(ChooseClosures(found, ways_, options_, one).believed.size(), 6U);
+  EXPECT_EQ(ChooseClosures(found, ways_, options_).believed.size(), 6U);
+  found.erase(found.begin());
+  EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 6U) << "one is chance";
+  EXPECT_TRUE(ChooseClosures(two, ways_, options_, all).believed.empty()) << "there are no others";
+}
+
+// Nobody is known by two closures alone, however many such meetings lead around to him.
+TEST_F(ClosureChoiceTest, TwosDoNotVouchForEachOther) {
+  std::vector<FoundClosure> found;
+  for (const std::size_t i : {0U, 1U}) {
+    for (const auto& [a, b] : {std::pair(0U, 1U), std::pair(0U, 2U), std::pair(1U, 2U)}) {
+      found.push_back(Meeting({a, i}, {b, i}));
+    }
+  }
+  const IsAsKnown all = [](const FoundClosure&) {
+    return true;
+  };
+  EXPECT_TRUE(ChooseClosures(found, ways_, options_, all).believed.empty());
 }
 
 TEST_F(ClosureChoiceTest, TooFewAreNot) {

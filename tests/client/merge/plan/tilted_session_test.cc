@@ -109,6 +109,31 @@ TEST(TiltedSessionTest, WhoMeetsItIsNotBentByIt) {
   EXPECT_TRUE(plan->closures.empty());
 }
 
+// Two closures are enough where the others have both there: without the others they are two.
+TEST(TiltedSessionTest, WhoHungOnItDoesNotStayByTwoClosures) {
+  std::vector<MergeSession> sessions{LevelSession("level", 0.0, 41),
+                                     LevelSession("tilted", 0.0, 41),
+                                     LevelSession("behind", 20.0, 31)};
+  const MoreClosures meet = [&](const auto&, const auto&) {
+    std::vector<FoundClosure> closures;
+    for (const std::size_t i : {0U, 1U, 2U}) {
+      closures.push_back(FoundAsStored(sessions, {0, i}, {1, i}));
+      closures.push_back(FoundAsStored(sessions, {1, i}, {2, i}));
+    }
+    for (const std::size_t i : {0U, 1U}) {
+      closures.push_back(FoundAsStored(sessions, {0, i}, {2, i}));
+    }
+    return closures;
+  };
+  MergeWork work = MergeWork::Temporary().value();
+  const auto plan = PlanMerge(sessions, {Level(), LevelOnce(41), Level()},
+                              {MapProfile(), MergeOptions(), work}, nullptr, meet);
+  ASSERT_TRUE(plan.has_value()) << plan.error().message();
+  EXPECT_TRUE(plan->sessions[1].is_refused);
+  EXPECT_FALSE(plan->sessions[2].is_joined);
+  EXPECT_TRUE(plan->closures.empty()) << "two, and nobody else has them there";
+}
+
 // All three by as much, of which one alone has a part in it: it is the last to go, and the others
 // come back.
 TEST(TiltedSessionTest, WhoWasTiltedByItIsNotBlamed) {
