@@ -103,10 +103,11 @@ class Planner {
   }
 
   // One that would have to be tilted too far bends the others while it tilts: without it again, the
-  // most tilted first, until there is none.
+  // most tilted first, until there is none. With all that was found: what it contradicted may be
+  // right.
   Status LeaveOutTilted() {
     for (;;) {
-      const std::vector<FoundClosure> closures = choice_.believed;
+      const std::vector<FoundClosure> closures = rejected_.Without({});
       std::vector<std::size_t> tilted;
       for (auto worst = MostTilted();; worst = MostTilted()) {
         if (!worst) return worst.error();

@@ -134,6 +134,37 @@ TEST(TiltedSessionTest, WhoHungOnItDoesNotStayByTwoClosures) {
   EXPECT_TRUE(plan->closures.empty()) << "two, and nobody else has them there";
 }
 
+// What it contradicted, by more than the others have to say, is not lost when it goes.
+TEST(TiltedSessionTest, WhatItContradictedIsLookedAtAgain) {
+  std::vector<MergeSession> sessions{LevelSession("level", 0.0, 41),
+                                     LevelSession("tilted", 0.0, 41),
+                                     LevelSession("other", 0.0, 41)};
+  sessions[0].is_staged = false;
+  bool is_found = false;
+  const MoreClosures meet = [&](const auto&, const auto&) {
+    std::vector<FoundClosure> closures;
+    for (const std::size_t i : {0U, 1U, 2U, 3U}) {
+      if (is_found) break;
+      closures.push_back(FoundAsStored(sessions, {0, i}, {1, i}));
+      closures.push_back(FoundAsStored(sessions, {1, i}, {2, i}));
+      const Pose T_world_a = StoredPose(sessions[0], sessions[0].submaps[i]);
+      const Pose off = T_world_a.inverse() * At(0.0, 3.0) * T_world_a;
+      if (i < 3) closures.push_back(FoundAsStored(sessions, {0, i}, {2, i}, off));
+    }
+    is_found = true;
+    return closures;
+  };
+  MergeOptions options;
+  options.refinements = 0;
+  MergeWork work = MergeWork::Temporary().value();
+  const auto plan = PlanMerge(sessions, {Level(), LevelOnce(41), Level()},
+                              {MapProfile(), options, work}, nullptr, meet);
+  ASSERT_TRUE(plan.has_value()) << plan.error().message();
+  EXPECT_TRUE(plan->sessions[1].is_refused);
+  EXPECT_TRUE(plan->sessions[2].is_joined) << plan->sessions[2].why_not;
+  EXPECT_EQ(plan->closures.size(), 3U);
+}
+
 // All three by as much, of which one alone has a part in it: it is the last to go, and the others
 // come back.
 TEST(TiltedSessionTest, WhoWasTiltedByItIsNotBlamed) {
