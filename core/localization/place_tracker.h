@@ -34,12 +34,12 @@ struct PlaceTrackerOptions {
   double min_fit = 0.4;
   double good_fit = 0.45;  // less is weak
   // A scan with so many columns of which fewer than this share stand on structure is weak: ground
-  // alone is much the same everywhere. On whole drives right places had 0.11 at least, one deck off
-  // on an overpass, where next to nothing was mapped, 0.02 at most.
+  // alone is much the same everywhere. On whole drives right places had 0.11 at least, but for one
+  // in a map that has little of what it sees; 40 m off, on a bridge instead of below it, 0.02.
+  // After more such scans in a row its covariance is that of an unknown place.
   double min_columns = 0.05;
   std::size_t few_columns = 30;
-  int most_unheld =
-      2;  // such scans in a row; after more its covariance is that of an unknown place
+  int most_unheld = 2;
   double max_weak_sigma_m = 0.10;  // of the worst horizontal direction; more is weak
   int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did
 

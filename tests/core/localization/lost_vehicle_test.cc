@@ -76,15 +76,8 @@ TEST(LostVehicleTest, CarriedAwayAndTurnedItIsBackAfterSomeScans) {
 
 // The same yard twice, 40 m apart; what tells them apart comes into sight when it drives on.
 TEST(LostVehicleTest, OfTwoPlacesThatLookAlikeItTakesTheOneThatItsDriveShows) {
-  ShapeWorld world;
-  world.patches = {testing::Patch{}};
   for (const double x : {-20.0, 20.0}) {
-    world.boxes.push_back({{x - 6.05, 5.05, -1.0}, {x + 4.05, 6.05, 4.0}});
-    world.boxes.push_back({{x + 7.05, -5.05, -1.0}, {x + 8.05, 2.05, 4.0}});
-    world.boxes.push_back({{x - 8.05, -6.05, -1.0}, {x - 7.55, -5.55, 4.0}});
-  }
-  for (const double x : {-20.0, 20.0}) {
-    ShapeWorld told_apart = world;
+    ShapeWorld told_apart = testing::TwoYards();
     told_apart.boxes.push_back({{x + 11.05, 6.05, -1.0}, {x + 12.05, 13.05, 4.0}});
     PaintedMap map;
     map.Paint(told_apart, 38.0);
@@ -104,12 +97,7 @@ TEST(LostVehicleTest, OfTwoPlacesThatLookAlikeItTakesTheOneThatItsDriveShows) {
 }
 
 TEST(LostVehicleTest, WhatIsAlikeForGoodIsNeverGood) {
-  ShapeWorld world;
-  world.patches = {testing::Patch{}};
-  for (const double x : {-20.0, 20.0}) {
-    world.boxes.push_back({{x - 6.05, 5.05, -1.0}, {x + 4.05, 6.05, 4.0}});
-    world.boxes.push_back({{x + 7.05, -5.05, -1.0}, {x + 8.05, 2.05, 4.0}});
-  }
+  const ShapeWorld world = testing::TwoYards();
   PaintedMap map;
   map.Paint(world, 38.0);
   LocalizerOptions options = QuickOptions();

@@ -243,6 +243,17 @@ ShapeWorld GarageCorner() {
   return world;
 }
 
+ShapeWorld TwoYards() {
+  ShapeWorld world;
+  world.patches = {Patch{}};
+  for (const double x : {-20.0, 20.0}) {
+    world.boxes.push_back({{x - 6.05, 5.05, -1.0}, {x + 4.05, 6.05, 4.0}});
+    world.boxes.push_back({{x + 7.05, -5.05, -1.0}, {x + 8.05, 2.05, 4.0}});
+    world.boxes.push_back({{x - 8.05, -6.05, -1.0}, {x - 7.55, -5.55, 4.0}});
+  }
+  return world;
+}
+
 ShapeWorld Corridor() {
   ShapeWorld world;
   world.patches = {Patch{}};

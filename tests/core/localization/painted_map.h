@@ -56,6 +56,8 @@ TileLayer ColumnLayer(double altitude_m, std::uint32_t segments);
 ShapeWorld Street();
 // Two decks 3 m apart in one corner: two walls, pillars in other places on either deck.
 ShapeWorld GarageCorner();
+// The same yard of three boxes twice, around x = -20 and 20 m.
+ShapeWorld TwoYards();
 // Two endless walls along x and nothing else.
 ShapeWorld Corridor();
 

@@ -82,14 +82,7 @@ TEST(RelocalizerTest, ADeckIsNeverTakenForTheOther) {
 }
 
 TEST(RelocalizerTest, WhereTwoPlacesLookTheSameItDoesNotKnowUnlessItIsToldWhereAbout) {
-  // The same yard twice, 40 m apart.
-  ShapeWorld world;
-  world.patches = {testing::Patch{}};
-  for (const double x : {-20.0, 20.0}) {
-    world.boxes.push_back({{x - 6.05, 5.05, -1.0}, {x + 4.05, 6.05, 4.0}});
-    world.boxes.push_back({{x + 7.05, -5.05, -1.0}, {x + 8.05, 2.05, 4.0}});
-    world.boxes.push_back({{x - 8.05, -6.05, -1.0}, {x - 7.55, -5.55, 4.0}});
-  }
+  const ShapeWorld world = testing::TwoYards();
   PaintedMap map;
   map.Paint(world, 35.0);
   RelocalizerOptions options;
