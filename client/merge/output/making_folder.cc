@@ -11,7 +11,8 @@ namespace fs = std::filesystem;
 
 Result<std::unique_ptr<MakingFolder>> MakingFolder::Make(const fs::path& target) {
   const fs::path beside = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  auto made = MakeTemporaryFolder({beside, StrCat(".", target.filename().string(), ".merging-")});
+  const std::string prefix = StrCat(".", target.filename().string(), ".merging-");
+  auto made = MakeTemporaryFolder({beside, prefix, std::chrono::seconds(10)});
   if (!made) return Error(made.error());
   std::unique_ptr<MakingFolder> folder(new MakingFolder(*std::move(made)));
   for (const fs::path& inner : {folder->data(), folder->backups()}) {

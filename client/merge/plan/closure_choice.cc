@@ -9,6 +9,8 @@
 namespace atlas {
 namespace {
 
+constexpr std::size_t kFewButKnown = 2;  // places
+
 // Submaps of each session that have a part in it.
 std::size_t CountPlaces(const std::vector<Closure>& closures, const std::vector<std::size_t>& set) {
   std::set<std::size_t> of_a;
@@ -24,8 +26,10 @@ std::size_t CountPlaces(const std::vector<Closure>& closures, const std::vector<
 struct Judged {
   SessionMeeting meeting;
   std::vector<std::size_t> found;  // its closures, of all that were found
-  std::vector<std::size_t> set;    // of these the ones that agree
-  bool has_rival = false;          // that is too good for it to be believed
+  std::vector<std::size_t> set;    // of these the ones that agree,
+  std::size_t places = 0;          // at so many places
+  bool has_rival = false;          // that is too good for it to be believed,
+  bool has_few_rival = false;      // or for few to be
 };
 
 Judged Judge(const std::vector<FoundClosure>& found,
@@ -40,15 +44,20 @@ Judged Judge(const std::vector<FoundClosure>& found,
         {found[i].a.submap, found[i].b.submap, found[i].match.T_a_b, found[i].match.explained});
   }
   auto sets = ConsistentSets(closures, {ways[a], ways[b]}, options.consistency, 2);
-  Judged judged{{a, b, indices.size(), sets[0].size()}, indices, {}, false};
+  Judged judged;
+  judged.meeting = {a, b, indices.size(), sets[0].size()};
+  judged.found = indices;
   SessionMeeting& meeting = judged.meeting;
   const double next_weight = sets.size() > 1 ? WeightOf(closures, sets[1]) : 0.0;
   if (next_weight > 0.0) {
     meeting.margin = WeightOf(closures, sets[0]) / next_weight;
-    judged.has_rival = CountPlaces(closures, sets[1]) >= options.min_closures &&
-                       meeting.margin < options.min_margin;
+    const std::size_t next = CountPlaces(closures, sets[1]);
+    const bool is_close = meeting.margin < options.min_margin;
+    judged.has_rival = is_close && next >= options.min_closures;
+    judged.has_few_rival = is_close && next >= kFewButKnown;
   }
-  meeting.is_believed = CountPlaces(closures, sets[0]) >= options.min_closures && !judged.has_rival;
+  judged.places = CountPlaces(closures, sets[0]);
+  meeting.is_believed = judged.places >= options.min_closures && !judged.has_rival;
   judged.set = std::move(sets[0]);
   return judged;
 }
@@ -69,13 +78,13 @@ std::vector<std::size_t> PartsOf(const std::vector<Judged>& all, std::size_t ses
 bool IsKnown(const Judged& judged,
              const std::vector<FoundClosure>& found,
              const IsAsKnown& is_as_known) {
-  constexpr std::size_t kFewButKnown = 2;
-  return judged.set.size() >= kFewButKnown && !judged.has_rival &&
+  return judged.places >= kFewButKnown && !judged.has_few_rival &&
          std::all_of(judged.set.begin(), judged.set.end(),
                      [&](std::size_t k) { return is_as_known(found[judged.found[k]]); });
 }
 
-// Parts are those without them: few are no reason to believe few.
+// Parts are those without them: few are no reason to believe few. What two visits of one session
+// have to do with each other is known from that session alone, on both sides of a jump nothing is.
 void BelieveKnown(const std::vector<FoundClosure>& found,
                   const IsAsKnown& is_as_known,
                   std::size_t sessions,
@@ -83,7 +92,7 @@ void BelieveKnown(const std::vector<FoundClosure>& found,
   const std::vector<std::size_t> part_of = PartsOf(all, sessions);
   for (Judged& one : all) {
     SessionMeeting& meeting = one.meeting;
-    if (part_of[meeting.a] != part_of[meeting.b]) continue;
+    if (meeting.a == meeting.b || part_of[meeting.a] != part_of[meeting.b]) continue;
     meeting.is_believed = meeting.is_believed || IsKnown(one, found, is_as_known);
   }
 }

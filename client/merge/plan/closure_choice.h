@@ -33,9 +33,9 @@ struct ClosureChoice {
 using IsAsKnown = std::function<bool(const FoundClosure&)>;
 
 // `ways` of each session, as its own links have it. A set counts by the fewer of the two sessions'
-// submaps that have a part in it: `min_closures`, or two closures, where all of it is as known and
-// sessions that meet often enough lead from the one to the other. `is_as_known` may be empty:
-// nothing is.
+// submaps that have a part in it: `min_closures`, or two, where all of it is as known, the sessions
+// are two, and others that meet often enough lead from the one to the other. `is_as_known` may be
+// empty: nothing is.
 ClosureChoice ChooseClosures(const std::vector<FoundClosure>& found,
                              const std::vector<SessionWay>& ways,
                              const MergeOptions& options,

@@ -84,6 +84,7 @@ Status MergeOptions::Validate() const {
                            {"refined_shape.rad", refined_shape.rad},
                            {"max_surprise_m", max_surprise_m},
                            {"max_surprise_rad", max_surprise_rad},
+                           {"max_height_surprise_m", max_height_surprise_m},
                            {"guided_rounds", static_cast<double>(guided_rounds)},
                            {"refinements", static_cast<double>(refinements)},
                            {"min_move_m", min_move_m},

@@ -84,6 +84,8 @@ struct MergeOptions {
   // Of a match from where it was expected: where a loop is not closed yet, a metre and more.
   double max_surprise_m = 2.0;
   double max_surprise_rad = 3.0 * std::numbers::pi / 180.0;
+  // Where two are enough, for they are where they were expected: less than from deck to deck.
+  double max_height_surprise_m = 1.0;
   int guided_rounds = 3;
 
   // Submaps that were fused before by poses this near are taken as they are, at the beginning, and

@@ -104,10 +104,11 @@ class Planner {
 
   // One that would have to be tilted too far bends the others while it tilts: without it again, the
   // most tilted first, until there is none. With all that was found: what it contradicted may be
-  // right.
+  // right. Whoever was left out has one more try at the end, when the others have their places.
   Status LeaveOutTilted() {
-    for (;;) {
+    for (bool is_tried_again = false;;) {
       const std::vector<FoundClosure> closures = rejected_.Without({});
+      const auto before = left_out_;
       std::vector<std::size_t> tilted;
       for (auto worst = MostTilted();; worst = MostTilted()) {
         if (!worst) return worst.error();
@@ -116,10 +117,13 @@ class Planner {
         tilted.push_back((*worst)->first);
         ATLAS_RETURN_IF_ERROR(SettleAgain(closures));
       }
-      if (tilted.empty()) return {};
-      // The last one was it; those before it may have been bent by it.
-      tilted.pop_back();
+      if (!tilted.empty()) {
+        tilted.pop_back();  // it was the last one; those before it may have been bent by it
+      } else if (!std::exchange(is_tried_again, true)) {
+        for (const auto& [session, why] : left_out_) tilted.push_back(session);
+      }
       for (const std::size_t session : tilted) ATLAS_RETURN_IF_ERROR(TakeBack(session, closures));
+      if (is_tried_again && left_out_ == before) return {};
       if (options_.refinements > 0) ATLAS_RETURN_IF_ERROR(Refine());
     }
   }
@@ -128,6 +132,7 @@ class Planner {
   Status TakeBack(std::size_t session, const std::vector<FoundClosure>& closures) {
     auto why = left_out_.extract(session);
     ATLAS_RETURN_IF_ERROR(SettleAgain(closures));
+    ATLAS_RETURN_IF_ERROR(SettleAgain(closures));  // where it meets few is known since it is back
     const auto worst = MostTilted();
     if (!worst) return worst.error();
     if (!*worst) return {};
@@ -196,7 +201,9 @@ class Planner {
       if (known_parts[closure.a.session] != known_parts[closure.b.session]) return false;
       const Pose expected = (*start)[closure.a.session][closure.a.submap].inverse() *
                             (*start)[closure.b.session][closure.b.submap];
-      return IsNearlyThere(closure.match.T_a_b, expected, options_);
+      const double height_m = closure.match.T_a_b.translation().z() - expected.translation().z();
+      return IsNearlyThere(closure.match.T_a_b, expected, options_) &&
+             std::abs(height_m) <= options_.max_height_surprise_m;
     };
     if (more_closures_) {
       const std::vector<FoundClosure> more = more_closures_(found, ways_);

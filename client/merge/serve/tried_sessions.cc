@@ -23,6 +23,13 @@ bool HasAnyCome(const SessionKey& key, const MergeRevisions& merge, const KnownS
   });
 }
 
+bool HasAnyLeft(const std::set<SessionKey>& map, const KnownSessions& known) {
+  return std::any_of(map.begin(), map.end(), [&](const SessionKey& key) {
+    const auto now = known.find(key);
+    return now == known.end() || !now->second.is_in_map;
+  });
+}
+
 bool IsAllOfTheMapGrowing(const KnownSessions& known) {
   bool is_any = false;
   for (const auto& [key, session] : known) {
@@ -38,15 +45,23 @@ bool IsAllOfTheMapGrowing(const KnownSessions& known) {
 void TriedSessions::MetNobody(const SessionKey& key,
                               const KnownSessions& known,
                               const MergeRevisions& merge) {
-  trials_[key] = {known.at(key).changed_revision, false, merge, {}};
+  trials_[key] = {known.at(key).changed_revision, false, merge, {}, {}};
 }
 
 void TriedSessions::SetAside(const SessionKey& key,
                              const KnownSessions& known,
                              const std::set<SessionKey>& about) {
-  Trial trial{known.at(key).changed_revision, true, {}, {}};
+  Trial trial{known.at(key).changed_revision, true, {}, {}, {}};
   for (const SessionKey& one : about) {
     trial.about.emplace(one, known.at(one).changed_revision);
+  }
+  trials_[key] = std::move(trial);
+}
+
+void TriedSessions::Refused(const SessionKey& key, const KnownSessions& known) {
+  Trial trial{known.at(key).changed_revision, true, {}, {}, {}};
+  for (const auto& [other, session] : known) {
+    if (session.is_in_map) trial.map.insert(other);
   }
   trials_[key] = std::move(trial);
 }
@@ -55,7 +70,7 @@ bool TriedSessions::IsOutdated(const SessionKey& key,
                                const Trial& trial,
                                const KnownSessions& known) {
   if (trial.own_revision != known.at(key).changed_revision) return true;
-  return trial.is_set_aside ? HasAnyChanged(trial.about, known)
+  return trial.is_set_aside ? HasAnyChanged(trial.about, known) || HasAnyLeft(trial.map, known)
                             : HasAnyCome(key, trial.merge, known);
 }
 

@@ -38,11 +38,14 @@ class TriedSessions {
   void SetAside(const SessionKey& key,
                 const KnownSessions& known,
                 const std::set<SessionKey>& about);
+  // One of `known` that is staged does not fit those in the map.
+  void Refused(const SessionKey& key, const KnownSessions& known);
 
   // Which of `known` that are staged and closed are to be merged now. A session is tried once. It
   // is tried again when it has changed, and if it met nobody, when another one that is closed came
   // or changed since, other than by the batch of its own merge, or if it was set aside, when one
-  // that it is about changed or went. Whoever met nobody comes along with others: they might meet.
+  // that it is about changed or went, or if it was refused, when one left the map. Whoever met
+  // nobody comes along with others: they might meet.
   std::vector<SessionKey> WorthTrying(const KnownSessions& known) const;
 
   // Of those that `known` does not have nothing is kept.
@@ -51,9 +54,10 @@ class TriedSessions {
  private:
   struct Trial {
     std::uint64_t own_revision = 0;
-    bool is_set_aside = false;
+    bool is_set_aside = false;                  // or refused
     MergeRevisions merge;                       // it met nobody
     std::map<SessionKey, std::uint64_t> about;  // it was set aside
+    std::set<SessionKey> map;                   // it was refused
   };
 
   static bool IsOutdated(const SessionKey& key, const Trial& trial, const KnownSessions& known);

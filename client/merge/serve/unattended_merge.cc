@@ -186,6 +186,11 @@ void UnattendedMerge::NoteUnmet(const std::vector<SessionKey>& keys,
   for (const SessionKey& key : run.Published()) {
     unmet.erase(key);
   }
+  for (std::size_t i = 0; i < run.sessions.size(); ++i) {
+    const SessionKey& key = run.sessions[i].key;
+    if (!run.plan.sessions[i].is_refused || unmet.erase(key) == 0) continue;
+    tried_.Refused(key, *known_);
+  }
   for (const SessionKey& key : unmet) {
     tried_.MetNobody(key, *known_, {run.revision, applied});
   }

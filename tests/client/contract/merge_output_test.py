@@ -89,7 +89,8 @@ def interrupted_cases(merges, other, work):
 
 
 def killed_cases(merges, work):
-    """A SIGKILL leaves a hidden folder: who makes the same file next removes it, unless somebody is in it."""
+    """A SIGKILL leaves a hidden folder: who makes the same file next removes it, unless somebody is in it, or may be
+    about to be, as it is new."""
     report, made = merges.report, work / "killed"
     made.mkdir()
     flags = ("run", "--from", merges.server, "--output", made / "new.db")
@@ -102,6 +103,8 @@ def killed_cases(merges, work):
     other.mkdir()
     with open(other / "lock", "w", encoding="ascii") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
+        for folder in made.glob(".new.db.merging-*"):
+            os.utime(folder / "lock", (0, 0))
         done = merges.merge(*flags, "--json", server=False)
         report.equal(f"once more: exit code ({done.stderr})", done.returncode, 0)
         report.equal("once more: what is left", left(made), [other.name, "new.db"])

@@ -68,7 +68,7 @@ TEST_F(ClosureChoiceTest, EnoughThatAgreeAreBelieved) {
 }
 
 TEST_F(ClosureChoiceTest, TwoAreEnoughWhereTheOthersHaveThemThere) {
-  const std::vector<FoundClosure> two{Meeting({0, 1}, {1, 1}), Meeting({0, 1}, {1, 2})};
+  const std::vector<FoundClosure> two{Meeting({0, 1}, {1, 1}), Meeting({0, 2}, {1, 2})};
   std::vector<FoundClosure> found = two;
   for (const std::size_t i : {0U, 1U, 2U}) {
     found.push_back(Meeting({0, i}, {2, i}));
@@ -86,6 +86,41 @@ TEST_F(ClosureChoiceTest, TwoAreEnoughWhereTheOthersHaveThemThere) {
   found.erase(found.begin());
   EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 6U) << "one is chance";
   EXPECT_TRUE(ChooseClosures(two, ways_, options_, all).believed.empty()) << "there are no others";
+}
+
+TEST_F(ClosureChoiceTest, OfTwoThatAreEnoughNeitherIsInDoubt) {
+  std::vector<FoundClosure> found{Meeting({0, 1}, {1, 1}), Meeting({0, 2}, {1, 2})};
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    found.push_back(Meeting({0, i}, {2, i}));
+    found.push_back(Meeting({1, i}, {2, i}));
+  }
+  const IsAsKnown all = [](const FoundClosure&) {
+    return true;
+  };
+  ASSERT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 8U);
+  std::vector<FoundClosure> with_rival = found;
+  with_rival.push_back(Meeting({0, 4}, {1, 4}, 7.5));
+  EXPECT_EQ(ChooseClosures(with_rival, ways_, options_, all).believed.size(), 8U) << "one is none";
+  with_rival.push_back(Meeting({0, 6}, {1, 6}, 7.5));
+  EXPECT_EQ(ChooseClosures(with_rival, ways_, options_, all).believed.size(), 6U);
+  found[1] = Meeting({0, 1}, {1, 2});
+  EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 6U)
+      << "both are of one place";
+}
+
+// A piece behind a jump is held by nothing but them.
+TEST_F(ClosureChoiceTest, WithinASessionTwoAreNotEnough) {
+  for (std::size_t i = 5; i < kSubmaps; ++i) {
+    ways_[1].T_session_submap[i] = At(11.0 * static_cast<double>(i - 5), 0.2);
+  }
+  const IsAsKnown all = [](const FoundClosure&) {
+    return true;
+  };
+  std::vector<FoundClosure> found;
+  for (const std::size_t i : {0U, 2U}) found.push_back(Found({1, i}, {1, i + 5}, At(0.0)));
+  EXPECT_TRUE(ChooseClosures(found, ways_, options_, all).believed.empty());
+  found.push_back(Found({1, 4}, {1, 9}, At(0.0)));
+  EXPECT_EQ(ChooseClosures(found, ways_, options_, all).believed.size(), 3U);
 }
 
 // Nobody is known by two closures alone, however many such meetings lead around to him.

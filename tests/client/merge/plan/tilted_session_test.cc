@@ -197,5 +197,49 @@ TEST(TiltedSessionTest, WhoWasTiltedByItIsNotBlamed) {
   EXPECT_EQ(plan->sessions[2].why_not, "meets no session of the map often enough");
 }
 
+// The first to go, as it leans by itself and is bent on top of that, comes back, and so does what
+// it has in common with who meets it at two places only.
+TEST(TiltedSessionTest, WhoComesBackMeetsFewAgain) {
+  std::vector<MergeSession> sessions{LevelSession("level", 0.0, 121),
+                                     LevelSession("tilted", 0.0, 121),
+                                     LevelSession("bent", 0.0, 121), LevelSession("few", 0.0, 121)};
+  sessions[0].is_staged = false;
+  const double leaning_rad = 1.6 * std::numbers::pi / 180.0;
+  for (MergeKeyframe& one : sessions[2].keyframes)
+    one.blob_hash = Hash64(BlobTiltedBy(leaning_rad));
+  const BlobReader leaning = [&](std::size_t) -> Result<Bytes> {
+    return BlobTiltedBy(leaning_rad);
+  };
+  const Pose roll(Eigen::AngleAxisd(-2.8 * std::numbers::pi / 180.0, Eigen::Vector3d::UnitX()));
+  bool is_found = false;
+  const MoreClosures meet = [&](const auto&, const auto&) {
+    std::vector<FoundClosure> closures;
+    if (std::exchange(is_found, true)) return closures;
+    const auto add = [&](std::size_t a, std::size_t b, std::size_t count, const Pose& moved) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const Pose T_world_a = StoredPose(sessions[a], sessions[a].submaps[i]);
+        const Pose off = T_world_a.inverse() * moved * T_world_a;
+        closures.push_back(FoundAsStored(sessions, {a, i}, {b, i}, off));
+      }
+    };
+    add(0, 1, 10, roll);
+    add(0, 2, 3, Pose::Identity());
+    add(0, 3, 3, Pose::Identity());
+    add(1, 2, 9, Pose::Identity());
+    add(2, 3, 2, Pose::Identity());
+    return closures;
+  };
+  MergeOptions options;
+  options.graph.tilt_sigma_rad = 0.2;
+  options.refinements = 0;
+  MergeWork work = MergeWork::Temporary().value();
+  const auto plan = PlanMerge(sessions, {Level(), Level(), leaning, Level()},
+                              {MapProfile(), options, work}, nullptr, meet);
+  ASSERT_TRUE(plan.has_value()) << plan.error().message();
+  EXPECT_TRUE(plan->sessions[1].is_refused);
+  EXPECT_TRUE(plan->sessions[2].is_joined) << plan->sessions[2].why_not;
+  EXPECT_EQ(plan->closures.size(), 8U);
+}
+
 }  // namespace
 }  // namespace atlas

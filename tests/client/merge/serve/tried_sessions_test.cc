@@ -95,6 +95,24 @@ TEST(TriedSessionsTest, WhoWasSetAsideDoesNotComeAlong) {
   EXPECT_EQ(tried.WorthTrying(known), Keys{kB});
 }
 
+TEST(TriedSessionsTest, WhoWasRefusedIsTriedWhenItOrTheMapIsAnother) {
+  TriedSessions tried;
+  const KnownSessions before{{kMap, InMap(5)}, {kA, Staged(7)}};
+  tried.Refused(kA, before);
+  KnownSessions known = before;
+  known[kMap] = InMap(20);
+  EXPECT_EQ(tried.WorthTrying(known), Keys{}) << "merges move it";
+  known[kB] = Staged(9);
+  EXPECT_EQ(tried.WorthTrying(known), Keys{kB}) << "it does not come along";
+  known[kA] = Staged(21);
+  EXPECT_EQ(tried.WorthTrying(known), (Keys{kA, kB}));
+  known = before;
+  known[kMap] = Retracted(22);
+  EXPECT_EQ(tried.WorthTrying(known), Keys{kA}) << "it may have been that one";
+  known.erase(kMap);
+  EXPECT_EQ(tried.WorthTrying(known), Keys{kA});
+}
+
 // Else a staged session would become a map of its own beside it.
 TEST(TriedSessionsTest, AMapThatGrowsIsWaitedForUnlessPartOfItIsClosed) {
   const TriedSessions tried;
