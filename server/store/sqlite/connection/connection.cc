@@ -208,8 +208,8 @@ void Connection::Begin() {
   for (const auto& deferred : deferred_) {
     deferred->Forget();  // of one that SQLite gave up
   }
-  must_be_rolled_back_ = false;
   Execute("BEGIN IMMEDIATE");
+  must_be_rolled_back_ = false;
 }
 
 void Connection::Commit() {
@@ -320,14 +320,6 @@ ToleratedIndexes::~ToleratedIndexes() {
     connection_.Execute("PRAGMA writable_schema = OFF");
   } catch (const SQLite::Exception&) {
     // No statement here writes the schema; what an index lacks is found by who checks them.
-  }
-}
-
-PagesInMemory::~PagesInMemory() {
-  try {
-    connection_.Execute("PRAGMA cache_spill = ON");
-  } catch (const SQLite::Exception&) {
-    // Later transactions then take memory for all that they change.
   }
 }
 

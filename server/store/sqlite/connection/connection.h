@@ -226,21 +226,6 @@ class ToleratedIndexes {
   Connection& connection_;
 };
 
-// As long as it is there, what a transaction changes stays in memory until its commit, however much
-// it is: what fails within it is then as if it had not been.
-class PagesInMemory {
- public:
-  explicit PagesInMemory(Connection& connection) : connection_(connection) {
-    connection_.Execute("PRAGMA cache_spill = OFF");
-  }
-  PagesInMemory(const PagesInMemory&) = delete;
-  PagesInMemory& operator=(const PagesInMemory&) = delete;
-  ~PagesInMemory();
-
- private:
-  Connection& connection_;
-};
-
 // A read transaction: everything inside sees one state of the atlas.
 class Snapshot {
  public:

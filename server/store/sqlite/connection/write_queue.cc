@@ -115,10 +115,6 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
   if (transaction.ok()) {
     transaction = RunInTransaction(group, ends);
   }
-  if (BoreAFailure(group, ends)) {
-    const PagesInMemory pages(*connection_);
-    transaction = RunInTransaction(group, ends);
-  }
   if (!transaction.ok()) {
     NoteRefusal(transaction);
     Settle(group);  // whether a commit that failed wrote something is not known
@@ -127,13 +123,6 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
     const bool is_own = transaction.ok() || ends.gave_up == i;
     group[i].finish(is_own ? ends.results[i] : transaction);
   }
-}
-
-// A single one that would end well, were it not for the pages that it had written: in vain would it
-// be told to try again.
-bool WriteQueue::BoreAFailure(const std::vector<Operation>& group, const Ends& ends) const {
-  return connection_->must_be_rolled_back() && group.size() == 1 && ends.results.front().ok() &&
-         guard_.status().ok();
 }
 
 void WriteQueue::Settle(const std::vector<Operation>& group) {

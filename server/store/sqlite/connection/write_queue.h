@@ -42,9 +42,7 @@ class WriteQueue {
     };
   };
   struct Operation {
-    // In a savepoint, unless it is alone; again, in a new transaction, where a statement of it
-    // failed that had written much, and it bore that.
-    std::function<Status(Connection&)> run;
+    std::function<Status(Connection&)> run;     // in a savepoint, unless it is alone
     std::function<void(const Status&)> finish;  // after the commit; must not block
     // Before that: once all can see what it wrote, or it is certain that nobody will, and before
     // the revision tells of it; must not block, nor throw. May be empty.
@@ -84,7 +82,6 @@ class WriteQueue {
     std::optional<std::size_t> gave_up;
   };
   Status RunInTransaction(std::vector<Operation>& group, Ends& ends);
-  bool BoreAFailure(const std::vector<Operation>& group, const Ends& ends) const;
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
   // Nothing of `group` is written, for one of it, which ended as `failure`, cannot be taken out
