@@ -48,6 +48,7 @@ void SessionStarts::ForgetRested(Clock::time_point now) {
 }
 
 Status SessionStart::Begin(const std::string& vehicle, SessionStarts::Clock::time_point now) {
+  if (counted_ != SessionStarts::Clock::duration{0}) return {};  // its write is made once more
   const Result<SessionStarts::Clock::duration> counted = starts_->Begin(vehicle, now);
   if (!counted) {
     return counted.error();

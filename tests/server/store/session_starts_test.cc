@@ -69,6 +69,7 @@ TEST(SessionStartsTest, OnlyWhatBecameOfAnUploadThatFailedIsGivenBack) {
   const auto starts = std::make_shared<SessionStarts>(1);
   SessionStart failed(starts);
   ASSERT_TRUE(failed.Begin("bus", kStart).ok());
+  EXPECT_TRUE(failed.Begin("bus", kStart).ok()) << "its write is made once more: counted once";
   EXPECT_FALSE(SessionStart(starts).Begin("bus", kStart).ok()) << "counted at once";
   SessionStart never_begun(starts);
   never_begun.NoteEnd({StatusCode::kUnavailable, "another reason"});

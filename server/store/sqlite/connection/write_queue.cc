@@ -12,14 +12,24 @@
 namespace atlas {
 namespace {
 
+// What the disk lacks or refuses, which is the same for all.
+bool IsOfTheDisk(const Status& status) {
+  return status.code() == StatusCode::kResourceExhausted ||
+         status.code() == StatusCode::kPermissionDenied;
+}
+
 // What all of a group are told whose transaction SQLite gave up in an operation that ended as
-// `result`: only what the disk lacks or refuses is the same for all.
+// `result`.
 Status WhyGivenUp(const Status& result) {
-  const bool is_of_all =
-      result.code() == StatusCode::kUnavailable || result.code() == StatusCode::kResourceExhausted;
+  const bool is_of_all = IsOfTheDisk(result) || result.code() == StatusCode::kUnavailable;
   return is_of_all ? result
                    : Status(StatusCode::kUnavailable,
                             "store: SQLite gave up the transaction of this write");
+}
+
+// It ended well, and a statement of it did not.
+Status FailedWithin() {
+  return {StatusCode::kInternal, "store: a statement of this write failed, and it went on"};
 }
 
 }  // namespace
@@ -96,8 +106,7 @@ void WriteQueue::Loop() {
 std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
   std::unique_lock lock(mutex_);
   has_work_.wait(lock, [this] { return is_stopping_ || !queue_.empty(); });
-  const std::size_t size = std::min(queue_.size(), singles_ > 0 ? 1 : options_.max_group);
-  singles_ -= singles_ > 0 ? 1 : 0;
+  const std::size_t size = std::min(queue_.size(), options_.max_group);
   auto end = queue_.begin() + static_cast<std::ptrdiff_t>(size);
   end = std::find_if(queue_.begin(), end, [](const Operation& next) { return next.is_alone; });
   if (end == queue_.begin() && size > 0) {
@@ -109,11 +118,15 @@ std::vector<WriteQueue::Operation> WriteQueue::TakeGroup() {
   return group;
 }
 
-void WriteQueue::RunGroup(std::vector<Operation>& group) {
-  Ends ends{std::vector<Status>(group.size()), std::nullopt};
+void WriteQueue::RunGroup(Group group) {
+  Ends ends{std::vector<Status>(group.size()), std::nullopt, std::nullopt};
   Status transaction = guard_.status();
   if (transaction.ok()) {
     transaction = RunInTransaction(group, ends);
+  }
+  if (ends.spoiler && group.size() > 1) {
+    RunInParts(group, *ends.spoiler);
+    return;
   }
   if (!transaction.ok()) {
     NoteRefusal(transaction);
@@ -125,7 +138,18 @@ void WriteQueue::RunGroup(std::vector<Operation>& group) {
   }
 }
 
-void WriteQueue::Settle(const std::vector<Operation>& group) {
+// In their order: those before it, it, those behind it. Nobody is told what another made of it.
+void WriteQueue::RunInParts(Group group, std::size_t spoiler) {
+  const bool is_known = spoiler < group.size();
+  const std::size_t first = is_known ? spoiler : group.size() / 2;
+  const std::size_t behind = is_known ? spoiler + 1 : first;
+  for (const Group part :
+       {group.first(first), group.subspan(first, behind - first), group.subspan(behind)}) {
+    if (!part.empty()) RunGroup(part);
+  }
+}
+
+void WriteQueue::Settle(Group group) {
   for (const Operation& operation : group) {
     if (operation.settle) {
       operation.settle();
@@ -153,25 +177,16 @@ WriteFigures WriteQueue::ReadFigures() const {
 }
 
 // Not ok: nothing of the group was written.
-Status WriteQueue::RunInTransaction(std::vector<Operation>& group, Ends& ends) {
+Status WriteQueue::RunInTransaction(Group group, Ends& ends) {
   try {
     const auto begin = std::chrono::steady_clock::now();
     const int changes_before = connection_->total_changes();
     connection_->Begin();
-    for (std::size_t i = 0; i < group.size(); ++i) {
-      Status& result = ends.results[i];
-      result = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
-      if (!connection_->is_in_transaction()) {  // SQLite gave the whole of it up
-        ends.gave_up = result.ok() ? std::nullopt : std::optional(i);
-        return WhyGivenUp(result);
-      }
-      if ((group[i].is_alone && !result.ok()) || connection_->must_be_rolled_back()) {
-        return GiveUp(group, result);
-      }
-    }
+    ATLAS_RETURN_IF_ERROR(RunAll(group, ends));
     if (Status status = guard_.status(); !status.ok()) {
       return RollBack(std::move(status));
     }
+    ATLAS_RETURN_IF_ERROR(WriteDeferred(group, ends));
     const std::uint64_t revision = options_.read_revision(*connection_);
     options_.look(*connection_);
     connection_->Commit();
@@ -189,14 +204,37 @@ Status WriteQueue::RunInTransaction(std::vector<Operation>& group, Ends& ends) {
   }
 }
 
-Status WriteQueue::GiveUp(const std::vector<Operation>& group, const Status& failure) {
-  if (group.size() == 1 && !failure.ok()) {
-    return RollBack(failure);
+// Not ok: the transaction is over.
+Status WriteQueue::RunAll(Group group, Ends& ends) {
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    Status& result = ends.results[i];
+    result = group[i].is_alone ? group[i].run(*connection_) : RunOne(group[i]);
+    if (!connection_->is_in_transaction()) {  // SQLite gave the whole of it up
+      ends.gave_up = result.ok() ? std::nullopt : std::optional(i);
+      return WhyGivenUp(result);
+    }
+    if (group[i].is_alone && !result.ok()) {
+      return RollBack(result);
+    }
+    if (connection_->must_be_rolled_back()) {
+      ends.spoiler = i;
+      return RollBack(result.ok() ? FailedWithin() : result);
+    }
   }
-  singles_ = options_.max_group;  // whoever asks again is told of its own write
-  return RollBack(
-      {StatusCode::kUnavailable,
-       "store: a write of this transaction failed after it had written much; try again"});
+  return {};
+}
+
+// What is damaged where one of them left a row for later is that one's.
+Status WriteQueue::WriteDeferred(Group group, Ends& ends) {
+  try {
+    connection_->WriteDeferred();
+    return {};
+  } catch (const std::exception& error) {
+    guard_.Note(error);
+    Status failure = StatusFromException(error);
+    if (!IsOfTheDisk(failure)) ends.spoiler = group.size();
+    return RollBack(std::move(failure));
+  }
 }
 
 Status WriteQueue::RollBack(Status failure) {
@@ -211,8 +249,8 @@ Status WriteQueue::RollBack(Status failure) {
 
 Status WriteQueue::RunOne(Operation& operation) {
   Status status;
+  connection_->Save();  // where that fails halfway, nothing can be gone back to
   try {
-    connection_->Save();
     status = operation.run(*connection_);
   } catch (const std::exception& error) {
     status = StatusFromException(error);

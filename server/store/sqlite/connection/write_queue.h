@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <thread>
 #include <vector>
 
@@ -42,7 +43,9 @@ class WriteQueue {
     };
   };
   struct Operation {
-    std::function<Status(Connection&)> run;     // in a savepoint, unless it is alone
+    // In a savepoint, unless it is alone. Once more, in another transaction, where the first was
+    // given up for what another of its group made of it.
+    std::function<Status(Connection&)> run;
     std::function<void(const Status&)> finish;  // after the commit; must not block
     // Before that: once all can see what it wrote, or it is certain that nobody will, and before
     // the revision tells of it; must not block, nor throw. May be empty.
@@ -73,20 +76,24 @@ class WriteQueue {
   bool Enqueue(Operation& operation, std::size_t max_queued);
   void Loop();
   std::vector<Operation> TakeGroup();
-  void RunGroup(std::vector<Operation>& group);
-  static void Settle(const std::vector<Operation>& group);
+  using Group = std::span<Operation>;
   // How each operation ended, and which of them is told so although nothing of its group is
   // written.
   struct Ends {
     std::vector<Status> results;
     std::optional<std::size_t> gave_up;
+    // The one that cannot be taken out alone of what the transaction has written; the group's size:
+    // it is not known which.
+    std::optional<std::size_t> spoiler;
   };
-  Status RunInTransaction(std::vector<Operation>& group, Ends& ends);
+  void RunGroup(Group group);
+  void RunInParts(Group group, std::size_t spoiler);
+  static void Settle(Group group);
+  Status RunInTransaction(Group group, Ends& ends);
+  Status RunAll(Group group, Ends& ends);
+  Status WriteDeferred(Group group, Ends& ends);
   void NoteRefusal(const Status& status);
   Status RollBack(Status failure);
-  // Nothing of `group` is written, for one of it, which ended as `failure`, cannot be taken out
-  // alone; or it ended well, and a statement of it did not.
-  Status GiveUp(const std::vector<Operation>& group, const Status& failure);
   Status RunOne(Operation& operation);
 
   std::unique_ptr<Connection> connection_;
@@ -94,7 +101,6 @@ class WriteQueue {
   SyncGuard& guard_;
   std::atomic<std::uint64_t> revision_;
   DurationHistogram commits_;
-  std::size_t singles_ = 0;  // so many get a transaction each, behind one that was given up
   mutable std::mutex mutex_;
   std::condition_variable has_work_;
   std::deque<Operation> queue_;

@@ -1,6 +1,7 @@
 #include "server/store/sqlite/transactions/keyframe_twins.h"
 
 #include <exception>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -88,16 +89,20 @@ class Settlement {
         is_moved = true;
       }
     }
-    if (!is_moved) {
-      return;
+    const auto footprint = is_moved ? FootprintOfYounger() : std::nullopt;
+    if (footprint) {
+      WriteFootprint(connection_, twins_.older, *footprint, LastChange(connection_, twins_.older));
     }
+  }
+
+  // None: it is damaged. Who checks keyframes finds that the older one lists other tiles than it
+  // touches.
+  std::optional<std::vector<TileId>> FootprintOfYounger() const {
     try {
-      WriteFootprint(connection_, twins_.older, ReadFootprint(connection_, twins_.younger),
-                     LastChange(connection_, twins_.older));
+      return ReadFootprint(connection_, twins_.younger);
     } catch (const std::exception& error) {
-      if (StatusFromException(error).code() != StatusCode::kInvalidData) {
-        throw;
-      }  // who checks keyframes finds that it lists other tiles than it touches
+      if (StatusFromException(error).code() != StatusCode::kInvalidData) throw;
+      return std::nullopt;
     }
   }
 
