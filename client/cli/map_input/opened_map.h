@@ -12,6 +12,8 @@
 
 namespace atlas {
 
+class AtlasFile;
+
 class OpenedMap {
  public:
   // Errors as of AtlasClient::Connect or AtlasFile::Open. kInvalidArgument: an earlier revision of
@@ -22,14 +24,18 @@ class OpenedMap {
   // Lives as long as the map.
   MapSource& source() const { return *source_; }
   const MapProfile& profile() const { return source_->profile(); }
+  // kNotFound where the map has no tile; the message says what to do. Else as of reading it.
+  Status CheckHasTiles() const;
   // From a daemon; of a file nothing is received.
   std::uint64_t bytes_received() const;
 
  private:
   OpenedMap(std::unique_ptr<AtlasClient> client, std::unique_ptr<MapSource> source);
+  explicit OpenedMap(std::unique_ptr<AtlasFile> file);
 
   std::unique_ptr<AtlasClient> client_;  // null: the source is a file
   std::unique_ptr<MapSource> source_;
+  AtlasFile* file_ = nullptr;  // the source, if it is one
 };
 
 }  // namespace atlas
