@@ -3,6 +3,7 @@
 #include <string>
 
 #include "client/cli/commands/drive/deskew_text.h"
+#include "client/cli/commands/drive/dropped_text.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
 #include "core/base/str_cat.h"
@@ -48,6 +49,7 @@ boost::json::object LocalizationJson(const DriveLocalizationReport& report,
       {"good_failures", report.good_failures},
       {"restarts", report.restarts},
       {"scans", report.scans},
+      {"dropped_returns", report.dropped_returns},
       {"shots", report.score.shots()},
       {"hz", Rounded(report.hz(), 2)},
       {"bytes_received", bytes_received}};
@@ -71,6 +73,7 @@ void PrintLocalization(const DriveLocalizationReport& report,
                                report.good_failures, " called good"));
   facts.Add("health",
             StrCat(report.good, " good, ", report.weak, " weak, ", score.lost(), " lost"));
+  AddDropped(report.dropped_returns, facts);
   if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
   facts.Add("speed", FixedText(report.hz(), 1) + " scans a CPU second");
   facts.Add("received", BytesText(bytes_received));
