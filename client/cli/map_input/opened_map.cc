@@ -69,6 +69,10 @@ Result<OpenedMap> OpenedMap::Open(const CommandContext& context,
   return OpenedMap(std::move(client), std::move(source));
 }
 
+AtlasKey OpenedMap::key() const {
+  return file_ == nullptr ? AtlasKey{client_->atlas().atlas_id, profile()} : file_->key();
+}
+
 Status OpenedMap::CheckHasTiles() const {
   return file_ == nullptr ? CheckDaemonsMap(*client_) : CheckFilesMap(*file_);
 }

@@ -71,7 +71,7 @@ class RenderCommand : public Command {
     if (!path_.empty()) {
       auto route = ReadRoute(path_);
       if (!route) return route.error();
-      options.route = *std::move(route);
+      options.route = std::move(route->waypoints);
     }
     std::vector<ContradictionPlace> contradictions;
     if (!contradictions_.empty()) {
