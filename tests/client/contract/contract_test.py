@@ -14,6 +14,7 @@ import threading
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
+import map_use_cases
 from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 
 KEYS = {
@@ -156,30 +157,6 @@ def track_cases(cases, work, drive):
         cases.report.equal(f"localize --mode {mode}: failures", found["failures"], 0)
     cases.run("localize", drive, "--max-range", "12", "--plot", f"{work}/track.png")
     cases.report.equal("track.png: a picture", pathlib.Path(work, "track.png").read_bytes()[:4], b"\x89PNG")
-
-
-def lost_cases(cases, work, drives):
-    """Where no scan is localized all is written, the exit code and stderr say it."""
-    astray = drives.copy("astray")
-    poses = [line.split() for line in drives.poses()]
-    for pose in poses:
-        pose[3] = str(float(pose[3]) + 1000.0)
-    (astray / "poses.txt").write_text("".join(" ".join(pose) + "\n" for pose in poses), encoding="ascii")
-    files = [pathlib.Path(work) / f"astray.{ending}" for ending in ("csv", "svg")]
-    line = ["localize", astray, "--max-range", "5", "--output", files[0], "--plot", files[1]]
-    for name, args, says in (("tracked", line, "--relocalize"),
-                             ("single shots", [*line[:4], "--perturb", "1,1", "--trials", "2"], "--perturb"),
-                             ("relocalized", [*line[:4], "--relocalize"], "of another place")):
-        done = cases.call(*args, "--json")
-        summary = json.loads(done.stdout.splitlines()[-1])
-        cases.report.equal(f"lost, {name}: exit code", done.returncode, 3)
-        cases.report.equal(f"lost, {name}: the last line", summary["type"], "summary")
-        cases.typed(f"lost, {name}", done.stderr, "not_found", says)
-        plain = cases.call(*args)
-        cases.report.check(f"lost, {name}: in words", plain.returncode == 3 and "scans" in plain.stdout and
-                           "none of 5 scans" in plain.stderr, plain)
-    for file in files:
-        cases.report.check(f"lost: {file.name} is written", file.exists())
 
 
 def contradiction_cases(cases, work, drive):
@@ -327,8 +304,8 @@ def main():
             content_cases(cases, found)
             stream_cases(cases, found, work)
             track_cases(cases, work, drives.good)
-            lost_cases(cases, work, drives)
             contradiction_cases(cases, work, drives.good)
+            map_use_cases.run(cases, drives, work)
             export_cases(cases, work)
             backup_cases(cases, work)
             unlabelled_case(cases, drives)

@@ -91,19 +91,23 @@ class LocalizeCommand : public Command {
               "--mode paper"};
     }
     ATLAS_RETURN_IF_ERROR(contradictions_.Check());
-    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off" ||
-                        track_.is_wanted())) {
+    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off")) {
       return {StatusCode::kInvalidArgument,
               "--relocalize takes no start and no track: without --perturb, --no-restart, --mode "
-              "paper, --deskew, --output and --plot"};
+              "paper and --deskew"};
     }
     if (perturbation_) {
       options_.shots = {perturbation_->translation_m,
                         perturbation_->rotation_deg * std::numbers::pi / 180.0,
                         trials_.value_or(10)};
     }
-    ATLAS_RETURN_IF_ERROR(track_.Check(!perturbation_));
+    ATLAS_RETURN_IF_ERROR(track_.Check(Kind()));
     return relocalize_ ? RelocalizationOptions().Validate() : options_.Validate();
+  }
+
+  LocalizationKind Kind() const {
+    if (relocalize_) return LocalizationKind::kRelocalized;
+    return perturbation_ ? LocalizationKind::kSingleShots : LocalizationKind::kTracked;
   }
 
   void PrintReport(const DriveLocalizationReport& report,
@@ -160,8 +164,10 @@ class LocalizeCommand : public Command {
     MapView view(source);
     const auto report = RelocalizeDrive(drive, options, view, [&](const RelocalizedScan& scan) {
       if (context.is_json) context.PrintJson(RelocalizedScanJson(scan));
+      if (track_.is_wanted()) track_.Add(scan);
     });
     if (!report) return report.error();
+    ATLAS_RETURN_IF_ERROR(track_.Write(Title(drive)));
     if (context.is_json) {
       context.PrintJson(RelocalizationJson(*report));
     } else {
