@@ -33,6 +33,13 @@ void ImageCanvas::Line(PlotPoint from, PlotPoint to, Rgb color, double width_px)
   }
 }
 
+void ImageCanvas::Box(PlotPoint upper_left, PlotPoint lower_right, Rgb color) {
+  const auto left = std::llround(upper_left.x_px);
+  const auto top = std::llround(upper_left.y_px);
+  Pen(image, color)
+      .Fill(left, top, std::llround(lower_right.x_px) - left, std::llround(lower_right.y_px) - top);
+}
+
 void ImageCanvas::Text(PlotPoint at, std::string_view text, Rgb color, TextAnchor anchor) {
   const std::int64_t length_px = Length_px(text);
   std::int64_t x = std::llround(at.x_px);

@@ -4,6 +4,7 @@
 #include <limits>
 #include <numbers>
 
+#include "client/cli/commands/drive/health_strip.h"
 #include "client/cli/files/whole_file.h"
 #include "client/drive/relocalization_file.h"
 #include "client/render/image.h"
@@ -48,6 +49,7 @@ LinePlot PlotOf(const std::vector<LocalizedScan>& scans, const std::string& titl
        {CurveOf("yaw", kBlue, scans,
                 [](const Scan& scan) { return scan.offset.yaw_rad * kDegrees; })}},
       {"fit", {CurveOf("fit", kViolet, scans, [](const Scan& scan) { return scan.located.fit; })}}};
+  plot.strip = HealthStrip(scans);
   for (const Scan& scan : scans) {
     if (scan.is_after_jump) plot.marks.push_back(scan.scan);
     if (scan.is_failure) plot.flags.push_back(scan.scan);
