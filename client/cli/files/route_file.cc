@@ -10,7 +10,6 @@
 
 #include "client/cli/files/whole_file.h"
 #include "client/cli/output/text_table.h"
-#include "core/base/bytes.h"
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -79,12 +78,12 @@ std::optional<RouteFile> ParseCsv(const std::string& text) {
 
 }  // namespace
 
-RouteAtlas RouteAtlasOf(const AtlasKey& atlas) {
+RouteAtlas RouteAtlasOf(ByteSpan atlas_id, const MapProfile& profile) {
   ByteWriter hash;
-  hash.U64(atlas.profile.Hash());
+  hash.U64(profile.Hash());
   Bytes bytes = hash.Take();
   std::reverse(bytes.begin(), bytes.end());  // as a number is written
-  return {HexText(atlas.atlas_id), HexText(bytes)};
+  return {HexText(atlas_id), HexText(bytes)};
 }
 
 boost::json::object RouteAtlasJson(const RouteAtlas& atlas) {

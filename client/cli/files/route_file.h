@@ -9,8 +9,9 @@
 #include <Eigen/Core>
 #include <boost/json/object.hpp>
 
-#include "client/vehicle/atlas_folder.h"
+#include "core/base/bytes.h"
 #include "core/base/status.h"
+#include "core/geometry/map_profile.h"
 
 namespace atlas {
 
@@ -21,7 +22,7 @@ struct RouteAtlas {
 
   friend bool operator==(const RouteAtlas&, const RouteAtlas&) = default;
 };
-RouteAtlas RouteAtlasOf(const AtlasKey& atlas);
+RouteAtlas RouteAtlasOf(ByteSpan atlas_id, const MapProfile& profile);
 boost::json::object RouteAtlasJson(const RouteAtlas& atlas);
 
 struct RouteFile {

@@ -69,8 +69,8 @@ Result<OpenedMap> OpenedMap::Open(const CommandContext& context,
   return OpenedMap(std::move(client), std::move(source));
 }
 
-AtlasKey OpenedMap::key() const {
-  return file_ == nullptr ? AtlasKey{client_->atlas().atlas_id, profile()} : file_->key();
+const Bytes& OpenedMap::atlas_id() const {
+  return file_ == nullptr ? client_->atlas().atlas_id : file_->key().atlas_id;
 }
 
 Status OpenedMap::CheckHasTiles() const {

@@ -8,7 +8,7 @@
 #include "client/cli/command_line/command.h"
 #include "client/connection/atlas_client.h"
 #include "client/map/map_source.h"
-#include "client/vehicle/atlas_folder.h"
+#include "core/base/bytes.h"
 #include "core/base/status.h"
 
 namespace atlas {
@@ -25,8 +25,8 @@ class OpenedMap {
   // Lives as long as the map.
   MapSource& source() const { return *source_; }
   const MapProfile& profile() const { return source_->profile(); }
-  // Which atlas it is of.
-  AtlasKey key() const;
+  // Of the atlas that it is of.
+  const Bytes& atlas_id() const;
   // kNotFound where the map has no tile; the message says what to do. Else as of reading it.
   Status CheckHasTiles() const;
   // From a daemon; of a file nothing is received.

@@ -139,7 +139,9 @@ class PlanCommand : public Command {
       route = Route();
     }
     if (!file_.empty() && route->found) {
-      const std::string text = RouteText(*route, format, map->key());
+      const std::string text =
+          RouteText(*route, format, RouteAtlasOf(map->atlas_id(), map->profile()),
+                    map->profile().cell_size_m());
       ATLAS_RETURN_IF_ERROR(WriteWholeFile(file_, Bytes(text.begin(), text.end())));
     }
     if (context.is_json) {

@@ -95,7 +95,7 @@ class RenderCommand : public Command {
     if (!picture) return picture.error();
     std::optional<RouteCheck> route;
     if (!path_.empty()) {
-      route = CheckOf(path_, planned_in, map->key(), ground);
+      route = CheckOf(path_, planned_in, RouteAtlasOf(map->atlas_id(), map->profile()), ground);
       ATLAS_RETURN_IF_ERROR(NoteRoute(*route, context.err));
     }
     ATLAS_RETURN_IF_ERROR(WritePng(picture->image, file_));

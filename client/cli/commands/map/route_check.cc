@@ -7,10 +7,10 @@ namespace atlas {
 
 RouteCheck CheckOf(const std::string& file,
                    const std::optional<RouteAtlas>& planned_in,
-                   const AtlasKey& drawn_in,
+                   const RouteAtlas& drawn_in,
                    const RouteGround& ground) {
   RouteCheck check{file, std::nullopt, ground.points(), ground.on_tiles(), ground.on_surfaces()};
-  if (planned_in) check.is_of_atlas = *planned_in == RouteAtlasOf(drawn_in);
+  if (planned_in) check.is_of_atlas = *planned_in == drawn_in;
   return check;
 }
 

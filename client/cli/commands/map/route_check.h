@@ -9,7 +9,6 @@
 
 #include "client/cli/files/route_file.h"
 #include "client/map/route_ground.h"
-#include "client/vehicle/atlas_folder.h"
 #include "core/base/status.h"
 
 namespace atlas {
@@ -24,7 +23,7 @@ struct RouteCheck {
 
 RouteCheck CheckOf(const std::string& file,
                    const std::optional<RouteAtlas>& planned_in,
-                   const AtlasKey& drawn_in,
+                   const RouteAtlas& drawn_in,
                    const RouteGround& ground);
 
 // kConflict where no point lies on a tile. What else is odd is noted on `err`.

@@ -7,7 +7,6 @@
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 
-#include "client/cli/files/route_file.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
 #include "core/base/str_cat.h"
@@ -38,7 +37,7 @@ boost::json::object Properties(const Route& route, double cell_m) {
   return properties;
 }
 
-std::string GeoJson(const Route& route, const AtlasKey& atlas) {
+std::string GeoJson(const Route& route, const RouteAtlas& atlas, double cell_m) {
   boost::json::array line;
   for (const Eigen::Vector3d& p : route.waypoints) {
     line.push_back(Position(p));
@@ -51,9 +50,9 @@ std::string GeoJson(const Route& route, const AtlasKey& atlas) {
     geometry = boost::json::object{{"type", "LineString"}, {"coordinates", std::move(line)}};
   }
   const boost::json::object feature{{"type", "Feature"},
-                                    {"atlas", RouteAtlasJson(RouteAtlasOf(atlas))},
+                                    {"atlas", RouteAtlasJson(atlas)},
                                     {"geometry", std::move(geometry)},
-                                    {"properties", Properties(route, atlas.profile.cell_size_m())}};
+                                    {"properties", Properties(route, cell_m)}};
   return JsonText(feature) + "\n";
 }
 
@@ -87,9 +86,11 @@ Result<RouteFormat> RouteFormatOf(const std::string& file) {
                StrCat("route file '", file, "': expected a name in .geojson, .json or .csv"));
 }
 
-std::string RouteText(const Route& route, RouteFormat format, const AtlasKey& atlas) {
-  return format == RouteFormat::kGeoJson ? GeoJson(route, atlas)
-                                         : Csv(route, atlas.profile.cell_size_m());
+std::string RouteText(const Route& route,
+                      RouteFormat format,
+                      const RouteAtlas& atlas,
+                      double cell_m) {
+  return format == RouteFormat::kGeoJson ? GeoJson(route, atlas, cell_m) : Csv(route, cell_m);
 }
 
 boost::json::object RouteEndJson(const RouteEnd& end) {

@@ -5,7 +5,7 @@
 
 #include <boost/json/object.hpp>
 
-#include "client/vehicle/atlas_folder.h"
+#include "client/cli/files/route_file.h"
 #include "core/base/status.h"
 #include "core/planning/plan_route.h"
 
@@ -20,9 +20,12 @@ Result<RouteFormat> RouteFormatOf(const std::string& file);
 // latitude, with the route's figures and each point's clearance and slope as its properties;
 // without a geometry when no route was found; `atlas`, beside them, names the atlas that it was
 // planned in. kCsv: a line a waypoint, x_m,y_m,z_m,along_m,clearance_m,slope_deg. Ends that were
-// moved by more than half a cell are `start` and `goal` of the properties, or lines before the
-// first that begin with #.
-std::string RouteText(const Route& route, RouteFormat format, const AtlasKey& atlas);
+// moved by more than half a cell (`cell_m`) are `start` and `goal` of the properties, or lines
+// before the first that begin with #.
+std::string RouteText(const Route& route,
+                      RouteFormat format,
+                      const RouteAtlas& atlas,
+                      double cell_m);
 
 // asked, at, aside_m, above_m, layer, layers.
 boost::json::object RouteEndJson(const RouteEnd& end);

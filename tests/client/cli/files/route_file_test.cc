@@ -25,7 +25,6 @@ class RouteFileTest : public ::testing::Test {
     route_.slope_deg = {0.0, 3.5, 24.0};
     route_.start = RouteEnd{{1.5, -2.25, 0.125}, {1.5, -2.25, 0.125}, 0, 1};
     route_.goal = RouteEnd{{1e6, 2.0, -2.0}, {1e6, 3.0, -4.0}, 1, 3};
-    atlas_.atlas_id = Bytes(16, 0xAB);
   }
   ~RouteFileTest() override { std::filesystem::remove_all(folder_); }
 
@@ -35,11 +34,15 @@ class RouteFileTest : public ::testing::Test {
     return folder_ / name;
   }
 
-  std::string Text(RouteFormat format) const { return RouteText(route_, format, atlas_); }
+  std::string Text(RouteFormat format) const {
+    return RouteText(route_, format, atlas_, profile_.cell_size_m());
+  }
 
   std::filesystem::path folder_;
   Route route_;
-  AtlasKey atlas_;
+  Bytes atlas_id_ = Bytes(16, 0xAB);
+  MapProfile profile_;
+  RouteAtlas atlas_ = RouteAtlasOf(atlas_id_, profile_);
 };
 
 TEST_F(RouteFileTest, BothFormatsAreReadAsTheyWereWritten) {
@@ -74,12 +77,12 @@ TEST_F(RouteFileTest, EndsThatWereMovedSaySoAndOthersDoNot) {
 TEST_F(RouteFileTest, GeoJsonNamesItsAtlas) {
   const auto read = ReadRoute(Write("a.geojson", Text(RouteFormat::kGeoJson)));
   ASSERT_TRUE(read && read->atlas);
-  EXPECT_EQ(*read->atlas, RouteAtlasOf(atlas_));
+  EXPECT_EQ(*read->atlas, atlas_);
   EXPECT_EQ(read->atlas->id, "abababababababababababababababab");
   EXPECT_EQ(read->atlas->profile.size(), 16U);
-  AtlasKey coarser = atlas_;
-  coarser.profile.cell_size_um *= 2;
-  EXPECT_NE(*read->atlas, RouteAtlasOf(coarser));
+  MapProfile coarser = profile_;
+  coarser.cell_size_um *= 2;
+  EXPECT_NE(*read->atlas, RouteAtlasOf(atlas_id_, coarser));
   EXPECT_FALSE(ReadRoute(Write("a.csv", Text(RouteFormat::kCsv)))->atlas);
   // What others put there is theirs.
   for (const std::string other : {"7", "{}", R"({"id":7,"profile":"x"})", R"({"id":"x"})"}) {
