@@ -204,7 +204,7 @@ void DrawStrip(const PlotStrip& strip, const Span& x, PlotCanvas& canvas) {
   }
 }
 
-double StripHeight_px(const LinePlot& plot) {
+double StripPixels(const LinePlot& plot) {
   return plot.strip.states.empty() ? 0.0 : kStrip_px;
 }
 
@@ -221,8 +221,8 @@ void DrawNames(const LinePlot& plot, double height_px, PlotCanvas& canvas) {
   }
 }
 
-double Height_px(const LinePlot& plot) {
-  return kTop_px + StripHeight_px(plot) + kPanel_px * static_cast<double>(plot.panels.size()) +
+double HeightPixels(const LinePlot& plot) {
+  return kTop_px + StripPixels(plot) + kPanel_px * static_cast<double>(plot.panels.size()) +
          kFoot_px;
 }
 
@@ -231,26 +231,26 @@ void Draw(const LinePlot& plot, PlotCanvas& canvas) {
   if (!plot.strip.states.empty()) DrawStrip(plot.strip, x, canvas);
   for (std::size_t i = 0; i < plot.panels.size(); ++i) {
     const double top_px =
-        kTop_px + StripHeight_px(plot) + kPanel_px * static_cast<double>(i) + kGap_px;
+        kTop_px + StripPixels(plot) + kPanel_px * static_cast<double>(i) + kGap_px;
     const PanelArea area(x, SpanOfY(plot.panels[i]), top_px);
     DrawGrid(area, i + 1 == plot.panels.size(), canvas);
     DrawPanel(area, plot, plot.panels[i], canvas);
   }
-  DrawNames(plot, Height_px(plot), canvas);
+  DrawNames(plot, HeightPixels(plot), canvas);
 }
 
 }  // namespace
 
 Image DrawPlot(const LinePlot& plot) {
   ImageCanvas canvas(static_cast<std::uint32_t>(kWidth_px),
-                     static_cast<std::uint32_t>(Height_px(plot)));
+                     static_cast<std::uint32_t>(HeightPixels(plot)));
   Draw(plot, canvas);
   return std::move(canvas.image);
 }
 
 std::string PlotSvg(const LinePlot& plot) {
   SvgCanvas canvas(static_cast<std::uint32_t>(kWidth_px),
-                   static_cast<std::uint32_t>(Height_px(plot)));
+                   static_cast<std::uint32_t>(HeightPixels(plot)));
   Draw(plot, canvas);
   return canvas.svg();
 }
