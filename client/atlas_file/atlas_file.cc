@@ -71,6 +71,16 @@ std::uint64_t AtlasFile::dirty_tiles() const {
   return snapshot_->state().dirty_tiles;
 }
 
+Result<bool> AtlasFile::HasTiles() {
+  bool has_tiles = false;
+  const Status status = List(0, Everywhere(), [&has_tiles](const TileFacts&) {
+    has_tiles = true;
+    return Status(StatusCode::kConflict, "one is enough");
+  });
+  if (!has_tiles && !status.ok()) return Error(status);
+  return has_tiles;
+}
+
 Status AtlasFile::ReadLevel(std::uint8_t level,
                             const std::optional<DiscArea>& disc,
                             const OnTile& on_tile) {

@@ -42,6 +42,8 @@ class AtlasFile final : public MapSource {
   // yet.
   std::uint64_t dirty_tiles() const;
 
+  // Whether there is a tile at all, damaged or not.
+  Result<bool> HasTiles();
   // In the order of the tiles' keys. kInvalidData names a damaged tile.
   Status ReadLevel(std::uint8_t level,
                    const std::optional<DiscArea>& disc,

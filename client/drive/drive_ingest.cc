@@ -180,6 +180,7 @@ class Ingest {
       const DriveScan& scan = drive_.scans[selected.index];
       const auto cloud = ReadScan(scan.scan);
       if (!cloud) return cloud.error();
+      report_.dropped_returns += cloud->dropped.size();
       report_.empty_scans += SeesNothing(*cloud) ? 1U : 0U;
       if (const auto time_ms = TimeOf(scan); !time_ms) return time_ms.error();
     }

@@ -45,9 +45,10 @@ struct IngestOptions {
 };
 
 struct IngestReport {
-  std::uint64_t keyframes = 0;    // selected
-  std::uint64_t empty_scans = 0;  // of those: without a return from beyond the vehicle
-  std::uint64_t positions = 0;    // of those: with a position from elsewhere
+  std::uint64_t keyframes = 0;        // selected
+  std::uint64_t empty_scans = 0;      // of those: without a return from beyond the vehicle
+  std::uint64_t dropped_returns = 0;  // of those: entries without one (scan_reader.h)
+  std::uint64_t positions = 0;        // of those: with a position from elsewhere
   LastingUploadReport upload;
   double metres = 0.0;
   double frontend_s = 0.0;  // CPU time from scan to blob

@@ -30,6 +30,7 @@ class DriveLocalization {
         NoteUnreadable(scan, cloud.error());
         continue;
       }
+      report_.dropped_returns += cloud->dropped.size();
       const bool is_start = last_part != selected.session_part;
       const Status status = options_.shots ? Shoot(scan, *cloud)
                                            : Track(scan, *cloud, is_start, last_part.has_value());

@@ -80,6 +80,7 @@ struct DriveLocalizationReport {
   std::uint64_t good_failures = 0;
   std::vector<UnreadableScan> unreadable;  // damaged, while tracking: lost there, and it goes on
   std::uint64_t restarts = 0;              // after jumps
+  std::uint64_t dropped_returns = 0;       // entries without one (scan_reader.h)
   double cpu_s = 0.0;                      // segmentation and tiles included
   DeskewDecision deskewing;
 

@@ -27,6 +27,19 @@ RelocalizerOptions RelocalizerOptionsFor(const DriveRelocalizationOptions& optio
   return result;
 }
 
+RelocalizedScan Judged(const DriveScan& scan,
+                       Relocalization found,
+                       const Eigen::Quaterniond& R_level_sensor) {
+  RelocalizedScan result{scan.number, scan.time_s, std::move(found), {}, {}};
+  if (!result.found.places.empty()) {
+    Pose pose = result.found.places.front().registration.T_world_level;
+    pose.linear() *= R_level_sensor.toRotationMatrix();
+    result.error = ErrorOf(pose, scan.T_world_sensor);
+    result.offset = OffsetOf(pose, scan.T_world_sensor);
+  }
+  return result;
+}
+
 }  // namespace
 
 Status DriveRelocalizationOptions::Validate() const {
@@ -60,6 +73,7 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
     const DriveScan& scan = drive.scans[selected.index];
     const Result<PointCloud> cloud = ReadScan(scan.scan);
     if (!cloud) return Error(cloud.error());
+    report.dropped_returns += cloud->dropped.size();
     const TrialSeed seed{options.seed, scan.number, 0};
     const Eigen::Quaterniond R_level_sensor =
         DisturbedLevel(scan.T_world_sensor, options.tilt_error_rad, seed);
@@ -76,12 +90,7 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
     auto found = relocalizer.Find(leveled, R_level_sensor, prior);
     const double cpu_s = timer.elapsed_s();
     if (!found) return Error(found.error().WithContext(StrCat("scan ", scan.number)));
-    RelocalizedScan result{scan.number, *std::move(found), {}};
-    if (!result.found.places.empty()) {
-      Pose pose = result.found.places[0].registration.T_world_level;
-      pose.linear() *= R_level_sensor.toRotationMatrix();
-      result.error = ErrorOf(pose, scan.T_world_sensor);
-    }
+    const RelocalizedScan result = Judged(scan, *std::move(found), R_level_sensor);
     report.cpu_s += cpu_s;
     report.worst_cpu_s = std::max(report.worst_cpu_s, cpu_s);
     ++report.scans;

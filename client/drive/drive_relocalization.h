@@ -11,6 +11,7 @@
 #include "client/drive/drive_selection.h"
 #include "client/map/map_view.h"
 #include "client/score/localization_score.h"
+#include "client/score/pose_offset.h"
 #include "core/base/status.h"
 #include "core/localization/relocalizer.h"
 #include "core/scan/drive_folder.h"
@@ -31,19 +32,23 @@ struct DriveRelocalizationOptions {
 
 struct RelocalizedScan {
   std::uint32_t scan = 0;
+  std::optional<double> time_s;  // where the drive says it
   Relocalization found;
-  PoseError error;  // of what was found, or would have been
+  // Of what was found, or would have been; nothing where there is no place at all.
+  PoseError error;
+  PoseOffset offset;
 };
 
 struct DriveRelocalizationReport {
   std::uint64_t scans = 0;
-  std::uint64_t right = 0;    // found within kRight_m
-  std::uint64_t wrong = 0;    // found elsewhere
-  std::uint64_t unknown = 0;  // "don't know"
-  std::size_t places = 0;     // of the map
-  double cpu_s = 0.0;         // of all scans, segmentation and tiles included
-  double worst_cpu_s = 0.0;   // of one
-  LocalizationScore score;    // of those found
+  std::uint64_t right = 0;            // found within kRight_m
+  std::uint64_t wrong = 0;            // found elsewhere
+  std::uint64_t unknown = 0;          // "don't know"
+  std::size_t places = 0;             // of the map
+  std::uint64_t dropped_returns = 0;  // entries without one (scan_reader.h)
+  double cpu_s = 0.0;                 // of all scans, segmentation and tiles included
+  double worst_cpu_s = 0.0;           // of one
+  LocalizationScore score;            // of those found
 
   static constexpr double kRight_m = 0.5;
 };

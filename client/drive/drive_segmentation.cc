@@ -57,6 +57,7 @@ Status SegmentOne(const DriveScan& scan,
   const std::vector<std::uint8_t> is_ground = segmenter.Segment(image, up_sensor);
   report.cpu_s += timer.elapsed_s();
   ++report.scans;
+  report.dropped += cloud->dropped.size();
   for (std::size_t i = 0; i < image.size(); ++i) {
     ++(is_ground[i] != 0 ? report.ground : report.obstacle);
   }

@@ -25,6 +25,7 @@ struct DriveSegmentationReport {
   std::uint64_t scans = 0;
   std::uint64_t ground = 0;  // returns
   std::uint64_t obstacle = 0;
+  std::uint64_t dropped = 0;  // entries without a return (scan_reader.h)
   double cpu_s = 0.0;
 
   double ms_per_scan() const { return scans == 0 ? 0.0 : 1e3 * cpu_s / static_cast<double>(scans); }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -30,6 +31,24 @@ Status CheckRequest(const MapProfile& profile, const PlanRequest& request) {
   ATLAS_RETURN_IF_ERROR(request.options.Validate(profile));
   ATLAS_RETURN_IF_ERROR(CheckPoint("start", request.from));
   return CheckPoint("goal", request.to);
+}
+
+std::optional<RouteEnd> EndAt(const SurfaceTiles& tiles,
+                              const NodeRef& ref,
+                              const Eigen::Vector3d& asked) {
+  if (ref.is_none()) {
+    return std::nullopt;
+  }
+  const SurfaceTile& tile = tiles.tile(ref.slot);
+  const SurfaceNode& node = tiles.node(ref);
+  RouteEnd end;
+  end.asked = asked;
+  end.at = {(static_cast<double>(tiles.CellX(ref)) + 0.5) * tiles.cell_m(),
+            (static_cast<double>(tiles.CellY(ref)) + 0.5) * tiles.cell_m(),
+            1e-3 * node.altitude_mm};
+  end.layer = ref.node - tile.cell_begin[node.cell];
+  end.layers = tile.Nodes(node.cell).size();
+  return end;
 }
 
 // Drops points between kept ones, as long as those stay near each other and within one step. The
@@ -87,6 +106,8 @@ Result<Route> PlanRoute(TileSource& tiles, const MapProfile& profile, const Plan
     return Error(goal.error());
   }
   Route route;
+  route.start = EndAt(map.tiles(), *start, request.from);
+  route.goal = EndAt(map.tiles(), *goal, request.to);
   if (!start->is_none() && !goal->is_none()) {
     RouteSearch search(tiles, profile, request.options, budget, map);
     const auto way = search.Run(*start, *goal);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,8 +24,27 @@ struct PlanRequest {
   std::function<double()> now_s = {};
 };
 
+// Where an end of a route stands: on the surface, in the middle of a cell. World frame.
+struct RouteEnd {
+  Eigen::Vector3d asked = Eigen::Vector3d::Zero();  // the point that was given
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  std::size_t layer = 0;  // of the cell, 0 is the lowest
+  std::size_t layers = 0;
+
+  double aside_m() const { return (at - asked).head<2>().norm(); }
+  double above_m() const { return at.z() - asked.z(); }  // negative: below the point
+  // To another cell, or up or down by more than half a cell's side.
+  bool IsMoved(double cell_m) const {
+    return (at - asked).cwiseAbs().maxCoeff() > 0.5 * cell_m + 1e-9;
+  }
+};
+
 struct Route {
   bool found = false;
+  // Known whether a route is found or not; none where something is traversable near the point, but
+  // nowhere this vehicle may stand.
+  std::optional<RouteEnd> start;
+  std::optional<RouteEnd> goal;
   double length_m = 0.0;                   // along the waypoints
   double cost = 0.0;                       // metres, weighted by how close obstacles are
   double searched_cost = 0.0;              // before the way was straightened: no less

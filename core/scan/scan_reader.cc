@@ -14,8 +14,25 @@ constexpr std::size_t kPointBytes = 16;
 constexpr std::size_t kMaxScanBytes = 64u << 20;  // 4 million returns
 constexpr float kMaxCoordinate_m = 1000.0F;
 
-bool IsPlausible(float value) {
-  return std::isfinite(value) && std::abs(value) <= kMaxCoordinate_m;
+bool IsNear(const Eigen::Vector3f& p) {
+  return p.cwiseAbs().maxCoeff() <= kMaxCoordinate_m;
+}
+
+// Without those of entries that are no returns.
+std::vector<std::uint32_t> LabelsOfReturns(ByteSpan bytes, const PointCloud& cloud) {
+  std::vector<std::uint32_t> labels;
+  labels.reserve(cloud.size());
+  ByteReader in(bytes);
+  auto dropped = cloud.dropped.begin();
+  for (std::uint32_t i = 0; in.remaining() > 0; ++i) {
+    const std::uint32_t label = in.U32();
+    if (dropped != cloud.dropped.end() && *dropped == i) {
+      ++dropped;
+    } else {
+      labels.push_back(label);
+    }
+  }
+  return labels;
 }
 
 Status FileError(const std::filesystem::path& path, const std::error_code& error) {
@@ -60,17 +77,24 @@ Result<PointCloud> ParseScan(ByteSpan bytes) {
   PointCloud cloud;
   cloud.points.reserve(bytes.size() / kPointBytes);
   ByteReader in(bytes);
-  while (in.remaining() > 0) {
-    const auto x = std::bit_cast<float>(in.U32());
-    const auto y = std::bit_cast<float>(in.U32());
-    const auto z = std::bit_cast<float>(in.U32());
+  for (std::uint32_t i = 0; in.remaining() > 0; ++i) {
+    Eigen::Vector3f p;
+    for (float& coordinate : p) coordinate = std::bit_cast<float>(in.U32());
     in.U32();  // intensity
-    if (!IsPlausible(x) || !IsPlausible(y) || !IsPlausible(z)) {
-      return Error(StatusCode::kInvalidData,
-                   StrCat("return ", cloud.size(), " at (", x, ", ", y, ", ", z,
-                          ") m: expected finite coordinates within 1000 m"));
+    if (!p.allFinite()) {
+      cloud.dropped.push_back(i);
+      continue;
     }
-    cloud.points.emplace_back(x, y, z);
+    if (!IsNear(p)) {
+      return Error(StatusCode::kInvalidData, StrCat("return ", i, " at (", p.x(), ", ", p.y(), ", ",
+                                                    p.z(), ") m: expected it within 1000 m"));
+    }
+    cloud.points.push_back(p);
+  }
+  if (cloud.points.empty()) {
+    return Error(StatusCode::kInvalidData,
+                 StrCat("the scan has no return: none of its ", cloud.dropped.size(),
+                        " entries has finite coordinates"));
   }
   return cloud;
 }
@@ -90,16 +114,12 @@ Result<std::vector<std::uint32_t>> ReadLabels(const std::filesystem::path& path,
   if (!bytes) {
     return Error(bytes.error());
   }
-  if (bytes->size() != 4 * cloud.size()) {
+  const std::size_t entries = cloud.size() + cloud.dropped.size();
+  if (bytes->size() != 4 * entries) {
     return Error(StatusCode::kInvalidData, StrCat(path.string(), ": ", bytes->size(), " bytes for ",
-                                                  cloud.size(), " returns, expected 4 each"));
+                                                  entries, " returns, expected 4 each"));
   }
-  std::vector<std::uint32_t> labels(cloud.size());
-  ByteReader in(*bytes);
-  for (std::uint32_t& label : labels) {
-    label = in.U32();
-  }
-  return labels;
+  return LabelsOfReturns(*bytes, cloud);
 }
 
 }  // namespace atlas

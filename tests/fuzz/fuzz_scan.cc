@@ -1,4 +1,5 @@
 // Scan files and what a vehicle makes of them, up to the keyframe that it uploads.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -35,7 +36,11 @@ Bytes GroundScan(int columns) {
 }
 
 std::vector<Bytes> Seeds() {
-  return {GroundScan(24), GroundScan(90), Bytes(kPointBytes, 0)};
+  Bytes with_gaps = GroundScan(90);
+  for (std::size_t i = 0; i + 3 < with_gaps.size(); i += 7 * kPointBytes) {
+    std::fill_n(with_gaps.begin() + static_cast<std::ptrdiff_t>(i), 4, std::uint8_t{0xFF});  // NaN
+  }
+  return {GroundScan(24), GroundScan(90), with_gaps, Bytes(kPointBytes, 0)};
 }
 
 const KeyframeBuilder& Builder() {
@@ -56,6 +61,11 @@ bool Run(ByteSpan bytes) {
   if (!cloud) {
     return false;
   }
+  for (const Eigen::Vector3f& p : cloud->points) {
+    Require(p.allFinite(), "what is no return is dropped");
+  }
+  Require(cloud->size() > 0 && cloud->size() + cloud->dropped.size() == bytes.size() / kPointBytes,
+          "every entry is a return or dropped");
   SensorLayoutEstimator estimator;
   estimator.Add(*cloud);
   const auto layout = estimator.Estimate();

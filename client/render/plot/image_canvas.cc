@@ -10,7 +10,7 @@ namespace {
 constexpr Rgb kPaper{255, 255, 255};
 constexpr std::int64_t kDot_px = 2;
 
-std::int64_t Length_px(std::string_view text) {
+std::int64_t TextPixels(std::string_view text) {
   return static_cast<std::int64_t>(text.size()) * Pen::kLetterWidth_dots * kDot_px;
 }
 
@@ -33,8 +33,15 @@ void ImageCanvas::Line(PlotPoint from, PlotPoint to, Rgb color, double width_px)
   }
 }
 
+void ImageCanvas::Box(PlotPoint upper_left, PlotPoint lower_right, Rgb color) {
+  const auto left = std::llround(upper_left.x_px);
+  const auto top = std::llround(upper_left.y_px);
+  Pen(image, color)
+      .Fill(left, top, std::llround(lower_right.x_px) - left, std::llround(lower_right.y_px) - top);
+}
+
 void ImageCanvas::Text(PlotPoint at, std::string_view text, Rgb color, TextAnchor anchor) {
-  const std::int64_t length_px = Length_px(text);
+  const std::int64_t length_px = TextPixels(text);
   std::int64_t x = std::llround(at.x_px);
   if (anchor == TextAnchor::kMiddle) x -= length_px / 2;
   if (anchor == TextAnchor::kRight) x -= length_px;
@@ -45,7 +52,7 @@ void ImageCanvas::Text(PlotPoint at, std::string_view text, Rgb color, TextAncho
 void ImageCanvas::UprightText(PlotPoint at, std::string_view text, Rgb color) {
   Pen(image, color)
       .WriteUpwards(text, std::llround(at.x_px) - Pen::kLetterHeight_dots * kDot_px / 2,
-                    std::llround(at.y_px) + Length_px(text) / 2, kDot_px);
+                    std::llround(at.y_px) + TextPixels(text) / 2, kDot_px);
 }
 
 }  // namespace atlas

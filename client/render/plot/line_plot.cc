@@ -25,6 +25,12 @@ constexpr double kTop_px = 30.0;
 constexpr double kFoot_px = 46.0;
 constexpr double kFlag_px = 7.0;
 
+constexpr double kStrip_px = 48.0;
+constexpr double kBar_px = 18.0;      // of that, the bars themselves
+constexpr double kThinnest_px = 2.0;  // a single scan of a long drive is seen
+
+constexpr double kLetter_px = 8.0;
+
 struct Span {
   double low = 0.0;
   double high = 1.0;
@@ -168,11 +174,38 @@ void DrawPanel(const PanelArea& area,
   canvas.UprightText({14.0, 0.5 * (area.top_px() + area.bottom_px())}, panel.label, kInk);
   double x_px = kLeft_px;
   for (const PlotCurve& curve : panel.curves) {
-    constexpr double kLetter_px = 8.0;
     canvas.Line({x_px, area.top_px() - 9.0}, {x_px + 16.0, area.top_px() - 9.0}, curve.color, 3.0);
     canvas.Text({x_px + 22.0, area.top_px() - 9.0}, curve.name, kInk, TextAnchor::kLeft);
     x_px += 40.0 + kLetter_px * static_cast<double>(curve.name.size());
   }
+}
+
+// The better states first, so that the worse ones are seen.
+void DrawStrip(const PlotStrip& strip, const Span& x, PlotCanvas& canvas) {
+  const PanelArea area(x, {}, 0.0);
+  const double top_px = kTop_px + kStrip_px - kBar_px;
+  const double foot_px = kTop_px + kStrip_px;
+  for (std::size_t state = 0; state < strip.states.size(); ++state) {
+    const double share = static_cast<double>(state + 1) / static_cast<double>(strip.states.size());
+    for (const PlotStrip::Part& part : strip.parts) {
+      if (part.state != state || part.to < x.low || part.from > x.high) continue;
+      const double left_px = area.X(std::max(part.from, x.low));
+      const double right_px = std::max(area.X(std::min(part.to, x.high)), left_px + kThinnest_px);
+      canvas.Box({left_px, foot_px - share * kBar_px}, {right_px, foot_px},
+                 strip.states[state].color);
+    }
+  }
+  canvas.Text({kLeft_px - 8.0, 0.5 * (top_px + foot_px)}, strip.name, kInk, TextAnchor::kRight);
+  double legend_px = kLeft_px;
+  for (const PlotStrip::State& state : strip.states) {
+    canvas.Box({legend_px, top_px - 14.0}, {legend_px + 16.0, top_px - 4.0}, state.color);
+    canvas.Text({legend_px + 22.0, top_px - 9.0}, state.name, kInk, TextAnchor::kLeft);
+    legend_px += 40.0 + kLetter_px * static_cast<double>(state.name.size());
+  }
+}
+
+double StripPixels(const LinePlot& plot) {
+  return plot.strip.states.empty() ? 0.0 : kStrip_px;
 }
 
 void DrawNames(const LinePlot& plot, double height_px, PlotCanvas& canvas) {
@@ -188,33 +221,36 @@ void DrawNames(const LinePlot& plot, double height_px, PlotCanvas& canvas) {
   }
 }
 
-double Height_px(const LinePlot& plot) {
-  return kTop_px + kPanel_px * static_cast<double>(plot.panels.size()) + kFoot_px;
+double HeightPixels(const LinePlot& plot) {
+  return kTop_px + StripPixels(plot) + kPanel_px * static_cast<double>(plot.panels.size()) +
+         kFoot_px;
 }
 
 void Draw(const LinePlot& plot, PlotCanvas& canvas) {
   const Span x = SpanOfX(plot);
+  if (!plot.strip.states.empty()) DrawStrip(plot.strip, x, canvas);
   for (std::size_t i = 0; i < plot.panels.size(); ++i) {
-    const double top_px = kTop_px + kPanel_px * static_cast<double>(i) + kGap_px;
+    const double top_px =
+        kTop_px + StripPixels(plot) + kPanel_px * static_cast<double>(i) + kGap_px;
     const PanelArea area(x, SpanOfY(plot.panels[i]), top_px);
     DrawGrid(area, i + 1 == plot.panels.size(), canvas);
     DrawPanel(area, plot, plot.panels[i], canvas);
   }
-  DrawNames(plot, Height_px(plot), canvas);
+  DrawNames(plot, HeightPixels(plot), canvas);
 }
 
 }  // namespace
 
 Image DrawPlot(const LinePlot& plot) {
   ImageCanvas canvas(static_cast<std::uint32_t>(kWidth_px),
-                     static_cast<std::uint32_t>(Height_px(plot)));
+                     static_cast<std::uint32_t>(HeightPixels(plot)));
   Draw(plot, canvas);
   return std::move(canvas.image);
 }
 
 std::string PlotSvg(const LinePlot& plot) {
   SvgCanvas canvas(static_cast<std::uint32_t>(kWidth_px),
-                   static_cast<std::uint32_t>(Height_px(plot)));
+                   static_cast<std::uint32_t>(HeightPixels(plot)));
   Draw(plot, canvas);
   return canvas.svg();
 }

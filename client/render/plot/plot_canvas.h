@@ -23,6 +23,8 @@ class PlotCanvas {
   virtual ~PlotCanvas() = default;
 
   virtual void Line(PlotPoint from, PlotPoint to, Rgb color, double width_px) = 0;
+  // Filled.
+  virtual void Box(PlotPoint upper_left, PlotPoint lower_right, Rgb color) = 0;
   // `at` is where the text's middle line begins, is halfway or ends.
   virtual void Text(PlotPoint at, std::string_view text, Rgb color, TextAnchor anchor) = 0;
   // Its middle is at `at`; read from below.
@@ -34,6 +36,7 @@ class ImageCanvas : public PlotCanvas {
   ImageCanvas(std::uint32_t width_px, std::uint32_t height_px);
 
   void Line(PlotPoint from, PlotPoint to, Rgb color, double width_px) override;
+  void Box(PlotPoint upper_left, PlotPoint lower_right, Rgb color) override;
   void Text(PlotPoint at, std::string_view text, Rgb color, TextAnchor anchor) override;
   void UprightText(PlotPoint at, std::string_view text, Rgb color) override;
 
@@ -45,6 +48,7 @@ class SvgCanvas : public PlotCanvas {
   SvgCanvas(std::uint32_t width_px, std::uint32_t height_px);
 
   void Line(PlotPoint from, PlotPoint to, Rgb color, double width_px) override;
+  void Box(PlotPoint upper_left, PlotPoint lower_right, Rgb color) override;
   void Text(PlotPoint at, std::string_view text, Rgb color, TextAnchor anchor) override;
   void UprightText(PlotPoint at, std::string_view text, Rgb color) override;
 

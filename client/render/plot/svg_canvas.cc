@@ -63,6 +63,12 @@ void SvgCanvas::Line(PlotPoint from, PlotPoint to, Rgb color, double width_px) {
                  "\" stroke-width=\"", width_px, "\" stroke-linecap=\"round\"/>\n");
 }
 
+void SvgCanvas::Box(PlotPoint upper_left, PlotPoint lower_right, Rgb color) {
+  svg_ += StrCat("<rect x=\"", Tenth(upper_left.x_px), "\" y=\"", Tenth(upper_left.y_px),
+                 "\" width=\"", Tenth(lower_right.x_px - upper_left.x_px), "\" height=\"",
+                 Tenth(lower_right.y_px - upper_left.y_px), "\" fill=\"", Hex(color), "\"/>\n");
+}
+
 void SvgCanvas::Text(PlotPoint at, std::string_view text, Rgb color, TextAnchor anchor) {
   svg_ += StrCat("<text x=\"", Tenth(at.x_px), "\" y=\"", Tenth(at.y_px + 4.0), "\" fill=\"",
                  Hex(color), "\" text-anchor=\"", AnchorName(anchor), "\">", Escaped(text),

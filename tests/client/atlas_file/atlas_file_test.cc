@@ -98,6 +98,17 @@ TEST(AtlasFileTest, TellsWhatIsNotFusedYet) {
   EXPECT_EQ(IdsOf(file, 0, std::nullopt).size(), 4U);  // as they were
 }
 
+TEST(AtlasFileTest, TellsWhetherItHasATileAtAll) {
+  TinyAtlasFile written;
+  {
+    AtlasFile file = Opened(written);
+    EXPECT_FALSE(file.HasTiles().value());
+  }
+  written.Write(SquareWorld(1));
+  written.Damage({0, -1, -1});
+  EXPECT_TRUE(Opened(written).HasTiles().value());
+}
+
 TEST(AtlasFileTest, ADamagedTileEndsAReadingAndIsNamed) {
   TinyAtlasFile written;
   written.Write(SquareWorld(2));

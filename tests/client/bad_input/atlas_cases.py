@@ -216,8 +216,15 @@ def empty_atlas_cases(cases, drives, work):
         empty.refused("export an empty atlas", ["export", "--points", drives.folder / "empty.pcd"], "not_found",
                       "nothing to export")
         cases.report.equal("digest of an empty atlas", empty.run("digest")["tiles"], 0)
-        lost = empty.run("localize", drives.good)
-        cases.report.equal("localize in an empty atlas", [lost["failures"], lost["translation_rmse_m"]], [5, None])
+        # Told before a scan is read: a damaged one would be another error.
+        damaged = drives.copy("for_an_empty_atlas")
+        (damaged / "velodyne/000000.bin").write_bytes(b"")
+        for flags in ([], ["--relocalize"], ["--mode", "paper"], ["--perturb", "1,1"]):
+            empty.refused(f"localize {flags} in an empty atlas", ["localize", damaged, *flags], "not_found",
+                          "atlas ingest DRIVE")
+        empty.run("ingest", drives.good, *NEAR, "--staged")
+        empty.refused("localize in an atlas of staged sessions", ["localize", damaged], "not_found",
+                      "1 staged (atlas session publish")
 
 
 def run(cases, source, work):

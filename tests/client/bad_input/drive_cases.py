@@ -48,12 +48,15 @@ def first_of(*lines):
 SCANS = {
     "truncated scan": (truncated, "000003.bin"),
     "empty scan": (empty, "000003.bin"),
-    "NaN in a coordinate": (coordinate(math.nan), "return 70"),
-    "infinite coordinate": (coordinate(-math.inf), "return 70"),
     "huge coordinate": (coordinate(1e30), "return 70"),
     "scan of NaN": (all_nan, "000003.bin"),
     "folder for a scan": (folder_for_a_scan, "000003.bin"),
     "same number twice": (same_number_twice, "number 3"),
+}
+
+GAPS = {  # where the sensor got nothing back
+    "NaN in a coordinate": coordinate(math.nan),
+    "infinite coordinate": coordinate(-math.inf),
 }
 
 TIMES = {
@@ -91,6 +94,18 @@ def scan_cases(cases, drives):
             cases.refused(f"segment, {name}", ["segment", folder], "invalid_data", says)
             cases.refused(f"localize, {name}", ["localize", folder, "--scans", "odd"], "invalid_data", says,
                           is_stream=True)
+
+
+def gap_cases(cases, drives):
+    """A return that is none is dropped and counted, by every command."""
+    for number, (name, spoil) in enumerate(GAPS.items()):
+        folder = drives.copy(f"gap_{number}")
+        spoil(folder)
+        near = ["--max-range", "12"]
+        for line in (["ingest", folder, *NEAR, "--session", f"gap{number}"], ["segment", folder],
+                     ["localize", folder, *near], ["localize", folder, *near, "--perturb", "0.1,0.5", "--trials", "1"]):
+            done = cases.accepted(f"{line[0]}, {name}", line)
+            cases.report.equal(f"{line[0]}, {name}: dropped", done.get("dropped_returns"), 1)
 
 
 def pose_cases(cases, drives):
@@ -174,5 +189,5 @@ def position_cases(cases, drives):
 def run(cases, source, work):
     drives = Drives(source, work)
     cases.run("ingest", drives.good, *NEAR)
-    for group in (scan_cases, pose_cases, folder_cases, permission_cases, label_cases, position_cases):
+    for group in (scan_cases, gap_cases, pose_cases, folder_cases, permission_cases, label_cases, position_cases):
         group(cases, drives)

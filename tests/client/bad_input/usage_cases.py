@@ -72,7 +72,7 @@ USAGE = {
         ["DRIVE", "--scans", "none"], ["DRIVE", "--seed", "-1"], ["DRIVE", "--mode", "guess"],
         ["DRIVE", "--prior-radius", "5"], ["DRIVE", "--relocalize", "--prior-radius", "0"],
         ["DRIVE", "--relocalize", "--perturb", "1,1"], ["DRIVE", "--relocalize", "--mode", "paper"],
-        ["DRIVE", "--relocalize", "--output", "WORK/x.csv"], ["DRIVE", "--relocalize", "--no-restart"],
+        ["DRIVE", "--relocalize", "--output", "WORK/x.tum"], ["DRIVE", "--relocalize", "--plot", "WORK/x.svg"], ["DRIVE", "--relocalize", "--no-restart"],
         ["DRIVE", "--output", "WORK/x.txt"], ["DRIVE", "--output", "WORK/x"], ["DRIVE", "--plot", "WORK/x.jpg"],
         ["DRIVE", "--contradictions", "WORK/x.txt"], ["DRIVE", "--contradictions", "WORK/x"],
         *(["DRIVE", "--contradictions", "WORK/x.csv", *other] for other in (

@@ -14,6 +14,7 @@ import threading
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 
+import map_use_cases
 from harness import NEAR, SMALL, Cases, Daemon, Drives, Report
 
 KEYS = {
@@ -304,6 +305,7 @@ def main():
             stream_cases(cases, found, work)
             track_cases(cases, work, drives.good)
             contradiction_cases(cases, work, drives.good)
+            map_use_cases.run(cases, drives, work)
             export_cases(cases, work)
             backup_cases(cases, work)
             unlabelled_case(cases, drives)

@@ -2,6 +2,7 @@
 // answer.
 #include "client/drive/drive_localization.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <vector>
@@ -145,6 +146,19 @@ TEST_F(DriveLocalizationTest, ADamagedScanIsLostAndTrackingGoesOn) {
   EXPECT_EQ(scans_[1].located.health, LocalizationHealth::kLost);
   EXPECT_TRUE(scans_[1].located.T_world_sensor.isApprox(scans_[0].located.T_world_sensor));
   EXPECT_EQ(report->restarts, 1U);
+}
+
+TEST_F(DriveLocalizationTest, WhereNothingCameBackTheRestIsLocalized) {
+  const float none = std::nanf("");
+  const float point[4] = {none, none, none, 0.0F};
+  std::ofstream(drive_.scans[1].scan, std::ios::binary | std::ios::app)
+      .write(reinterpret_cast<const char*>(point), sizeof(point));
+  ScriptedLocalizer localizer({{}, {{1, 0, 0}}, {{2, 0, 0}}, {}, {{1, 0, 0}}});
+  const auto report = Run(localizer);
+  ASSERT_TRUE(report.has_value()) << report.error().message();
+  EXPECT_TRUE(report->unreadable.empty());
+  EXPECT_EQ(report->dropped_returns, 1U);
+  EXPECT_EQ(report->score.lost(), 0U);
 }
 
 TEST_F(DriveLocalizationTest, ADamagedScanEndsSingleShots) {

@@ -138,6 +138,26 @@ TEST_F(AtlasFileEndToEndTest, TilesThatWaitToBeFusedAreNoted) {
   EXPECT_NE(noted.err.find("wait to be fused: 2;"), std::string::npos) << noted.err;
 }
 
+TEST_F(AtlasFileEndToEndTest, AFileWithoutATileIsNoMapToLocalizeIn) {
+  const fs::path data = NewData();
+  const Arguments localize = {"localize", shared_drive.string(), "--max-range", "25"};
+  {
+    DaemonProcess daemon(data, kSmall);
+    EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+  }
+  const CommandRun empty = RunOn(data / "atlas.db", localize);
+  EXPECT_EQ(empty.exit_code, 3);
+  EXPECT_EQ(empty.out, "");
+  EXPECT_NE(empty.err.find("the atlas is empty"), std::string::npos) << empty.err;
+  const fs::path file = StoppedAtlas();
+  Change(file,
+         "INSERT INTO dirty_tiles (key, shard, level, generation, since, checksum) "
+         "SELECT key, shard, 0, 1, 1, 0 FROM tiles LIMIT 2; DELETE FROM tiles");
+  const CommandRun waiting = RunOn(file, localize);
+  EXPECT_EQ(waiting.exit_code, 3);
+  EXPECT_NE(waiting.err.find("2 tiles wait to be fused (atlasd"), std::string::npos) << waiting.err;
+}
+
 TEST_F(AtlasFileEndToEndTest, WhatIsNoAtlasFileHasItsExitCode) {
   const fs::path file = StoppedAtlas();
   const fs::path text = shared_root / "text.db";

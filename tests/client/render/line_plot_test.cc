@@ -78,6 +78,33 @@ TEST(LinePlotTest, MarksFlagsAndEmptyPanelsAreDrawn) {
   EXPECT_GT(DrawPlot(LinePlot()).height, 0U);
 }
 
+TEST(LinePlotTest, AStripShowsStatesAboveThePanels) {
+  constexpr Rgb kFine{1, 200, 2};
+  constexpr Rgb kBad{200, 3, 200};
+  LinePlot plot = Rising();
+  const std::uint32_t height = DrawPlot(plot).height;
+  plot.strip = {"health",
+                {{"fine", kFine}, {"bad", kBad}},
+                {{-0.5, 50.0, 0}, {49.9, 50.1, 1}, {50.0, 100.5, 0}}};
+  const Image image = DrawPlot(plot);
+  EXPECT_EQ(image.height, height + 48);
+  const auto column = [&image](std::uint32_t x, const Rgb& color) {
+    std::size_t count = 0;
+    for (std::uint32_t y = 60; y < 80; ++y) count += image.at(x, y) == color ? 1U : 0U;
+    return count;
+  };
+  EXPECT_EQ(column(95, kFine), 9U);
+  EXPECT_EQ(column(95, kBad), 0U);
+  EXPECT_EQ(column(878, kFine), 9U);
+  EXPECT_EQ(column(485, kBad), 18U) << "a single scan is seen, and not painted over";
+  EXPECT_EQ(column(470, kBad), 0U);
+  EXPECT_EQ(column(87, kFine), 0U) << "nothing left of the axis";
+  EXPECT_GT(TopOf(image, 870, kRed), 78) << "the curve is below it";
+  const std::string svg = PlotSvg(plot);
+  EXPECT_EQ(CountText(svg, "fill=\"#c803c8\""), 2U);  // its part and the legend
+  EXPECT_NE(svg.find(">health</text>"), std::string::npos);
+}
+
 TEST(LinePlotTest, SvgIsTheSameInText) {
   const std::string svg = PlotSvg(Rising());
   EXPECT_TRUE(svg.starts_with("<svg "));

@@ -50,8 +50,7 @@ TEST(ScanReaderTest, RefusesEverySizeThatIsNotAMultipleOfAReturn) {
 }
 
 TEST(ScanReaderTest, RefusesAnyCoordinateThatIsNoPlace) {
-  for (const float bad : {kNan, -kNan, std::numeric_limits<float>::signaling_NaN(), kInf, -kInf,
-                          1000.1F, -1000.1F, 1e30F, std::numeric_limits<float>::max()}) {
+  for (const float bad : {1000.1F, -1000.1F, 1e30F, std::numeric_limits<float>::max()}) {
     for (std::size_t at = 0; at < 12; ++at) {
       std::array<float, 12> values{1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0};
       values[at] = bad;
@@ -66,6 +65,43 @@ TEST(ScanReaderTest, RefusesAnyCoordinateThatIsNoPlace) {
       EXPECT_NE(cloud.error().message().find(which), std::string::npos) << cloud.error().message();
     }
   }
+}
+
+TEST(ScanReaderTest, WhereNothingCameBackThereIsNoReturn) {
+  for (const float none : {kNan, -kNan, std::numeric_limits<float>::signaling_NaN(), kInf, -kInf}) {
+    for (std::size_t at = 0; at < 12; ++at) {
+      std::array<float, 12> values{1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0};
+      values[at] = none;
+      const Result<PointCloud> cloud = ParseScan(Returns(values));
+      ASSERT_TRUE(cloud.has_value()) << none << " at " << at;
+      if (at % 4 == 3) {  // intensity is not believed
+        EXPECT_EQ(cloud->size(), 3U);
+        EXPECT_TRUE(cloud->dropped.empty());
+        continue;
+      }
+      EXPECT_EQ(cloud->size(), 2U) << none << " at " << at;
+      EXPECT_EQ(cloud->dropped, std::vector<std::uint32_t>{static_cast<std::uint32_t>(at / 4)});
+      EXPECT_EQ(cloud->points[0].x(), at / 4 == 0 ? 4.0F : 1.0F);
+      EXPECT_EQ(cloud->points[1].x(), at / 4 == 2 ? 4.0F : 7.0F);
+    }
+  }
+}
+
+TEST(ScanReaderTest, AScanWithoutAReturnIsDamaged) {
+  std::array<float, 12> values{};
+  values.fill(kNan);
+  const Result<PointCloud> cloud = ParseScan(Returns(values));
+  ASSERT_FALSE(cloud.has_value());
+  EXPECT_EQ(cloud.error().code(), StatusCode::kInvalidData);
+  EXPECT_NE(cloud.error().message().find("none of its 3 entries"), std::string::npos)
+      << cloud.error().message();
+}
+
+TEST(ScanReaderTest, ADroppedEntryCountsInTheNumberOfABadOne) {
+  const std::array<float, 12> values{kNan, 0, 0, 0, 1, 2, 3, 0, 2000, 0, 0, 0};
+  const Result<PointCloud> cloud = ParseScan(Returns(values));
+  ASSERT_FALSE(cloud.has_value());
+  EXPECT_NE(cloud.error().message().find("return 2"), std::string::npos) << cloud.error().message();
 }
 
 TEST(ScanReaderTest, AcceptsTheLimitsAndWhatIsAlmostNothing) {
@@ -90,7 +126,8 @@ TEST(ScanReaderTest, RandomBytesMakeAnErrorOrAFiniteCloud) {
     const Result<PointCloud> cloud = ParseScan(bytes);
     if (cloud) {
       ++accepted;
-      EXPECT_EQ(cloud->size(), bytes.size() / 16);
+      EXPECT_EQ(cloud->size() + cloud->dropped.size(), bytes.size() / 16);
+      EXPECT_GT(cloud->size(), 0U);
       for (const Eigen::Vector3f& p : cloud->points) {
         EXPECT_TRUE(p.allFinite() && p.cwiseAbs().maxCoeff() <= 1000.0F);
       }
@@ -164,6 +201,21 @@ TEST_F(ScanFileTest, LabelsNeedExactlyFourBytesAReturn) {
         ReadLabels(Write("000000.label", size), CloudOf(2));
     EXPECT_EQ(labels.has_value(), size == 8) << size;
   }
+}
+
+TEST_F(ScanFileTest, LabelsOfDroppedEntriesAreLeftOut) {
+  const fs::path path = folder_ / "000000.label";
+  ByteWriter out;
+  for (std::uint32_t label = 10; label < 15; ++label) out.U32(label);
+  const Bytes bytes = out.Take();
+  std::ofstream(path, std::ios::binary) << std::string(bytes.begin(), bytes.end());
+  PointCloud cloud = CloudOf(3);
+  cloud.dropped = {0, 3};
+  const auto labels = ReadLabels(path, cloud);
+  ASSERT_TRUE(labels.has_value());
+  EXPECT_EQ(*labels, (std::vector<std::uint32_t>{11, 12, 14}));
+  cloud.dropped = {0};
+  EXPECT_EQ(ReadLabels(path, cloud).error().code(), StatusCode::kInvalidData);
 }
 
 }  // namespace

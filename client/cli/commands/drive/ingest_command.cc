@@ -6,6 +6,7 @@
 #include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/commands/drive/dropped_text.h"
 #include "client/cli/commands/drive/session_text.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
@@ -26,6 +27,7 @@ double FrontendMsPerScan(const IngestReport& report) {
 boost::json::object ReportJson(const IngestReport& report, bool has_positions, double wall_s) {
   boost::json::object json = {{"keyframes", report.keyframes},
                               {"empty_scans", report.empty_scans},
+                              {"dropped_returns", report.dropped_returns},
                               {"acked", report.upload.totals.acked},
                               {"duplicates", report.upload.totals.duplicates},
                               {"sent_before", report.upload.sent_before},
@@ -48,6 +50,7 @@ void PrintReport(const IngestReport& report, bool has_positions, double wall_s, 
   FactList facts;
   facts.Add("keyframes", StrCat(report.keyframes, " along ", FixedText(report.metres, 1), " m, ",
                                 report.sessions, " session(s)"));
+  AddDropped(report.dropped_returns, facts);
   if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
   for (const SessionAnchor& anchor : report.anchors) {
     facts.Add("anchor", AnchorText(anchor));

@@ -3,13 +3,12 @@
 #include <numbers>
 
 #include "client/cli/commands/drive/contradiction_output.h"
-#include "client/cli/commands/drive/deskew_text.h"
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/commands/drive/localization_text.h"
 #include "client/cli/commands/drive/relocalization_text.h"
 #include "client/cli/commands/drive/track_output.h"
 #include "client/cli/map_input/opened_map.h"
-#include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
 #include "client/drive/drive_localization.h"
@@ -18,83 +17,6 @@
 
 namespace atlas {
 namespace {
-
-boost::json::object ScanJson(const LocalizedScan& scan) {
-  boost::json::array pose;
-  for (const double number : PoseToRowMajor(scan.located.T_world_sensor)) {
-    pose.emplace_back(number);
-  }
-  boost::json::value cover;
-  if (scan.located.cover) cover = MapCoverName(*scan.located.cover);
-  return {{"type", "scan"},
-          {"scan", scan.scan},
-          {"trial", scan.trial},
-          {"pose", std::move(pose)},
-          {"health", LocalizationHealthName(scan.located.health)},
-          {"map", std::move(cover)},
-          {"error_m", Rounded(scan.error.translation_m, 5)},
-          {"error_deg", Rounded(scan.error.rotation_deg, 5)}};
-}
-
-// An error over no shot at all is no error of 0.
-boost::json::value ErrorJson(const LocalizationScore& score, double error) {
-  return score.successes() == 0 ? boost::json::value(nullptr) : Rounded(error, 5);
-}
-
-boost::json::object SummaryJson(const DriveLocalizationReport& report,
-                                std::uint64_t bytes_received) {
-  boost::json::object json{
-      {"type", "summary"},
-      {"translation_rmse_m", ErrorJson(report.score, report.score.translation_rmse_m())},
-      {"rotation_rmse_deg", ErrorJson(report.score, report.score.rotation_rmse_deg())},
-      {"translation_p95_m", ErrorJson(report.score, report.score.translation_p95_m())},
-      {"failures", report.score.failures()},
-      {"lost", report.score.lost()},
-      {"good", report.good},
-      {"weak", report.weak},
-      {"good_failures", report.good_failures},
-      {"restarts", report.restarts},
-      {"scans", report.scans},
-      {"shots", report.score.shots()},
-      {"hz", Rounded(report.hz(), 2)},
-      {"bytes_received", bytes_received}};
-  if (report.deskewing.skew) json["deskew"] = DeskewJson(report.deskewing);
-  return json;
-}
-
-void PrintSummary(const DriveLocalizationReport& report,
-                  std::uint64_t bytes_received,
-                  std::ostream& out) {
-  const LocalizationScore& score = report.score;
-  FactList facts;
-  facts.Add("scans", StrCat(report.scans, ", ", score.shots(), " localizations, ", report.restarts,
-                            " restarts"));
-  facts.Add("error", score.successes() == 0
-                         ? std::string("no localization succeeded")
-                         : StrCat(FixedText(score.translation_rmse_m(), 3), " m, ",
-                                  FixedText(score.rotation_rmse_deg(), 3), " deg RMSE; ",
-                                  FixedText(score.translation_p95_m(), 3), " m at 95 %"));
-  facts.Add("failures", StrCat(score.failures(), ", of them ", score.lost(), " lost and ",
-                               report.good_failures, " called good"));
-  facts.Add("health",
-            StrCat(report.good, " good, ", report.weak, " weak, ", score.lost(), " lost"));
-  if (report.deskewing.skew) facts.Add("deskew", DeskewText(report.deskewing));
-  facts.Add("speed", FixedText(report.hz(), 1) + " scans a CPU second");
-  facts.Add("received", BytesText(bytes_received));
-  facts.Print(out);
-}
-
-// The others were localized and written; a summary on stdout would be one of what was asked for.
-Status StatusOf(const DriveLocalizationReport& report) {
-  if (report.unreadable.empty()) return {};
-  const Status& first = report.unreadable.front().why;
-  const std::size_t count = report.unreadable.size();
-  return {first.code(), StrCat(count, count == 1 ? " scan" : " scans",
-                               " could not be read, the first: ", first.message(), "; of all ",
-                               report.scans, " scans ", report.score.failures(),
-                               " failed with that, of the others the error is ",
-                               FixedText(report.score.translation_rmse_m(), 3), " m RMSE")};
-}
 
 class LocalizeCommand : public Command {
  public:
@@ -131,6 +53,7 @@ class LocalizeCommand : public Command {
     if (!drive) return drive.error();
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
+    ATLAS_RETURN_IF_ERROR(map->CheckHasTiles());
     if (relocalize_) return Relocalize(*drive, map->source(), context);
     MapView view(map->source());
     DriveMonitor monitor(view, {}, [this](const Contradiction& c) { contradictions_.Add(c); });
@@ -140,9 +63,9 @@ class LocalizeCommand : public Command {
     monitor.Finish();
     ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
     ATLAS_RETURN_IF_ERROR(contradictions_.Write(map->profile().cell_size_m()));
-    ATLAS_RETURN_IF_ERROR(StatusOf(*report));
+    ATLAS_RETURN_IF_ERROR(CheckReadable(*report));
     PrintReport(*report, monitor, map->bytes_received(), context);
-    return {};
+    return CheckLocalized(*report, !perturbation_);
   }
 
  private:
@@ -168,19 +91,23 @@ class LocalizeCommand : public Command {
               "--mode paper"};
     }
     ATLAS_RETURN_IF_ERROR(contradictions_.Check());
-    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off" ||
-                        track_.is_wanted())) {
+    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off")) {
       return {StatusCode::kInvalidArgument,
               "--relocalize takes no start and no track: without --perturb, --no-restart, --mode "
-              "paper, --deskew, --output and --plot"};
+              "paper and --deskew"};
     }
     if (perturbation_) {
       options_.shots = {perturbation_->translation_m,
                         perturbation_->rotation_deg * std::numbers::pi / 180.0,
                         trials_.value_or(10)};
     }
-    ATLAS_RETURN_IF_ERROR(track_.Check(!perturbation_));
+    ATLAS_RETURN_IF_ERROR(track_.Check(Kind()));
     return relocalize_ ? RelocalizationOptions().Validate() : options_.Validate();
+  }
+
+  LocalizationKind Kind() const {
+    if (relocalize_) return LocalizationKind::kRelocalized;
+    return perturbation_ ? LocalizationKind::kSingleShots : LocalizationKind::kTracked;
   }
 
   void PrintReport(const DriveLocalizationReport& report,
@@ -188,12 +115,12 @@ class LocalizeCommand : public Command {
                    std::uint64_t bytes_received,
                    const CommandContext& context) const {
     if (context.is_json) {
-      boost::json::object summary = SummaryJson(report, bytes_received);
+      boost::json::object summary = LocalizationJson(report, bytes_received);
       if (contradictions_.is_wanted()) summary["contradictions"] = contradictions_.Json(monitor);
       context.PrintJson(summary);
       return;
     }
-    PrintSummary(report, bytes_received, context.out);
+    PrintLocalization(report, bytes_received, context.out);
     if (contradictions_.is_wanted()) {
       FactList facts;
       facts.Add("contradictions", contradictions_.Text(monitor));
@@ -216,7 +143,7 @@ class LocalizeCommand : public Command {
     ProgressBar bar(context.err, context.is_err_terminal && !is_stream_seen, "localize",
                     drive.scans.back().number - first + 1);
     return LocalizeDrive(drive, options_, view, [&](const LocalizedScan& scan) {
-      if (context.is_json) context.PrintJson(ScanJson(scan));
+      if (context.is_json) context.PrintJson(LocalizedScanJson(scan));
       if (track_.is_wanted()) track_.Add(scan);
       bar.Update(scan.scan - first + 1);
     });
@@ -237,14 +164,16 @@ class LocalizeCommand : public Command {
     MapView view(source);
     const auto report = RelocalizeDrive(drive, options, view, [&](const RelocalizedScan& scan) {
       if (context.is_json) context.PrintJson(RelocalizedScanJson(scan));
+      if (track_.is_wanted()) track_.Add(scan);
     });
     if (!report) return report.error();
+    ATLAS_RETURN_IF_ERROR(track_.Write(Title(drive)));
     if (context.is_json) {
       context.PrintJson(RelocalizationJson(*report));
     } else {
       PrintRelocalization(*report, context.out);
     }
-    return {};
+    return CheckRelocalized(*report);
   }
 
   DriveFlags drive_;

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "client/cli/commands/drive/dropped_text.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
 #include "core/base/str_cat.h"
@@ -50,6 +51,7 @@ boost::json::object RelocalizedScanJson(const RelocalizedScan& scan) {
 boost::json::object RelocalizationJson(const DriveRelocalizationReport& report) {
   return {{"type", "summary"},
           {"scans", report.scans},
+          {"dropped_returns", report.dropped_returns},
           {"right", report.right},
           {"wrong", report.wrong},
           {"unknown", report.unknown},
@@ -72,9 +74,18 @@ void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& 
   facts.Add("found", found);
   facts.Add("wrong", StrCat(report.wrong));
   facts.Add("don't know", StrCat(report.unknown));
+  AddDropped(report.dropped_returns, facts);
   facts.Add("CPU", StrCat(FixedText(CpuPerScan(report), 3), " s a scan, at most ",
                           FixedText(report.worst_cpu_s, 3), " s"));
   facts.Print(out);
+}
+
+Status CheckRelocalized(const DriveRelocalizationReport& report) {
+  if (report.scans == 0 || report.unknown < report.scans) return {};
+  return {StatusCode::kNotFound,
+          StrCat("none of ", report.scans, " scans was found in the map's ", report.places,
+                 " places: it may be of another place, not have this one yet (atlas wait), or have "
+                 "too little that tells it from others")};
 }
 
 }  // namespace atlas

@@ -6,6 +6,7 @@
 #include <boost/json/object.hpp>
 
 #include "client/drive/drive_relocalization.h"
+#include "core/base/status.h"
 
 namespace atlas {
 
@@ -14,5 +15,7 @@ namespace atlas {
 boost::json::object RelocalizedScanJson(const RelocalizedScan& scan);
 boost::json::object RelocalizationJson(const DriveRelocalizationReport& report);
 void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& out);
+// kNotFound where nothing was found of any scan; the message says what that may mean.
+Status CheckRelocalized(const DriveRelocalizationReport& report);
 
 }  // namespace atlas

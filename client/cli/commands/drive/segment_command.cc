@@ -1,6 +1,7 @@
 // `atlas segment DIR`: traversable ground in a drive's scans, scored where there are labels.
 #include "client/cli/commands/drive/drive_commands.h"
 #include "client/cli/commands/drive/drive_flags.h"
+#include "client/cli/commands/drive/dropped_text.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/progress_bar.h"
 #include "client/cli/output/text_table.h"
@@ -34,6 +35,7 @@ boost::json::object ReportJson(const DriveSegmentationReport& report, bool with_
   }
   json["ground"] = report.ground;
   json["obstacle"] = report.obstacle;
+  json["dropped_returns"] = report.dropped;
   json["ms_per_scan"] = Rounded(report.ms_per_scan(), 3);
   json["scans"] = report.scans;
   json["labelled_scans"] = report.score.scans();  // what the score is of
@@ -52,6 +54,7 @@ void PrintReport(const DriveSegmentationReport& report, bool with_curbs, std::os
     facts.Add("false road", ShareText(report.curbs.false_road(), report.curbs.road_cells));
   }
   facts.Add("returns", StrCat(report.ground, " ground, ", report.obstacle, " obstacle"));
+  AddDropped(report.dropped, facts);
   facts.Add("scans", StrCat(report.scans, ", of them ", report.score.scans(), " with labels"));
   facts.Add("CPU", FixedText(report.ms_per_scan(), 2) + " ms a scan");
   facts.Print(out);

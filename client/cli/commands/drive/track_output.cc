@@ -4,7 +4,9 @@
 #include <limits>
 #include <numbers>
 
+#include "client/cli/commands/drive/health_strip.h"
 #include "client/cli/files/whole_file.h"
+#include "client/drive/relocalization_file.h"
 #include "client/render/image.h"
 #include "client/render/plot/line_plot.h"
 #include "core/base/str_cat.h"
@@ -47,6 +49,7 @@ LinePlot PlotOf(const std::vector<LocalizedScan>& scans, const std::string& titl
        {CurveOf("yaw", kBlue, scans,
                 [](const Scan& scan) { return scan.offset.yaw_rad * kDegrees; })}},
       {"fit", {CurveOf("fit", kViolet, scans, [](const Scan& scan) { return scan.located.fit; })}}};
+  plot.strip = HealthStrip(scans);
   for (const Scan& scan : scans) {
     if (scan.is_after_jump) plot.marks.push_back(scan.scan);
     if (scan.is_failure) plot.flags.push_back(scan.scan);
@@ -58,36 +61,49 @@ LinePlot PlotOf(const std::vector<LocalizedScan>& scans, const std::string& titl
 
 void TrackOutput::Declare(ArgumentSet& arguments) {
   arguments.Optional("--output", "FILE.csv|.tum|.kitti", text_file_,
-                     "Write each scan's pose and error (.csv), or the trajectory");
+                     "Write each scan's pose and error (.csv), or the trajectory; of "
+                     "--perturb and --relocalize .csv alone");
   arguments.Optional("--plot", "FILE.png|.svg", plot_file_, "Draw the errors along the drive");
 }
 
-Status TrackOutput::Check(bool is_tracking) {
-  if (!text_file_.empty()) {
-    const Result<TrackFormat> format = TrackFormatOf(text_file_);
-    if (!format) return format.error();
-    format_ = *format;
-    if (*format != TrackFormat::kCsv && !is_tracking) {
-      return {StatusCode::kInvalidArgument,
-              StrCat(text_file_, ": single shots are no trajectory; give a name with .csv")};
-    }
-    ATLAS_RETURN_IF_ERROR(CheckPlace(text_file_));
+Status TrackOutput::Check(LocalizationKind kind) {
+  kind_ = kind;
+  if (!text_file_.empty()) ATLAS_RETURN_IF_ERROR(CheckText());
+  return plot_file_.empty() ? Status() : CheckPlot();
+}
+
+Status TrackOutput::CheckText() {
+  const Result<TrackFormat> format = TrackFormatOf(text_file_);
+  if (!format) return format.error();
+  format_ = *format;
+  if (*format != TrackFormat::kCsv && kind_ != LocalizationKind::kTracked) {
+    return {StatusCode::kInvalidArgument,
+            StrCat(text_file_,
+                   ": scans that are each found alone are no trajectory; give a name "
+                   "with .csv")};
   }
-  if (!plot_file_.empty()) {
-    is_svg_ = plot_file_.ends_with(".svg");
-    if (!is_svg_ && !plot_file_.ends_with(".png")) {
-      return {StatusCode::kInvalidArgument,
-              StrCat(plot_file_, ": expected a name that ends in .png or .svg")};
-    }
-    ATLAS_RETURN_IF_ERROR(CheckPlace(plot_file_));
+  return CheckPlace(text_file_);
+}
+
+Status TrackOutput::CheckPlot() {
+  if (kind_ == LocalizationKind::kRelocalized) {
+    return {StatusCode::kInvalidArgument, "--plot draws what starts somewhere: not --relocalize"};
   }
-  return {};
+  is_svg_ = plot_file_.ends_with(".svg");
+  if (!is_svg_ && !plot_file_.ends_with(".png")) {
+    return {StatusCode::kInvalidArgument,
+            StrCat(plot_file_, ": expected a name that ends in .png or .svg")};
+  }
+  return CheckPlace(plot_file_);
+}
+
+std::string TrackOutput::Text() const {
+  return kind_ == LocalizationKind::kRelocalized ? RelocalizationText(relocalized_)
+                                                 : TrackText(*format_, scans_);
 }
 
 Status TrackOutput::Write(const std::string& title) const {
-  if (format_) {
-    ATLAS_RETURN_IF_ERROR(WriteTextFile(text_file_, TrackText(*format_, scans_)));
-  }
+  if (format_) ATLAS_RETURN_IF_ERROR(WriteTextFile(text_file_, Text()));
   return plot_file_.empty() ? Status() : WritePlot(title);
 }
 

@@ -1,5 +1,7 @@
 // `atlas plan`: a route over the map's surfaces.
 #include <chrono>
+#include <optional>
+#include <utility>
 
 #include "client/cli/commands/map/map_commands.h"
 #include "client/cli/commands/map/plan_flags.h"
@@ -33,6 +35,11 @@ class ViewTiles : public TileSource {
   std::shared_ptr<const Tile> lent_;
 };
 
+// Null: this vehicle may stand nowhere near.
+boost::json::value EndJson(const std::optional<RouteEnd>& end) {
+  return end ? boost::json::value(RouteEndJson(*end)) : nullptr;
+}
+
 boost::json::object RouteJson(const Route& route, double ms) {
   boost::json::array waypoints;
   boost::json::array clearances;
@@ -44,6 +51,8 @@ boost::json::object RouteJson(const Route& route, double ms) {
     slopes.push_back(Rounded(route.slope_deg[i], 3));
   }
   return {{"found", route.found},
+          {"start", EndJson(route.start)},
+          {"goal", EndJson(route.goal)},
           {"length_m", Rounded(route.length_m, 3)},
           {"cost", Rounded(route.cost, 3)},
           {"searched_cost", Rounded(route.searched_cost, 3)},
@@ -55,7 +64,7 @@ boost::json::object RouteJson(const Route& route, double ms) {
           {"ms", Rounded(ms, 3)}};
 }
 
-void PrintRoute(const Route& route, double ms, std::ostream& out) {
+void PrintRoute(const Route& route, double ms, double cell_m, std::ostream& out) {
   TextTable table({">x m", ">y m", ">z m", ">clearance m", ">slope deg"});
   for (std::size_t i = 0; i < route.waypoints.size(); ++i) {
     const Eigen::Vector3d& p = route.waypoints[i];
@@ -63,17 +72,24 @@ void PrintRoute(const Route& route, double ms, std::ostream& out) {
                FixedText(route.clearance_m[i], 2), FixedText(route.slope_deg[i], 1)});
   }
   if (!route.waypoints.empty()) table.Print(out);
+  for (const auto& [name, end] : {std::pair("start", &route.start), {"goal", &route.goal}}) {
+    if (*end && (*end)->IsMoved(cell_m)) out << name << ' ' << MoveText(**end) << '\n';
+  }
   out << (route.found ? StrCat("route of ", FixedText(route.length_m, 1), " m")
                       : std::string("no route"))
       << ", " << route.tiles_loaded << " tiles loaded, " << FixedText(ms, 0) << " ms CPU\n";
 }
 
 // Whether it is the map or the vehicle, nobody can tell without planning for another one.
-Status NoRoute(const PlanOptions& vehicle) {
+Status NoRoute(const Route& route, const PlanOptions& vehicle) {
+  const std::string why = route.start && route.goal
+                              ? std::string("what start and goal stand on is not joined,")
+                              : StrCat("nowhere within ", vehicle.snap_radius_m, " m of the ",
+                                       route.start ? "goal" : "start", " is room");
   return {
       StatusCode::kNotFound,
-      StrCat("no route: what start and goal stand on is not joined, for a vehicle ",
-             vehicle.vehicle_width_m, " m wide (--width) with ", vehicle.safety_margin_m,
+      StrCat("no route: ", why, " for a vehicle ", vehicle.vehicle_width_m,
+             " m wide (--width) with ", vehicle.safety_margin_m,
              " m to each side (--margin) that needs ", vehicle.headroom_m,
              " m of height (--headroom) and drives slopes of ", vehicle.max_slope_deg,
              " degrees (--max-slope-deg)",
@@ -123,16 +139,18 @@ class PlanCommand : public Command {
       route = Route();
     }
     if (!file_.empty() && route->found) {
-      const std::string text = RouteText(*route, format);
+      const std::string text =
+          RouteText(*route, format, RouteAtlasOf(map->atlas_id(), map->profile()),
+                    map->profile().cell_size_m());
       ATLAS_RETURN_IF_ERROR(WriteWholeFile(file_, Bytes(text.begin(), text.end())));
     }
     if (context.is_json) {
       context.PrintJson(RouteJson(*route, ms));
     } else {
-      PrintRoute(*route, ms, context.out);
+      PrintRoute(*route, ms, map->profile().cell_size_m(), context.out);
     }
     if (failure.ok() && !route->found) {
-      failure = NoRoute(request_.options);
+      failure = NoRoute(*route, request_.options);
     }
     return failure;
   }

@@ -1,9 +1,14 @@
 // `atlas render`: a picture of the whole atlas.
+#include <optional>
+#include <utility>
+
 #include "client/cli/commands/map/map_commands.h"
+#include "client/cli/commands/map/route_check.h"
 #include "client/cli/files/contradiction_file.h"
 #include "client/cli/files/route_file.h"
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
+#include "client/map/route_ground.h"
 #include "client/render/map_picture.h"
 #include "core/base/str_cat.h"
 #include "core/tile/tile_codec.h"
@@ -11,11 +16,12 @@
 namespace atlas {
 namespace {
 
-LevelReader ReaderOf(MapSource& source) {
-  return [&source](std::uint8_t level, const TileCallback& on_tile) -> Status {
+LevelReader ReaderOf(MapSource& source, RouteGround& ground) {
+  return [&source, &ground](std::uint8_t level, const TileCallback& on_tile) -> Status {
     return source.ReadLevel(level, std::nullopt, [&](const TileBlob& read) -> Status {
       const Result<Tile> tile = DecodeTile(read.blob, source.profile());
       if (!tile) return tile.error().WithContext(StrCat("tile ", read.id));
+      ground.Add(*tile);
       return on_tile(*tile);
     });
   };
@@ -68,10 +74,12 @@ class RenderCommand : public Command {
     const auto color = ParseMapColor(color_);
     if (!color) return color.error();
     options.color = *color;
+    std::optional<RouteAtlas> planned_in;
     if (!path_.empty()) {
       auto route = ReadRoute(path_);
       if (!route) return route.error();
-      options.route = *std::move(route);
+      options.route = std::move(route->waypoints);
+      planned_in = std::move(route->atlas);
     }
     std::vector<ContradictionPlace> contradictions;
     if (!contradictions_.empty()) {
@@ -82,19 +90,29 @@ class RenderCommand : public Command {
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
     options.marks = MarksOf(contradictions, map->profile().cell_size_m());
-    const auto picture = RenderMap(ReaderOf(map->source()), options, map->profile());
+    RouteGround ground(options.route, map->profile());
+    const auto picture = RenderMap(ReaderOf(map->source(), ground), options, map->profile());
     if (!picture) return picture.error();
+    std::optional<RouteCheck> route;
+    if (!path_.empty()) {
+      route = CheckOf(path_, planned_in, RouteAtlasOf(map->atlas_id(), map->profile()), ground);
+      ATLAS_RETURN_IF_ERROR(NoteRoute(*route, context.err));
+    }
     ATLAS_RETURN_IF_ERROR(WritePng(picture->image, file_));
-    Print(*picture, context);
+    Print(*picture, route, context);
     return {};
   }
 
  private:
-  void Print(const MapPicture& picture, const CommandContext& context) const {
+  void Print(const MapPicture& picture,
+             const std::optional<RouteCheck>& route,
+             const CommandContext& context) const {
     if (context.is_json) {
-      context.PrintJson({{"width", picture.image.width},
-                         {"height", picture.image.height},
-                         {"metres_per_pixel", Rounded(picture.metres_per_pixel, 6)}});
+      boost::json::object json{{"width", picture.image.width},
+                               {"height", picture.image.height},
+                               {"metres_per_pixel", Rounded(picture.metres_per_pixel, 6)}};
+      if (route) json["route"] = RouteCheckJson(*route);
+      context.PrintJson(json);
     } else {
       context.out << file_ << ": " << picture.image.width << " x " << picture.image.height
                   << " pixels of " << picture.metres_per_pixel << " m\n";

@@ -1,6 +1,9 @@
 // Waypoints as text.
 #include "client/cli/commands/map/route_text.h"
 
+#include <cmath>
+#include <utility>
+
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 
@@ -17,10 +20,27 @@ boost::json::array Numbers(const std::vector<double>& values) {
   return numbers;
 }
 
-std::string GeoJson(const Route& route) {
+boost::json::array Position(const Eigen::Vector3d& p) {
+  return {Rounded(p.x(), 3), Rounded(p.y(), 3), Rounded(p.z(), 3)};
+}
+
+boost::json::object Properties(const Route& route, double cell_m) {
+  boost::json::object properties{{"frame", "map, metres"},
+                                 {"found", route.found},
+                                 {"length_m", Rounded(route.length_m, 3)},
+                                 {"cost", Rounded(route.cost, 3)},
+                                 {"clearance_m", Numbers(route.clearance_m)},
+                                 {"slope_deg", Numbers(route.slope_deg)}};
+  for (const auto& [name, end] : {std::pair("start", &route.start), {"goal", &route.goal}}) {
+    if (*end && (*end)->IsMoved(cell_m)) properties[name] = RouteEndJson(**end);
+  }
+  return properties;
+}
+
+std::string GeoJson(const Route& route, const RouteAtlas& atlas, double cell_m) {
   boost::json::array line;
   for (const Eigen::Vector3d& p : route.waypoints) {
-    line.push_back({Rounded(p.x(), 3), Rounded(p.y(), 3), Rounded(p.z(), 3)});
+    line.push_back(Position(p));
   }
   // A LineString has two positions at least.
   boost::json::value geometry = nullptr;
@@ -30,19 +50,21 @@ std::string GeoJson(const Route& route) {
     geometry = boost::json::object{{"type", "LineString"}, {"coordinates", std::move(line)}};
   }
   const boost::json::object feature{{"type", "Feature"},
+                                    {"atlas", RouteAtlasJson(atlas)},
                                     {"geometry", std::move(geometry)},
-                                    {"properties",
-                                     {{"frame", "map, metres"},
-                                      {"found", route.found},
-                                      {"length_m", Rounded(route.length_m, 3)},
-                                      {"cost", Rounded(route.cost, 3)},
-                                      {"clearance_m", Numbers(route.clearance_m)},
-                                      {"slope_deg", Numbers(route.slope_deg)}}}};
+                                    {"properties", Properties(route, cell_m)}};
   return JsonText(feature) + "\n";
 }
 
-std::string Csv(const Route& route) {
-  std::string text = "x_m,y_m,z_m,along_m,clearance_m,slope_deg\n";
+std::string Csv(const Route& route, double cell_m) {
+  std::string text;
+  for (const auto& [name, end] : {std::pair("start", &route.start), {"goal", &route.goal}}) {
+    if (!*end || !(*end)->IsMoved(cell_m)) continue;
+    const Eigen::Vector3d& asked = (*end)->asked;
+    text += StrCat("# ", name, " (", FixedText(asked.x(), 3), " ", FixedText(asked.y(), 3), " ",
+                   FixedText(asked.z(), 3), ") ", MoveText(**end), "\n");
+  }
+  text += "x_m,y_m,z_m,along_m,clearance_m,slope_deg\n";
   double along_m = 0.0;
   for (std::size_t i = 0; i < route.waypoints.size(); ++i) {
     const Eigen::Vector3d& p = route.waypoints[i];
@@ -64,8 +86,29 @@ Result<RouteFormat> RouteFormatOf(const std::string& file) {
                StrCat("route file '", file, "': expected a name in .geojson, .json or .csv"));
 }
 
-std::string RouteText(const Route& route, RouteFormat format) {
-  return format == RouteFormat::kGeoJson ? GeoJson(route) : Csv(route);
+std::string RouteText(const Route& route,
+                      RouteFormat format,
+                      const RouteAtlas& atlas,
+                      double cell_m) {
+  return format == RouteFormat::kGeoJson ? GeoJson(route, atlas, cell_m) : Csv(route, cell_m);
+}
+
+boost::json::object RouteEndJson(const RouteEnd& end) {
+  return {{"asked", Position(end.asked)},
+          {"at", Position(end.at)},
+          {"aside_m", Rounded(end.aside_m(), 3)},
+          {"above_m", Rounded(end.above_m(), 3)},
+          {"layer", end.layer},
+          {"layers", end.layers}};
+}
+
+std::string MoveText(const RouteEnd& end) {
+  const std::string surface =
+      end.layers == 1 ? std::string("the surface there")
+                      : StrCat("layer ", end.layer, " of ", end.layers, " there, 0 is the lowest");
+  return StrCat("moved ", FixedText(end.aside_m(), 2), " m aside and ",
+                FixedText(std::abs(end.above_m()), 2), end.above_m() < 0.0 ? " m down" : " m up",
+                ", onto ", surface, ", at ", FixedText(end.at.z(), 2), " m");
 }
 
 }  // namespace atlas

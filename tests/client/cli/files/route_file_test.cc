@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include <boost/json/parse.hpp>
 #include <gtest/gtest.h>
 
 #include "client/cli/commands/map/route_text.h"
@@ -22,6 +23,8 @@ class RouteFileTest : public ::testing::Test {
     route_.waypoints = {{1.5, -2.25, 0.125}, {2.0, -2.0, 0.25}, {1e6, 3.0, -4.0}};
     route_.clearance_m = {1.5, 1.2, 1.1};
     route_.slope_deg = {0.0, 3.5, 24.0};
+    route_.start = RouteEnd{{1.5, -2.25, 0.125}, {1.5, -2.25, 0.125}, 0, 1};
+    route_.goal = RouteEnd{{1e6, 2.0, -2.0}, {1e6, 3.0, -4.0}, 1, 3};
   }
   ~RouteFileTest() override { std::filesystem::remove_all(folder_); }
 
@@ -31,17 +34,62 @@ class RouteFileTest : public ::testing::Test {
     return folder_ / name;
   }
 
+  std::string Text(RouteFormat format) const {
+    return RouteText(route_, format, atlas_, profile_.cell_size_m());
+  }
+
   std::filesystem::path folder_;
   Route route_;
+  Bytes atlas_id_ = Bytes(16, 0xAB);
+  MapProfile profile_;
+  RouteAtlas atlas_ = RouteAtlasOf(atlas_id_, profile_);
 };
 
 TEST_F(RouteFileTest, BothFormatsAreReadAsTheyWereWritten) {
   for (const std::string name : {"a.geojson", "a.json", "a.csv"}) {
     const auto format = RouteFormatOf(name);
     ASSERT_TRUE(format.has_value());
-    const auto read = ReadRoute(Write(name, RouteText(route_, *format)));
+    const auto read = ReadRoute(Write(name, Text(*format)));
     ASSERT_TRUE(read.has_value()) << read.error().message();
-    EXPECT_EQ(*read, route_.waypoints) << name;
+    EXPECT_EQ(read->waypoints, route_.waypoints) << name;
+  }
+}
+
+TEST_F(RouteFileTest, EndsThatWereMovedSaySoAndOthersDoNot) {
+  const auto properties =
+      boost::json::parse(Text(RouteFormat::kGeoJson)).at("properties").as_object();
+  EXPECT_FALSE(properties.contains("start"));
+  const auto& goal = properties.at("goal").as_object();
+  EXPECT_EQ(goal.at("asked"), (boost::json::array{1'000'000, 2, -2}));
+  EXPECT_EQ(goal.at("at"), (boost::json::array{1'000'000, 3, -4}));
+  EXPECT_DOUBLE_EQ(goal.at("aside_m").to_number<double>(), 1.0);
+  EXPECT_DOUBLE_EQ(goal.at("above_m").to_number<double>(), -2.0);
+  EXPECT_EQ(goal.at("layer").to_number<int>(), 1);
+  EXPECT_EQ(goal.at("layers").to_number<int>(), 3);
+  const std::string csv = Text(RouteFormat::kCsv);
+  EXPECT_EQ(csv.find("# start"), std::string::npos) << csv;
+  EXPECT_TRUE(
+      csv.starts_with("# goal (1000000.000 2.000 -2.000) moved 1.00 m aside and 2.00 m "
+                      "down, onto layer 1 of 3 there, 0 is the lowest, at -4.00 m\nx_m,"))
+      << csv;
+}
+
+TEST_F(RouteFileTest, GeoJsonNamesItsAtlas) {
+  const auto read = ReadRoute(Write("a.geojson", Text(RouteFormat::kGeoJson)));
+  ASSERT_TRUE(read && read->atlas);
+  EXPECT_EQ(*read->atlas, atlas_);
+  EXPECT_EQ(read->atlas->id, "abababababababababababababababab");
+  EXPECT_EQ(read->atlas->profile.size(), 16U);
+  MapProfile coarser = profile_;
+  coarser.cell_size_um *= 2;
+  EXPECT_NE(*read->atlas, RouteAtlasOf(atlas_id_, coarser));
+  EXPECT_FALSE(ReadRoute(Write("a.csv", Text(RouteFormat::kCsv)))->atlas);
+  // What others put there is theirs.
+  for (const std::string other : {"7", "{}", R"({"id":7,"profile":"x"})", R"({"id":"x"})"}) {
+    const auto foreign = ReadRoute(
+        Write("b.geojson", R"({"atlas":)" + other + R"(,"geometry":{"coordinates":[[1,2,3]]}})"));
+    ASSERT_TRUE(foreign.has_value()) << other;
+    EXPECT_FALSE(foreign->atlas) << other;
   }
 }
 
@@ -63,8 +111,8 @@ TEST_F(RouteFileTest, WhatIsNoRouteIsInvalidData) {
     ASSERT_FALSE(read.has_value()) << text;
     EXPECT_EQ(read.error().code(), StatusCode::kInvalidData) << text;
   }
-  for (const std::string text :
-       {"", "1,2,3\n", "x_m,y_m,z_m\n", "x_m,y_m,z_m\n1;2;3\n", "x_m,y_m,z_m\n1,2,3\nnan,0,0\n"}) {
+  for (const std::string text : {"", "# alone\n", "1,2,3\n", "x_m,y_m,z_m\n",
+                                 "x_m,y_m,z_m\n1;2;3\n", "x_m,y_m,z_m\n1,2,3\nnan,0,0\n"}) {
     const auto read = ReadRoute(Write(std::to_string(i++) + ".csv", text));
     ASSERT_FALSE(read.has_value()) << text;
     EXPECT_EQ(read.error().code(), StatusCode::kInvalidData) << text;

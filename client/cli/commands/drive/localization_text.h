@@ -1,0 +1,27 @@
+// What localized scans look like to a user.
+#pragma once
+
+#include <cstdint>
+#include <ostream>
+
+#include <boost/json/object.hpp>
+
+#include "client/drive/drive_localization.h"
+#include "core/base/status.h"
+
+namespace atlas {
+
+// A line of the stream.
+boost::json::object LocalizedScanJson(const LocalizedScan& scan);
+boost::json::object LocalizationJson(const DriveLocalizationReport& report,
+                                     std::uint64_t bytes_received);
+void PrintLocalization(const DriveLocalizationReport& report,
+                       std::uint64_t bytes_received,
+                       std::ostream& out);
+
+// Scans that could not be read, in the words of the first of them.
+Status CheckReadable(const DriveLocalizationReport& report);
+// kNotFound where all scans are lost; the message says what that may mean and what to do.
+Status CheckLocalized(const DriveLocalizationReport& report, bool is_tracked);
+
+}  // namespace atlas
