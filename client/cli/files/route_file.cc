@@ -62,9 +62,7 @@ std::optional<RouteFile> ParseGeoJson(const std::string& text) {
 std::optional<RouteFile> ParseCsv(const std::string& text) {
   std::istringstream lines(text);
   std::string line;
-  while (std::getline(lines, line) && line.starts_with('#')) {
-  }
-  if (!line.starts_with("x_m,y_m,z_m")) return std::nullopt;
+  if (!std::getline(lines, line) || !line.starts_with("x_m,y_m,z_m")) return std::nullopt;
   Points points;
   while (std::getline(lines, line)) {
     std::istringstream fields(line);

@@ -92,16 +92,15 @@ Status CheckReadable(const DriveLocalizationReport& report) {
                                FixedText(report.score.translation_rmse_m(), 3), " m RMSE")};
 }
 
-Status CheckLocalized(const DriveLocalizationReport& report, bool is_tracked) {
+void NoteLost(const DriveLocalizationReport& report, bool is_tracked, std::ostream& err) {
   const LocalizationScore& score = report.score;
-  if (score.shots() == 0 || score.lost() < score.shots()) return {};
-  return {StatusCode::kNotFound,
-          StrCat("none of ", report.scans,
-                 " scans was localized, all are lost: the map may be of "
-                 "another place, or not have this one yet (atlas wait), or ",
-                 is_tracked ? "the drive begins elsewhere in it than its poses.txt says"
-                            : "the starts are too far off (--perturb)",
-                 "; --relocalize looks for each scan in the whole map")};
+  if (score.shots() == 0 || score.lost() < score.shots()) return;
+  err << "note: none of " << report.scans
+      << " scans was localized, all are lost: the map may be of another place, or not have this "
+         "one yet (atlas wait), or "
+      << (is_tracked ? "the drive begins elsewhere in it than its poses.txt says"
+                     : "the starts are too far off (--perturb)")
+      << "; --relocalize looks for each scan in the whole map\n";
 }
 
 }  // namespace atlas

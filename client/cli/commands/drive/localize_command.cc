@@ -65,7 +65,8 @@ class LocalizeCommand : public Command {
     ATLAS_RETURN_IF_ERROR(contradictions_.Write(map->profile().cell_size_m()));
     ATLAS_RETURN_IF_ERROR(CheckReadable(*report));
     PrintReport(*report, monitor, map->bytes_received(), context);
-    return CheckLocalized(*report, !perturbation_);
+    NoteLost(*report, !perturbation_, context.err);
+    return {};
   }
 
  private:
@@ -173,7 +174,8 @@ class LocalizeCommand : public Command {
     } else {
       PrintRelocalization(*report, context.out);
     }
-    return CheckRelocalized(*report);
+    NoteUnknown(*report, context.err);
+    return {};
   }
 
   DriveFlags drive_;

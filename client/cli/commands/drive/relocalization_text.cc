@@ -80,12 +80,11 @@ void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& 
   facts.Print(out);
 }
 
-Status CheckRelocalized(const DriveRelocalizationReport& report) {
-  if (report.scans == 0 || report.unknown < report.scans) return {};
-  return {StatusCode::kNotFound,
-          StrCat("none of ", report.scans, " scans was found in the map's ", report.places,
-                 " places: it may be of another place, not have this one yet (atlas wait), or have "
-                 "too little that tells it from others")};
+void NoteUnknown(const DriveRelocalizationReport& report, std::ostream& err) {
+  if (report.scans == 0 || report.unknown < report.scans) return;
+  err << "note: none of " << report.scans << " scans was found in the map's " << report.places
+      << " places: it may be of another place, not have this one yet (atlas wait), or have too "
+         "little that tells it from others\n";
 }
 
 }  // namespace atlas

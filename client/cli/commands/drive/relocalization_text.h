@@ -15,7 +15,7 @@ namespace atlas {
 boost::json::object RelocalizedScanJson(const RelocalizedScan& scan);
 boost::json::object RelocalizationJson(const DriveRelocalizationReport& report);
 void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& out);
-// kNotFound where nothing was found of any scan; the message says what that may mean.
-Status CheckRelocalized(const DriveRelocalizationReport& report);
+// Where nothing was found of any scan: what that may mean.
+void NoteUnknown(const DriveRelocalizationReport& report, std::ostream& err);
 
 }  // namespace atlas

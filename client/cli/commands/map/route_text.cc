@@ -56,15 +56,8 @@ std::string GeoJson(const Route& route, const RouteAtlas& atlas, double cell_m) 
   return JsonText(feature) + "\n";
 }
 
-std::string Csv(const Route& route, double cell_m) {
-  std::string text;
-  for (const auto& [name, end] : {std::pair("start", &route.start), {"goal", &route.goal}}) {
-    if (!*end || !(*end)->IsMoved(cell_m)) continue;
-    const Eigen::Vector3d& asked = (*end)->asked;
-    text += StrCat("# ", name, " (", FixedText(asked.x(), 3), " ", FixedText(asked.y(), 3), " ",
-                   FixedText(asked.z(), 3), ") ", MoveText(**end), "\n");
-  }
-  text += "x_m,y_m,z_m,along_m,clearance_m,slope_deg\n";
+std::string Csv(const Route& route) {
+  std::string text = "x_m,y_m,z_m,along_m,clearance_m,slope_deg\n";
   double along_m = 0.0;
   for (std::size_t i = 0; i < route.waypoints.size(); ++i) {
     const Eigen::Vector3d& p = route.waypoints[i];
@@ -90,7 +83,7 @@ std::string RouteText(const Route& route,
                       RouteFormat format,
                       const RouteAtlas& atlas,
                       double cell_m) {
-  return format == RouteFormat::kGeoJson ? GeoJson(route, atlas, cell_m) : Csv(route, cell_m);
+  return format == RouteFormat::kGeoJson ? GeoJson(route, atlas, cell_m) : Csv(route);
 }
 
 boost::json::object RouteEndJson(const RouteEnd& end) {

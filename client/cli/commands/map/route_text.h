@@ -20,8 +20,7 @@ Result<RouteFormat> RouteFormatOf(const std::string& file);
 // latitude, with the route's figures and each point's clearance and slope as its properties;
 // without a geometry when no route was found; `atlas`, beside them, names the atlas that it was
 // planned in. kCsv: a line a waypoint, x_m,y_m,z_m,along_m,clearance_m,slope_deg. Ends that were
-// moved by more than half a cell (`cell_m`) are `start` and `goal` of the properties, or lines
-// before the first that begin with #.
+// moved by more than half a cell (`cell_m`) are `start` and `goal` of the properties.
 std::string RouteText(const Route& route,
                       RouteFormat format,
                       const RouteAtlas& atlas,

@@ -66,12 +66,7 @@ TEST_F(RouteFileTest, EndsThatWereMovedSaySoAndOthersDoNot) {
   EXPECT_DOUBLE_EQ(goal.at("above_m").to_number<double>(), -2.0);
   EXPECT_EQ(goal.at("layer").to_number<int>(), 1);
   EXPECT_EQ(goal.at("layers").to_number<int>(), 3);
-  const std::string csv = Text(RouteFormat::kCsv);
-  EXPECT_EQ(csv.find("# start"), std::string::npos) << csv;
-  EXPECT_TRUE(
-      csv.starts_with("# goal (1000000.000 2.000 -2.000) moved 1.00 m aside and 2.00 m "
-                      "down, onto layer 1 of 3 there, 0 is the lowest, at -4.00 m\nx_m,"))
-      << csv;
+  EXPECT_TRUE(Text(RouteFormat::kCsv).starts_with("x_m,y_m,z_m,")) << "a table and nothing else";
 }
 
 TEST_F(RouteFileTest, GeoJsonNamesItsAtlas) {
@@ -111,8 +106,8 @@ TEST_F(RouteFileTest, WhatIsNoRouteIsInvalidData) {
     ASSERT_FALSE(read.has_value()) << text;
     EXPECT_EQ(read.error().code(), StatusCode::kInvalidData) << text;
   }
-  for (const std::string text : {"", "# alone\n", "1,2,3\n", "x_m,y_m,z_m\n",
-                                 "x_m,y_m,z_m\n1;2;3\n", "x_m,y_m,z_m\n1,2,3\nnan,0,0\n"}) {
+  for (const std::string text :
+       {"", "1,2,3\n", "x_m,y_m,z_m\n", "x_m,y_m,z_m\n1;2;3\n", "x_m,y_m,z_m\n1,2,3\nnan,0,0\n"}) {
     const auto read = ReadRoute(Write(std::to_string(i++) + ".csv", text));
     ASSERT_FALSE(read.has_value()) << text;
     EXPECT_EQ(read.error().code(), StatusCode::kInvalidData) << text;
