@@ -63,7 +63,8 @@ TEST_F(LocalizationBenchTest, RawReturnsOfElsewhereAreNoPlace) {
   Pose elsewhere = piece_->drive().scans[1].T_world_sensor;
   elsewhere.translation().x() += 500.0;
   (*icp)->Start(elsewhere);
-  const PointCloud cloud{{{5.0F, 0.0F, 0.0F}, {6.0F, 0.0F, 0.0F}}};
+  PointCloud cloud;
+  cloud.points = {{5.0F, 0.0F, 0.0F}, {6.0F, 0.0F, 0.0F}};
   EXPECT_EQ((*icp)->Locate(cloud, Eigen::Quaterniond::Identity())->health,
             LocalizationHealth::kLost);
 }
