@@ -102,5 +102,21 @@ TEST_F(DamageLooksTest, SoIsOneThatCannotBeWritten) {
   EXPECT_EQ(failures.errors, 1);
 }
 
+// About an hour later; what became damaged since is noted then.
+TEST_F(DamageLooksTest, OneThatGoesOnFailingIsLookedAtAgain) {
+  Fill();
+  Tamper(kSpoilBlob);
+  const TileId tile = TileOfTheDamaged();
+  const auto keyframes = store_->ListKeyframesOfTile(tile).value();
+  ASSERT_GT(keyframes.back(), 4) << "one that is read behind the damaged one";
+  Close();
+  MarkAlone(tile);
+  FailTimes(70, [&] {
+    Beside("UPDATE keyframes SET blob = zeroblob(blob_bytes) WHERE id = " +
+           std::to_string(keyframes.back()));
+  });
+  EXPECT_EQ(Listed(), 2U);
+}
+
 }  // namespace
 }  // namespace atlas
