@@ -48,7 +48,7 @@ void WriteVersion(Connection& connection) {
 }
 
 Status RunInOneTransaction(Connection& connection, std::int64_t from, const MapProfile& profile) {
-  connection.Execute("BEGIN IMMEDIATE");
+  connection.Begin();
   AddUpgradeEvent(connection, from, RunSteps(connection, from, profile));
   WriteTableSums(connection);
   WriteVersion(connection);
@@ -57,7 +57,7 @@ Status RunInOneTransaction(Connection& connection, std::int64_t from, const MapP
             StrCat("upgrading it from schema version ", from, ": ", damage.what,
                    "; nothing was changed; put a copy of the data directory back")};
   }
-  connection.Execute("COMMIT");
+  connection.Commit();
   return {};
 }
 
