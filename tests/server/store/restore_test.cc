@@ -273,35 +273,50 @@ TEST_F(RestoreTest, ALogFollowsTheAtlasThatItGoesOnFromAlone) {
   ASSERT_TRUE(Restore().has_value());
   const std::string atlas = restored().string();
   std::string older;
+  std::string older_log;
   for (const std::uint32_t sequence : {50U, 51U, 52U}) {
     OpenRestored();
     ASSERT_TRUE(Put(Keyframe(sequence)));
     if (sequence == 50) {
+      older_log = Read(atlas + "-wal");
       store_.reset();
       older = Read(restored());
     }
   }
   const std::string own = Read(restored());
-  const std::string log = Read(atlas + "-wal");
+  const std::string own_log = Read(atlas + "-wal");
   const std::string note = Read(atlas + "-revision");
   store_.reset();
-  for (const auto& [kept, has_note, follows] :
-       {std::tuple(own, true, true), std::tuple(own, false, false), std::tuple(older, true, false),
-        std::tuple(older, false, false)}) {
+  struct Case {
+    const char* what;
+    std::string kept;
+    std::string log;
+    std::string noted_at;
+    bool follows;
+  };
+  const std::string kept_note = ".replaced-1-revision";
+  for (const Case& is : {Case{"its own", own, own_log, "-revision", true},
+                         Case{"its own, and the note was moved", own, own_log, kept_note, true},
+                         Case{"its own, and nothing says so", own, own_log, "", false},
+                         Case{"of an older run", own, older_log, "-revision", false},
+                         Case{"of an older run, the note moved", own, older_log, kept_note, false},
+                         Case{"of a newer run", older, own_log, "-revision", false},
+                         Case{"nothing tells", older, own_log, "", false}}) {
+    SCOPED_TRACE(is.what);
     std::filesystem::remove_all(restored().parent_path());
     std::filesystem::create_directories(restored().parent_path());
-    Write(atlas + ".replaced-1", kept);
-    Write(atlas + "-wal", log);
-    if (has_note) {
-      Write(atlas + "-revision", note);
+    Write(atlas + ".replaced-1", is.kept);
+    Write(atlas + "-wal", is.log);
+    if (!is.noted_at.empty()) {
+      Write(atlas + is.noted_at, note);
     }
     Write(atlas + ".partial", "half a copy");
     const auto done = Restore();
     ASSERT_TRUE(done.has_value()) << done.error().message();
-    EXPECT_EQ(done->kept.filename(), follows ? "atlas.db.replaced-1" : "atlas.db.replaced-2");
-    EXPECT_EQ(Read(done->kept.string() + "-wal"), log);
-    EXPECT_EQ(std::filesystem::exists(atlas + ".replaced-1-wal"), follows);
-    EXPECT_EQ(Read(atlas + ".replaced-1"), kept);
+    EXPECT_EQ(done->kept.filename(), is.follows ? "atlas.db.replaced-1" : "atlas.db.replaced-2");
+    EXPECT_EQ(Read(done->kept.string() + "-wal"), is.log);
+    EXPECT_EQ(std::filesystem::exists(atlas + ".replaced-1-wal"), is.follows);
+    EXPECT_EQ(Read(atlas + ".replaced-1"), is.kept);
   }
 }
 
