@@ -11,6 +11,8 @@
 
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/connection/log_damage.h"
+#include "server/store/sqlite/schema/row_hash.h"
+#include "server/store/sqlite/transactions/schema_repair.h"
 #include "tests/server/store/schema_fixture.h"
 
 namespace atlas {
@@ -128,6 +130,30 @@ TEST_F(TornEndTest, StaysBesideWhatCannotBePutRight) {
   EXPECT_THAT(refused.error().message(), HasSubstr("nothing was changed"));
   EXPECT_EQ(BytesOf(Database()), database);
   EXPECT_EQ(BytesOf(Log()), log);
+}
+
+// It is gone then, which is not nothing.
+TEST_F(TornEndTest, AnUpgradeThatIsRefusedBehindItSaysWhatIsTrue) {
+  testing::MakeEarlierStore({"store_v4", 4}, Database());
+  Spoil(Database(), "sql = replace(sql, 'z_um INTEGER', 'z_um INTEGES') WHERE name = 'poses'");
+  const auto rows = testing::DumpStore(Database());
+  Tear();
+  const auto refused = OpenSqliteStore(options_);
+  ASSERT_FALSE(refused);
+  EXPECT_FALSE(HasRest());
+  EXPECT_THAT(refused.error().message(), HasSubstr("nothing that was committed was changed"));
+  EXPECT_EQ(testing::DumpStore(Database()), rows);
+}
+
+TEST_F(TornEndTest, SoDoesARepairOfTheSchema) {
+  Fill(4);
+  store_.reset();
+  Spoil(Database(), kSpoilSchema);
+  Connection connection({Database(), DatabaseOptions::Mode::kReadWrite, 1'024, 0, true});
+  AddRowHash(connection);
+  const auto refused = RepairSchema(connection, [&] { Tamper("DELETE FROM poses"); });
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message(), HasSubstr("nothing that was committed was changed"));
 }
 
 }  // namespace

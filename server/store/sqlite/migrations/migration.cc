@@ -55,7 +55,8 @@ Status RunInOneTransaction(Connection& connection, std::int64_t from, const MapP
   if (const SchemaDamage damage = FindSchemaDamage(connection); !damage.is_none()) {
     return {StatusCode::kInvalidData,
             StrCat("upgrading it from schema version ", from, ": ", damage.what,
-                   "; nothing was changed; put a copy of the data directory back")};
+                   "; nothing that was committed was changed; put a copy of the data directory "
+                   "back")};
   }
   connection.Commit();
   return {};
