@@ -24,7 +24,8 @@ Result<RestoreSummary> RestoreBackup(const RestorePlan& plan) {
                         Bytes(backup.sha256.begin(), backup.sha256.end()),
                         done->epoch,
                         done->revision,
-                        done->kept};
+                        done->kept,
+                        done->left};
 }
 
 }  // namespace atlas

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <vector>
 
 #include "core/base/bytes.h"
 #include "core/base/status.h"
@@ -28,7 +29,10 @@ struct RestoreSummary {
   Bytes sha256;  // of its tiles, as in a DigestSummary
   std::uint64_t new_epoch = 0;
   std::uint64_t new_revision = 0;
-  std::filesystem::path kept;  // what was there before; empty: nothing
+  std::filesystem::path kept;  // the atlas.db that was there before; empty: none
+  // Then, the log or the note of one that was there without it: writes that were acknowledged may
+  // be in that log alone.
+  std::vector<std::filesystem::path> left;
 };
 
 // Reads all of the backup before anything is written. kNotFound: there is none. kInvalidArgument:

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "core/base/bytes.h"
 #include "core/base/status.h"
@@ -74,7 +75,9 @@ struct RestoredAtlas {
   AtlasFacts backup;
   std::uint64_t epoch = 0;     // from now on
   std::uint64_t revision = 0;  // likewise
-  std::filesystem::path kept;  // what was there before; empty: nothing
+  std::filesystem::path kept;  // the database that was there before; empty: none
+  // Then, what was left of one, under names of its own: commits may be in that log alone.
+  std::vector<std::filesystem::path> left;
 };
 
 }  // namespace atlas

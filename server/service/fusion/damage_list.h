@@ -1,6 +1,6 @@
-// The tiles that cannot be fused because something they are made of is damaged, as the workers last
-// found. They keep the content they have and stay dirty: a worker tries again now and then.
-// Thread-safe.
+// The tiles that cannot be fused because something they are made of is damaged, or what the store
+// keeps of them is, as the workers last found. They keep the content they have and stay dirty: a
+// worker tries again now and then. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ class DamageList {
   // True when the tile was not listed with this reason before. `is_noted`: what it is made of was
   // looked at, and what is damaged of it is noted in the store.
   bool Add(const TileId& id, const Status& why, bool is_noted);
-  // The tile was fused, or failed for another reason.
+  // The tile was fused and written, or failed for another reason.
   void Remove(const TileId& id);
 
   bool Contains(const TileId& id) const;

@@ -210,7 +210,6 @@ void FusionScheduler::BuildClaims(Worker& worker,
       PostponeFailed(worker, claim, built.error());
       return;
     }
-    damage_.Remove(id);
     ++tiles_built_;
     FinishedTile tile{claim, built->revision, std::move(built->content)};
     const bool is_removal = !tile.content;
@@ -228,8 +227,11 @@ void FusionScheduler::BuildClaims(Worker& worker,
       log_(LogLevel::kWarning, "fusion: " + result.error().message());
     } else if (!result) {
       PostponeFailed(worker, tile.claim, result.error());
-    } else if (result->is_changed) {
-      changed_(tile.claim.id, tile.is_removal ? 0 : result->revision);
+    } else {
+      damage_.Remove(tile.claim.id);  // not before: one that cannot be written is listed as well
+      if (result->is_changed) {
+        changed_(tile.claim.id, tile.is_removal ? 0 : result->revision);
+      }
     }
   }
   GiveBack(worker);

@@ -1,8 +1,11 @@
 #include "server/store/sqlite/damaged_log.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <fstream>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/base/str_cat.h"
 
@@ -11,6 +14,7 @@ namespace {
 
 constexpr std::uintmax_t kHeaderBytes = 32;
 constexpr std::uintmax_t kFrameHeaderBytes = 24;
+constexpr std::streamsize kStepBytes = 64 << 10;
 
 // Nobody looks at what is behind the last commit, so that nobody needs to be waited for.
 void CutBehindLastCommit(Connection& writer, const std::filesystem::path& log) {
@@ -28,6 +32,45 @@ void CutBehindLastCommit(Connection& writer, const std::filesystem::path& log) {
   }
 }
 
+// What cannot be read is not the same.
+bool HaveSameBytes(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::ifstream one(a, std::ios::binary);
+  std::ifstream other(b, std::ios::binary);
+  std::vector<char> of_one(kStepBytes);
+  std::vector<char> of_other(kStepBytes);
+  while (one && other) {
+    one.read(of_one.data(), kStepBytes);
+    other.read(of_other.data(), kStepBytes);
+    if (one.gcount() != other.gcount() ||
+        !std::equal(of_one.begin(), of_one.begin() + one.gcount(), of_other.begin())) {
+      return false;
+    }
+  }
+  return one.eof() && other.eof();
+}
+
+// By the first number that is free; or the copy that a start has kept that was refused, for a log
+// that stays as it is takes its room once.
+Status KeepCopy(const std::filesystem::path& log, DamagedLog& damaged) {
+  std::error_code error;
+  for (int number = 1; number == 1 || std::filesystem::exists(damaged.kept, error); ++number) {
+    damaged.kept = log.string() + StrCat(".damaged-", number);
+    if (HaveSameBytes(log, damaged.kept)) {
+      return {};
+    }
+  }
+  if (std::filesystem::copy_file(log, damaged.kept, error)) {
+    return {};
+  }
+  if (error != std::errc::file_exists) {  // then a part of it, where the disk is full
+    std::error_code ignored;
+    std::filesystem::remove(damaged.kept, ignored);
+  }
+  return {StatusCode::kUnavailable,
+          StrCat(log.string(), " is damaged at frame ", damaged.damage.frame,
+                 ", and no copy of it can be kept: ", error.message())};
+}
+
 }  // namespace
 
 Result<DamagedLog> MendLog(const std::filesystem::path& log) {
@@ -37,14 +80,8 @@ Result<DamagedLog> MendLog(const std::filesystem::path& log) {
   }
   DamagedLog damaged{{}, *found};
   if (damaged.is_lossy() || !found->turned.empty()) {
-    std::error_code error;
-    for (int number = 1; number == 1 || std::filesystem::exists(damaged.kept, error); ++number) {
-      damaged.kept = log.string() + StrCat(".damaged-", number);
-    }
-    if (!std::filesystem::copy_file(log, damaged.kept, error)) {
-      return Error(StatusCode::kUnavailable,
-                   StrCat(log.string(), " is damaged at frame ", damaged.damage.frame,
-                          ", and no copy of it can be kept: ", error.message()));
+    if (Status status = KeepCopy(log, damaged); !status.ok()) {
+      return Error(std::move(status));
     }
   }
   if (!found->turned.empty()) {

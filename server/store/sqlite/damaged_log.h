@@ -19,7 +19,8 @@ struct DamagedLog {
 };
 
 // Turns bits back in it where that mends it. Before that, and before SQLite drops what is behind
-// other damage, a copy is kept: who knows better can look at it. kUnavailable: the disk.
+// other damage, a copy is kept, once of each such log: who knows better can look at it.
+// kUnavailable: the disk.
 Result<DamagedLog> MendLog(const std::filesystem::path& log);
 
 // For people.

@@ -120,12 +120,13 @@ Status MakeCopy(const RestoreOrder& order, const fs::path& target, RestoredAtlas
 
 Status Replace(const fs::path& target, bool was_interrupted, RestoredAtlas& restored) {
   ATLAS_RETURN_IF_ERROR(SyncFolder(target.parent_path()));  // the copy is found by its name
-  Result<fs::path> kept = MoveAside(
+  Result<KeptAtlas> kept = MoveAside(
       target, [&](const fs::path& last) { return was_interrupted && DoesLogFollow(target, last); });
   if (!kept) {
     return kept.error();
   }
-  restored.kept = *std::move(kept);
+  restored.kept = std::move(kept->database);
+  restored.left = std::move(kept->left);
   return PublishCopy(target);
 }
 

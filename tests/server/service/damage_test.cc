@@ -1,10 +1,6 @@
 // Rows that are not what was written, under a running service: what it goes on serving, what heals
 // by itself, by the vehicle, or by who repairs.
-#include <atomic>
-#include <future>
-
 #include "server/service/verification/atlas_verify.h"
-#include "tests/server/service/blob_reads.h"
 #include "tests/server/service/damage_fixture.h"
 #include "tests/server/store/lost_rows.h"
 
@@ -331,42 +327,6 @@ TEST_F(DamageTest, LostMarksAreSetAgain) {
   std::filesystem::remove_all(directory_ / "data");
   Fill();
   EXPECT_EQ(digest.sha256, intact_.sha256);
-}
-
-// What a tile is made of is read by who builds it, up to what is damaged; all of it is looked at
-// once.
-TEST_F(DamageTest, ATileThatGoesOnFailingIsLookedAtOnce) {
-  Fill();
-  Tamper(kSpoilBlob);
-  const std::vector<TileId> footprint = store_->ReadKeyframe(4).value().footprint;
-  Close();
-  std::atomic<int> reads = 0;
-  const BlobReads watch([&] { ++reads; });
-  OpenStore();
-  ASSERT_TRUE(Await<std::uint32_t>(
-      [&](auto done) { store_->MarkDirty({footprint.front()}, std::move(done)); }));
-  constexpr int kTries = 12;
-  int first = 0;
-  std::promise<int> tried;
-  ServiceOptions options;
-  options.fusion.building.surveys = {0, 0};
-  options.fusion.min_backoff_ms = 0;
-  service_ = std::make_unique<AtlasService>(
-      *store_, [] { return kTestNow_ms; },
-      [&, tries = 0](LogLevel, const std::string& message) mutable {
-        if (message.find("keeps its content and stays dirty") != std::string::npos) {
-          first = tries == 0 ? reads.load() : first;
-          if (++tries == kTries) {
-            tried.set_value(reads - first);
-          }
-        }
-      },
-      options);
-  auto later = tried.get_future();
-  ASSERT_EQ(later.wait_for(std::chrono::seconds(60)), std::future_status::ready);
-  service_.reset();
-  EXPECT_GT(first, 2);
-  EXPECT_LT(later.get(), 2 * (kTries - 1)) << "the damaged one at each";
 }
 
 }  // namespace

@@ -9,6 +9,9 @@
 #include <optional>
 #include <random>
 
+#include <signal.h>
+#include <sys/resource.h>
+
 #include "server/store/event_types.h"
 #include "server/store/sqlite/connection/connection.h"
 #include "server/store/sqlite/damaged_log.h"
@@ -97,6 +100,11 @@ class LogDamageTest : public StoreTest {
   static std::size_t ByteOf(std::size_t frame) { return 32 + frame * kFrameBytes + 24 + 100; }
   std::size_t Frames() { return (killed_["atlas.db-wal"].size() - 32) / kFrameBytes; }
   fs::path Log() const { return options_.directory / "atlas.db-wal"; }
+  std::ptrdiff_t Copies() const {
+    return std::count_if(fs::directory_iterator(options_.directory), {}, [](const auto& entry) {
+      return entry.path().string().find(".damaged-") != std::string::npos;
+    });
+  }
   std::size_t Keyframes() { return store_->ListKeyframeIds(0, 100).value().size(); }
   bool IsToldOfLoss() {
     const auto events = store_->ListEvents(0, 100).value();
@@ -206,6 +214,40 @@ TEST_F(LogDamageTest, AnAtlasOfPagesOfDifferentCommitsIsRefusedAsItIs) {
     EXPECT_FALSE(fs::exists(Log().string() + ".damaged-1"));
   }
   EXPECT_GT(refused, 0u);
+}
+
+// The log stays as it is, and who looks for help starts again.
+TEST_F(LogDamageTest, RefusedStartsKeepOneCopy) {
+  Live();
+  constexpr std::size_t kVersionAt = 63;  // of the schema, in the header of the database
+  killed_["atlas.db"][kVersionAt] = 99;
+  Revive(ByteOf(20), 0x0f, 0x33);
+  const Bytes log = ReadFile(Log());
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_EQ(OpenCode(), StatusCode::kUnsupported);
+    EXPECT_EQ(ReadFile(Log()), log);
+  }
+  EXPECT_EQ(Copies(), 1);
+  Revive(ByteOf(20), 0x0f, 0x36);
+  WriteFile(Log().string() + ".damaged-1", log);
+  ASSERT_EQ(OpenCode(), StatusCode::kUnsupported);
+  EXPECT_EQ(ReadFile(Log().string() + ".damaged-1"), log) << "of another damage";
+  EXPECT_EQ(ReadFile(Log().string() + ".damaged-2"), ReadFile(Log()));
+}
+
+TEST_F(LogDamageTest, NoPartOfACopyIsLeftOnAFullDisk) {
+  Live();
+  Revive(ByteOf(20), 0x0f, 0x33);
+  ::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit full{4'096, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
+  const auto mended = MendLog(Log());
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  ASSERT_FALSE(mended);
+  EXPECT_EQ(mended.error().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(Copies(), 0);
 }
 
 TEST_F(LogDamageTest, WhatWasLostIsNotLostOnceMore) {

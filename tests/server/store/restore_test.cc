@@ -4,11 +4,15 @@
 #include <string_view>
 #include <tuple>
 
+#include <gmock/gmock.h>
+
 #include "server/store/sqlite/schema/schema.h"
 #include "tests/server/store/backup_fixture.h"
 
 namespace atlas {
 namespace {
+
+using ::testing::ElementsAre;
 
 class RestoreTest : public BackupTest {
  protected:
@@ -234,6 +238,22 @@ TEST_F(RestoreTest, TheLogOfAnAtlasThatWasMovedFollowsIt) {
   EXPECT_FALSE(std::filesystem::exists(restored().string() + "-wal"));
 }
 
+// All of it was moved, and the copy has not got its name.
+TEST_F(RestoreTest, WhatAnInterruptedRestoreMovedIsNamed) {
+  BackUp();
+  ASSERT_TRUE(Restore().has_value());
+  std::filesystem::rename(restored(), restored().string() + ".replaced-3");
+  Write(restored().string() + ".partial", "half a copy");
+  const auto done = Restore();
+  ASSERT_TRUE(done.has_value()) << done.error().message();
+  EXPECT_EQ(done->kept, restored().string() + ".replaced-3");
+  EXPECT_TRUE(done->left.empty());
+  std::filesystem::remove(restored());
+  const auto anew = Restore();
+  ASSERT_TRUE(anew.has_value()) << anew.error().message();
+  EXPECT_EQ(anew->kept, "") << "nobody was interrupted";
+}
+
 // Of another atlas than the one that was kept last: that one has its own log, or nobody was
 // interrupted.
 TEST_F(RestoreTest, NothingThatIsKeptIsWrittenOver) {
@@ -252,17 +272,20 @@ TEST_F(RestoreTest, NothingThatIsKeptIsWrittenOver) {
     }
     const auto done = Restore();
     ASSERT_TRUE(done.has_value()) << done.error().message();
-    EXPECT_EQ(done->kept.filename(), "atlas.db.replaced-2");
-    EXPECT_EQ(Read(done->kept.string() + "-wal"), "a log of today");
-    EXPECT_EQ(Read(done->kept.string() + "-revision"), "a note of today");
+    EXPECT_EQ(done->kept, "") << "no database was";
+    ASSERT_THAT(done->left, ElementsAre(restored().string() + ".replaced-2-wal",
+                                        restored().string() + ".replaced-2-revision"));
+    EXPECT_EQ(Read(done->left[0]), "a log of today");
+    EXPECT_EQ(Read(done->left[1]), "a note of today");
     EXPECT_EQ(std::filesystem::exists(kept + "-wal"), was_interrupted);
     EXPECT_FALSE(std::filesystem::exists(kept + "-revision"));
     std::filesystem::remove(restored());
     Write(restored().string() + "-wal", "a log of tomorrow");
     const auto again = Restore();
     ASSERT_TRUE(again.has_value()) << again.error().message();
-    EXPECT_EQ(again->kept.filename(), "atlas.db.replaced-3") << "a log alone takes a number, too";
-    EXPECT_EQ(Read(done->kept.string() + "-wal"), "a log of today");
+    EXPECT_THAT(again->left, ElementsAre(restored().string() + ".replaced-3-wal"))
+        << "a log alone takes a number, too";
+    EXPECT_EQ(Read(done->left[0]), "a log of today");
   }
 }
 
@@ -273,35 +296,51 @@ TEST_F(RestoreTest, ALogFollowsTheAtlasThatItGoesOnFromAlone) {
   ASSERT_TRUE(Restore().has_value());
   const std::string atlas = restored().string();
   std::string older;
+  std::string older_log;
   for (const std::uint32_t sequence : {50U, 51U, 52U}) {
     OpenRestored();
     ASSERT_TRUE(Put(Keyframe(sequence)));
     if (sequence == 50) {
+      older_log = Read(atlas + "-wal");
       store_.reset();
       older = Read(restored());
     }
   }
   const std::string own = Read(restored());
-  const std::string log = Read(atlas + "-wal");
+  const std::string own_log = Read(atlas + "-wal");
   const std::string note = Read(atlas + "-revision");
   store_.reset();
-  for (const auto& [kept, has_note, follows] :
-       {std::tuple(own, true, true), std::tuple(own, false, false), std::tuple(older, true, false),
-        std::tuple(older, false, false)}) {
+  struct Case {
+    const char* what;
+    std::string kept;
+    std::string log;
+    std::string noted_at;
+    bool follows;
+  };
+  const std::string kept_note = ".replaced-1-revision";
+  for (const Case& is : {Case{"its own", own, own_log, "-revision", true},
+                         Case{"its own, and the note was moved", own, own_log, kept_note, true},
+                         Case{"its own, and nothing says so", own, own_log, "", false},
+                         Case{"of an older run", own, older_log, "-revision", false},
+                         Case{"of an older run, the note moved", own, older_log, kept_note, false},
+                         Case{"of a newer run", older, own_log, "-revision", false},
+                         Case{"nothing tells", older, own_log, "", false}}) {
+    SCOPED_TRACE(is.what);
     std::filesystem::remove_all(restored().parent_path());
     std::filesystem::create_directories(restored().parent_path());
-    Write(atlas + ".replaced-1", kept);
-    Write(atlas + "-wal", log);
-    if (has_note) {
-      Write(atlas + "-revision", note);
+    Write(atlas + ".replaced-1", is.kept);
+    Write(atlas + "-wal", is.log);
+    if (!is.noted_at.empty()) {
+      Write(atlas + is.noted_at, note);
     }
     Write(atlas + ".partial", "half a copy");
     const auto done = Restore();
     ASSERT_TRUE(done.has_value()) << done.error().message();
-    EXPECT_EQ(done->kept.filename(), follows ? "atlas.db.replaced-1" : "atlas.db.replaced-2");
-    EXPECT_EQ(Read(done->kept.string() + "-wal"), log);
-    EXPECT_EQ(std::filesystem::exists(atlas + ".replaced-1-wal"), follows);
-    EXPECT_EQ(Read(atlas + ".replaced-1"), kept);
+    EXPECT_EQ(done->kept, is.follows ? atlas + ".replaced-1" : "");
+    EXPECT_EQ(done->left.empty(), is.follows);
+    EXPECT_EQ(Read(atlas + (is.follows ? ".replaced-1-wal" : ".replaced-2-wal")), is.log);
+    EXPECT_EQ(std::filesystem::exists(atlas + ".replaced-1-wal"), is.follows);
+    EXPECT_EQ(Read(atlas + ".replaced-1"), is.kept);
   }
 }
 

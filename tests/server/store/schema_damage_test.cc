@@ -6,7 +6,6 @@
 
 #include <gmock/gmock.h>
 
-#include "server/store/sqlite/connection/log_damage.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/store_snapshot.h"
 #include "tests/server/store/schema_fixture.h"
@@ -188,45 +187,6 @@ TEST_F(SchemaDamageTest, SeveralArePutBackAtOnce) {
   store_.reset();
   EXPECT_EQ(Texts(), texts);
   EXPECT_EQ(RowsOf(Database()), rows);
-}
-
-// What a kill left at the end of the log goes before the schema is put back, and stays where it is
-// not.
-TEST_F(SchemaDamageTest, ALogWithATornEndIsAsItWasBesideWhatCannotBePutRight) {
-  const std::string log = Database().string() + "-wal";
-  for (const bool is_whole : {true, false}) {
-    SCOPED_TRACE(is_whole);
-    store_.reset();
-    std::filesystem::remove_all(options_.directory);
-    Fill(4);
-    store_.reset();
-    if (!is_whole) {
-      Tamper("DELETE FROM poses");
-    }
-    Spoil(Database(), kDamages[0].how);
-    {
-      Connection connection({Database(), DatabaseOptions::Mode::kReadWrite, 1'024, 0, true});
-      connection.KeepLog(true);
-      const std::string version =
-          "PRAGMA user_version = " + std::to_string(connection.Ask("PRAGMA user_version"));
-      connection.Execute(version.c_str());
-      connection.Execute(version.c_str());
-    }
-    std::string torn = BytesOf(log);
-    std::fill(torn.end() - 100, torn.end(), 'Z');
-    std::ofstream(log, std::ios::binary) << torn;
-    ASSERT_TRUE(FindLogDamage(log, true)->has_rest);
-    if (is_whole) {
-      told_.clear();
-      Open();
-      EXPECT_THAT(told_, HasSubstr(kDamages[0].of));
-      EXPECT_TRUE(CheckAll().ok()) << CheckAll().message();
-      EXPECT_FALSE(FindLogDamage(log, true)->has_rest);
-    } else {
-      EXPECT_THAT(Refusal(), HasSubstr("nothing was changed"));
-      EXPECT_EQ(BytesOf(log), torn);
-    }
-  }
 }
 
 // Capitals and the layout are nothing that SQLite reads, nor are the quotes that it sets itself.

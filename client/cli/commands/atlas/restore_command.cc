@@ -2,8 +2,8 @@
 #include "client/atlas_file/backup_restore.h"
 #include "client/cli/command_line/interruption.h"
 #include "client/cli/commands/atlas/atlas_commands.h"
+#include "client/cli/commands/atlas/restore_text.h"
 #include "client/cli/output/progress_bar.h"
-#include "client/cli/output/text_table.h"
 
 namespace atlas {
 namespace {
@@ -25,23 +25,7 @@ class RestoreCommand : public Command {
   Status Run(CommandContext& context) override {
     const auto done = WithProgress(context);
     if (!done) return done.error();
-    if (context.is_json) {
-      context.PrintJson({{"backup_revision", done->revision},
-                         {"keyframes", done->keyframes},
-                         {"tiles", done->tiles},
-                         {"bytes", done->bytes},
-                         {"digest", HexText(done->sha256)},
-                         {"epoch", done->new_epoch},
-                         {"revision", done->new_revision},
-                         {"kept", done->kept.string()}});
-    } else {
-      context.out << HexText(done->sha256) << "  " << done->tiles << " tiles, " << done->keyframes
-                  << " keyframes of revision " << done->revision << "; now epoch "
-                  << done->new_epoch << ", revision " << done->new_revision << '\n';
-      if (!done->kept.empty()) {
-        context.out << "what was there is " << done->kept.string() << '\n';
-      }
-    }
+    PrintRestore(*done, context);
     return {};
   }
 

@@ -72,9 +72,23 @@ void Undo(const Renames& done) {
   }
 }
 
+// SQLite makes the index of a log anew.
+KeptAtlas WhatIsKept(const fs::path& kept, const Renames& done) {
+  if (IsThere(kept)) {
+    return {kept, {}};
+  }
+  KeptAtlas atlas;
+  for (const auto& [from, to] : done) {
+    if (!to.native().ends_with("-shm")) {
+      atlas.left.push_back(to);
+    }
+  }
+  return atlas;
+}
+
 }  // namespace
 
-Result<fs::path> MoveAside(const fs::path& database, const MayFollowKept& may_follow) {
+Result<KeptAtlas> MoveAside(const fs::path& database, const MayFollowKept& may_follow) {
   const fs::path kept = NameFor(database, may_follow);
   Renames done;
   for (const char* suffix : kSuffixes) {
@@ -90,14 +104,13 @@ Result<fs::path> MoveAside(const fs::path& database, const MayFollowKept& may_fo
     }
     done.emplace_back(from, to);
   }
-  if (done.empty()) {
-    return fs::path();
+  if (!done.empty()) {
+    if (Status status = SyncFolder(database.parent_path()); !status.ok()) {
+      Undo(done);
+      return Error(std::move(status));
+    }
   }
-  if (Status status = SyncFolder(database.parent_path()); !status.ok()) {
-    Undo(done);
-    return Error(std::move(status));
-  }
-  return kept;
+  return WhatIsKept(kept, done);
 }
 
 }  // namespace atlas

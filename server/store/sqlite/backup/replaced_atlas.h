@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <vector>
 
 #include "core/base/status.h"
 
@@ -15,12 +16,17 @@ inline constexpr std::string_view kReplaced = ".replaced-";
 // Whether what an interrupted restore left of an atlas is of the one that is kept under this name.
 using MayFollowKept = std::function<bool(const std::filesystem::path& kept)>;
 
+// What there was, under its names from now on.
+struct KeptAtlas {
+  std::filesystem::path database;           // empty: there was none
+  std::vector<std::filesystem::path> left;  // of one that is not there: its log, its note
+};
+
 // `database` and what SQLite keeps beside it are called database.replaced-N, by the first number
-// behind all that there are, durably; the name is returned, empty where there was nothing. Nothing
-// that is kept is written over. Where the database itself is not there, what is left of it follows
-// the last one that is kept, if that lacks it, and `may_follow`. After an error all is where it
-// was, as far as the disk lets it. The caller holds the directory.
-Result<std::filesystem::path> MoveAside(const std::filesystem::path& database,
-                                        const MayFollowKept& may_follow);
+// behind all that there are, durably. Nothing that is kept is written over. Where the database
+// itself is not there, what is left of it follows the last one that is kept, if that lacks it, and
+// `may_follow`: also if nothing is left. After an error all is where it was, as far as the disk
+// lets it. The caller holds the directory.
+Result<KeptAtlas> MoveAside(const std::filesystem::path& database, const MayFollowKept& may_follow);
 
 }  // namespace atlas

@@ -48,16 +48,17 @@ void WriteVersion(Connection& connection) {
 }
 
 Status RunInOneTransaction(Connection& connection, std::int64_t from, const MapProfile& profile) {
-  connection.Execute("BEGIN IMMEDIATE");
+  connection.Begin();
   AddUpgradeEvent(connection, from, RunSteps(connection, from, profile));
   WriteTableSums(connection);
   WriteVersion(connection);
   if (const SchemaDamage damage = FindSchemaDamage(connection); !damage.is_none()) {
     return {StatusCode::kInvalidData,
             StrCat("upgrading it from schema version ", from, ": ", damage.what,
-                   "; nothing was changed; put a copy of the data directory back")};
+                   "; nothing that was committed was changed; put a copy of the data directory "
+                   "back")};
   }
-  connection.Execute("COMMIT");
+  connection.Commit();
   return {};
 }
 

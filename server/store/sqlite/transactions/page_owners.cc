@@ -40,8 +40,8 @@ Status CheckPagesAreTheirs(Connection& connection) {
                            connection.Ask(kNoWholeCounter) != 0 || IsNoSessionWhole(connection);
   return is_doubtful && HasPageOfTwo(connection)
              ? Status(StatusCode::kInvalidData,
-                      "store: the database is damaged: a page of a table is another one's, too: "
-                      "nothing was changed; restore a backup")
+                      "store: the database is damaged: a page of a table is another one's, too; "
+                      "restore a backup")
              : Status();
 }
 

@@ -46,6 +46,7 @@ Result<std::string> RepairSchema(Connection& connection,
     return damages;
   }
   Status left(StatusCode::kInvalidData, "nothing tells what it was");
+  const char* unchanged = "nothing was changed";
   if (damage.can_be_put_back) {
     connection.Begin();
     left = PutBackAndCheck(connection, damages);
@@ -53,6 +54,7 @@ Result<std::string> RepairSchema(Connection& connection,
       connection.RollBack();
       connection.Execute("PRAGMA writable_schema = ON");  // as it was opened
       before_writing();
+      unchanged = "nothing that was committed was changed";
       connection.Begin();
       left = PutBackAndCheck(connection, damages);
     }
@@ -64,7 +66,7 @@ Result<std::string> RepairSchema(Connection& connection,
   }
   return Error(StatusCode::kInvalidData,
                StrCat("store: the database is damaged: ", damage.what, " and cannot be put right (",
-                      left.message(), "): nothing was changed; restore a backup"));
+                      left.message(), "): ", unchanged, "; restore a backup"));
 }
 
 }  // namespace atlas

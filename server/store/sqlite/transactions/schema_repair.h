@@ -19,7 +19,8 @@ namespace atlas {
 // before it is made.
 //
 // kInvalidData says what differs and why it stays: a table is gone, say, or there is other damage.
-// Nothing was changed then. Throws as the connection does.
+// Nothing was changed then, but for what `before_writing` did, if it was called: it may drop what
+// was never committed. Throws as the connection does.
 Result<std::string> RepairSchema(Connection& connection,
                                  const std::function<void()>& before_writing);
 
