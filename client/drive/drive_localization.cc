@@ -6,6 +6,7 @@
 #include "client/drive/localization_trial.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
+#include "core/localization/scan_clock.h"
 #include "core/scan/scan_reader.h"
 
 namespace atlas {
@@ -59,6 +60,7 @@ class DriveLocalization {
   Status Track(const DriveScan& scan, const PointCloud& cloud, bool is_start, bool is_after_jump) {
     if (is_start && (options_.is_restarted || !is_after_jump)) {
       localizer_.Start(scan.T_world_sensor);
+      clock_.Restart();
       report_.restarts += is_after_jump ? 1U : 0U;
     }
     const Eigen::Quaterniond R_level_sensor = DisturbedLevel(
@@ -74,7 +76,8 @@ class DriveLocalization {
                   LocalizedScan localized) {
     if (options_.monitor != nullptr) options_.monitor->Begin(scan.number);
     const CpuTimer timer;
-    Result<LocatedScan> located = localizer_.Locate(cloud, R_level_sensor);
+    Result<LocatedScan> located =
+        localizer_.Locate(cloud, R_level_sensor, clock_.Tick(scan.time_s));
     localized.cpu_s = timer.elapsed_s();
     if (!located) return located.error();
     localized.scan = scan.number;
@@ -122,6 +125,7 @@ class DriveLocalization {
   const DriveLocalizationOptions& options_;
   const std::function<void(const LocalizedScan&)>& on_scan_;
   ScanLocalizer& localizer_;
+  ScanClock clock_;
   std::optional<Pose> last_;
   DriveLocalizationReport report_;
 };

@@ -40,10 +40,11 @@ class AtlasScanLocalizer : public ScanLocalizer {
   void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
 
   Result<LocatedScan> Locate(const PointCloud& cloud,
-                             const Eigen::Quaterniond& R_level_sensor) override {
+                             const Eigen::Quaterniond& R_level_sensor,
+                             double scans) override {
     const LeveledScan leveled = SegmentScan(cloud, survey_.layout, survey_.ring_step,
                                             R_level_sensor, {}, DuringRevolution());
-    const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor);
+    const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor, scans);
     if (!result) return Error(result.error());
     if (on_localization_) {
       Status status = on_localization_(leveled, R_level_sensor, *result);
@@ -78,8 +79,10 @@ class PaperScanLocalizer : public ScanLocalizer {
 
   void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
 
+  // The paper starts from the last pose, whenever that was.
   Result<LocatedScan> Locate(const PointCloud& cloud,
-                             const Eigen::Quaterniond& R_level_sensor) override {
+                             const Eigen::Quaterniond& R_level_sensor,
+                             double /*scans*/) override {
     const Result<PaperLocalization> result =
         localizer_.Localize(builder_.Build(cloud, {R_level_sensor}), R_level_sensor);
     if (!result) return Error(result.error());

@@ -30,9 +30,11 @@ class ScanLocalizer {
 
   // Forgets the motion; the next scan is near `T_world_sensor`.
   virtual void Start(const Pose& T_world_sensor) = 0;
-  // Requires Start(). `R_level_sensor` is what the IMU says. Errors are those of the map's source.
+  // Requires Start(). `R_level_sensor` is what the IMU says; the scan comes `scans` times the usual
+  // time after the last one. Errors are those of the map's source.
   virtual Result<LocatedScan> Locate(const PointCloud& cloud,
-                                     const Eigen::Quaterniond& R_level_sensor) = 0;
+                                     const Eigen::Quaterniond& R_level_sensor,
+                                     double scans = 1.0) = 0;
 };
 
 // A scan as it was matched, and where; an error ends the localization.

@@ -32,8 +32,10 @@ void Localizer::Start(const Pose& T_world_sensor) {
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
-                                               const Eigen::Quaterniond& R_level_sensor) {
+                                               const Eigen::Quaterniond& R_level_sensor,
+                                               double scans) {
   const ScanFeatures& features = features_.Extract(scan);
+  for (SupposedPlace& place : places_) place.tracker.Expect(scans);
   std::vector<SupposedPlace> found;
   if (IsLookedFor()) {
     auto looked = Look(scan, R_level_sensor);

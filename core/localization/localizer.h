@@ -66,10 +66,12 @@ class Localizer {
   // be deskewed by. Identity as long as nothing is known of it.
   Pose T_now_later() const { return places_.front().tracker.T_now_later(); }
 
-  // Requires Start(). `scan` is levelled by `R_level_sensor`. Errors are those of the tiles'
-  // and the relocalizer's sources; the scan counts for nothing then.
+  // Requires Start(). `scan` is levelled by `R_level_sensor` and comes `scans` times the usual time
+  // after the last one: some may be missing (ScanClock). Errors are those of the tiles' and the
+  // relocalizer's sources; the scan counts for nothing then.
   Result<LocalizationResult> Localize(const LeveledScan& scan,
-                                      const Eigen::Quaterniond& R_level_sensor);
+                                      const Eigen::Quaterniond& R_level_sensor,
+                                      double scans = 1.0);
 
  private:
   // Where it may be.

@@ -36,22 +36,24 @@ void MotionModel::ForgetMotion() {
   covariance_.bottomRightCorner<4, 4>() = UnknownMotion(options_).asDiagonal();
 }
 
-void MotionModel::Predict() {
+void MotionModel::Predict(double scans) {
   last_ = pose_;
-  const Eigen::Matrix3d R = TurnAboutVertical(0.5 * motion_(3)) * pose_.linear();
-  const Eigen::Vector3d step = R * motion_.head<3>();
+  since_ = scans;
+  const Eigen::Matrix3d R = TurnAboutVertical(0.5 * scans * motion_(3)) * pose_.linear();
+  const Eigen::Vector3d step = scans * R * motion_.head<3>();
   const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(step);  // d step / d yaw
   Matrix8d F = Matrix8d::Identity();
   F.block<3, 1>(0, 3) = across;
-  F.block<3, 3>(0, 4) = R;
-  F.block<3, 1>(0, 7) = 0.5 * across;
-  F(3, 7) = 1.0;
+  F.block<3, 3>(0, 4) = scans * R;
+  F.block<3, 1>(0, 7) = 0.5 * scans * across;
+  F(3, 7) = scans;
   covariance_.bottomRightCorner<4, 4>().diagonal() +=
+      scans * scans *
       Squares(options_.ahead_change_m, options_.beside_change_m, options_.up_change_m,
               options_.turn_change_rad);
   covariance_ = F * covariance_ * F.transpose();
   pose_.translation() += step;
-  pose_.linear() = TurnAboutVertical(motion_(3)) * pose_.linear();
+  pose_.linear() = TurnAboutVertical(scans * motion_(3)) * pose_.linear();
 }
 
 Pose MotionModel::T_now_later() const {
@@ -83,6 +85,7 @@ void MotionModel::Turn(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) 
   motion_.head<3>() =
       (TurnAboutVertical(0.5 * difference(3)) * last_.linear()).transpose() * difference.head<3>();
   motion_(3) = difference(3);
+  motion_ /= since_;
   covariance_.bottomRightCorner<4, 4>() =
       Squares(options_.ahead_surprise_m, options_.beside_surprise_m, options_.up_surprise_m,
               options_.turn_surprise_rad)

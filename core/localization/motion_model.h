@@ -20,7 +20,8 @@ struct MotionOptions {
   double beside_m = 0.2;
   double up_m = 0.2;
   double turn_rad = 0.1;
-  // How much the motion changes from one scan to the next.
+  // How much the motion changes from one scan to the next; where some are missing, as many times
+  // as much.
   double ahead_change_m = 0.1;
   double beside_change_m = 0.03;
   double up_change_m = 0.05;
@@ -38,8 +39,8 @@ class MotionModel {
 
   // Forgets all motion: the vehicle stands at `T_world_sensor`, as uncertain as a start is.
   void Start(const Pose& T_world_sensor);
-  // To the next scan.
-  void Predict();
+  // To the next scan, after so many times the usual time between two: some may be missing.
+  void Predict(double scans = 1.0);
   // All three: the scan placed the vehicle, prior included, and `seen` is the scan's information
   // about (x, y, z, yaw).
   // As predicted, more or less: speeds follow as far as they are correlated with the place.
@@ -66,7 +67,8 @@ class MotionModel {
 
   MotionOptions options_;
   Pose pose_ = Pose::Identity();
-  Pose last_ = Pose::Identity();  // before Predict()
+  Pose last_ = Pose::Identity();  // before Predict(),
+  double since_ = 1.0;            // scans ago
   // Per scan, sensor frame: x, y, z, turn about the vertical.
   Eigen::Vector4d motion_ = Eigen::Vector4d::Zero();
   Matrix8d covariance_ = Matrix8d::Zero();  // of (x, y, z, yaw) and motion_

@@ -54,7 +54,7 @@ void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
 
 MotionModel PlaceTracker::Next() const {
   MotionModel next = motion_;
-  if (!is_first_) next.Predict();
+  if (!is_first_) next.Predict(scans_);
   return next;
 }
 
@@ -67,7 +67,7 @@ Status PlaceTracker::Prepare() {
 LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
                                        const Eigen::Quaterniond& R_level_sensor) {
   if (!is_first_) {
-    motion_.Predict();
+    motion_.Predict(scans_);
   }
   LocalizationResult result;
   Tracked tracked = Follow(features);
@@ -97,6 +97,10 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   }
   Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
   result.covariance = Covariance(result);
+  const double up_m = std::sqrt(result.covariance(2, 2));
+  if (result.health == LocalizationHealth::kGood && up_m > options_.max_weak_up_m) {
+    result.health = LocalizationHealth::kWeak;
+  }
   return result;
 }
 

@@ -40,7 +40,8 @@ struct PlaceTrackerOptions {
   double min_columns = 0.05;
   std::size_t few_columns = 30;
   int most_unheld = 2;
-  double max_weak_sigma_m = 0.10;  // of the worst horizontal direction; more is weak
+  double max_weak_sigma_m = 0.10;  // of the worst horizontal direction; more is weak,
+  double max_weak_up_m = 0.3;      // as is a height that is known no better, standard deviation
   int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did
 
   // Neighbouring features err together: a scan informs as this share of its features would, and a
@@ -90,6 +91,9 @@ struct PlaceTrackerOptions {
   // to be confirmed.
   double expected_m = 3.0;
   double expected_rad = 1.2;
+  // A first scan that is found further than this from the start that was told has to be, too.
+  double told_m = 1.0;
+  double told_rad = 0.1;
 };
 
 class PlaceTracker {
@@ -109,6 +113,9 @@ class PlaceTracker {
   // as nothing is known of it.
   Pose T_now_later() const { return motion_.T_now_later(); }
 
+  // The next scan comes after so many times the usual time between two. Before all that asks for
+  // it.
+  void Expect(double scans) { scans_ = scans; }
   // Where the next scan is expected.
   Pose T_world_expected() const { return Next().T_world_sensor(); }
 
@@ -193,6 +200,7 @@ class PlaceTracker {
   MotionModel motion_;
   Confirmation confirmation_;
   bool is_first_ = true;
+  double scans_ = 1.0;      // from the last scan to the next
   double usual_fit_ = 0.0;  // of good results, exponentially forgotten
   int lost_ = 0;            // scans in a row
   int unheld_ = 0;          // scans in a row

@@ -11,11 +11,16 @@ namespace atlas {
 PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result,
                                                 const ScanFeatures& features,
                                                 bool is_found) const {
-  if (is_first_ || (lost_ == 0 && !is_found)) {
-    return Surprise::kNone;
-  }
   const PosePrior prior = Prior();
   const Eigen::Vector4d off = PoseDifference(prior.T_world_level, result.T_world_level);
+  if (is_first_) {
+    const bool is_told =
+        off.head<3>().norm() <= options_.told_m && std::abs(off(3)) <= options_.told_rad;
+    return is_told ? Surprise::kNone : Surprise::kNew;
+  }
+  if (lost_ == 0 && !is_found) {
+    return Surprise::kNone;
+  }
   const bool is_near =
       off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;
   const bool is_likely = LogDensity(prior, result.T_world_level) > options_.surprising_log_density;
@@ -57,7 +62,7 @@ bool PlaceTracker::IsHeld(const RegistrationResult& result, const ScanFeatures& 
 LocalizationHealth PlaceTracker::Judge(const RegistrationResult& result,
                                        const ScanFeatures& features,
                                        Surprise surprise) const {
-  if (surprise != Surprise::kNone || !confirmation_.is_confirmed()
+  if ((surprise != Surprise::kNone && !is_first_) || !confirmation_.is_confirmed()
           ? !confirmation_.IsEnough(result, features)
           : result.fit < options_.min_fit) {
     return LocalizationHealth::kLost;

@@ -22,7 +22,7 @@ class ScriptedLocalizer : public ScanLocalizer {
   explicit ScriptedLocalizer(std::vector<Answer> script) : script_(std::move(script)) {}
 
   void Start(const Pose& T_world_sensor) override { starts.push_back(T_world_sensor); }
-  Result<LocatedScan> Locate(const PointCloud&, const Eigen::Quaterniond&) override {
+  Result<LocatedScan> Locate(const PointCloud&, const Eigen::Quaterniond&, double) override {
     if (next_ == script_.size()) return Error(StatusCode::kUnavailable, "gone");
     const Answer& answer = script_[next_++];
     LocatedScan located;

@@ -1,6 +1,7 @@
 // Drives through small worlds, scan after scan.
 #include "core/localization/localizer.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -59,6 +60,47 @@ TEST(LocalizerTest, FindsTheSecondScanHoweverFastTheVehicleIs) {
     const LocalizationResult result = At(localizer, testing::Street(), truth);
     EXPECT_EQ(result.health, LocalizationHealth::kGood) << ahead_m;
     EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06) << ahead_m;
+  }
+}
+
+// At 2 m a scan, of which two to four in a row are missing.
+TEST(LocalizerTest, GoesOnBehindScansThatAreMissing) {
+  Localizer localizer = StreetLocalizer();
+  double x_m = -14.0;
+  localizer.Start(OnStreet(x_m));
+  for (const int scans : {0, 1, 1, 1, 3, 1, 5, 1}) {
+    x_m += 2.0 * scans;
+    const Pose truth = OnStreet(x_m);
+    const auto scan = CastLeveledScan(testing::QuickSensor(), testing::Street(), truth);
+    const LocalizationResult result = localizer.Localize(scan, kLevel, std::max(scans, 1)).value();
+    EXPECT_EQ(result.health, LocalizationHealth::kGood) << x_m;
+    EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06) << x_m;
+  }
+}
+
+// Where it was told to be is not where it seems to be: it may be a place that looks like it.
+TEST(LocalizerTest, AFirstPlaceFarFromTheToldOneIsConfirmedFirst) {
+  Localizer localizer = StreetLocalizer();
+  localizer.Start(OnStreet(-6.0 - 2.5));
+  for (int i = 0; i < 6; ++i) {
+    const Pose truth = OnStreet(-6.0 + i);
+    const LocalizationResult result = At(localizer, testing::Street(), truth);
+    EXPECT_EQ(result.health, i < 2 ? LocalizationHealth::kWeak : LocalizationHealth::kGood) << i;
+    EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06) << i;
+  }
+}
+
+// Walls hold it everywhere but in height: there is no ground where it should be.
+TEST(LocalizerTest, WhereTheHeightIsUnknownItIsWeak) {
+  Localizer localizer = StreetLocalizer();
+  Pose above = OnStreet(-6.0);
+  above.translation().z() += 3.2;
+  localizer.Start(above);
+  for (int i = 0; i < 4; ++i) {
+    const Pose truth = OnStreet(-6.0 + i);
+    const LocalizationResult result = At(localizer, testing::Street(), truth);
+    const bool is_right = ErrorOf(result.T_world_sensor, truth).vertical_m < 0.1;
+    EXPECT_TRUE(is_right || result.health != LocalizationHealth::kGood) << i;
   }
 }
 

@@ -72,6 +72,29 @@ TEST(MotionModelTest, ASteadyMotionGoesOn) {
   }
 }
 
+// Every third scan arrives, or two in a row.
+TEST(MotionModelTest, WhatIsMissingIsNoAcceleration) {
+  MotionModel model({});
+  model.Start(OnCircle(0));
+  int at = 0;
+  for (int i = 1; i <= 30; ++i) {
+    const int scans = i > 5 && i % 3 == 0 ? 3 : 1;
+    at += scans;
+    model.Predict(scans);
+    if (i > 5) {
+      EXPECT_LT(ErrorOf(model.T_world_sensor(), OnCircle(at)).horizontal_m, 0.03 * scans) << i;
+      EXPECT_LT(ErrorOf(model.T_world_sensor(), OnCircle(at)).angle_rad, 0.004 * scans) << i;
+    }
+    model.Correct(OnCircle(at), kSeenWell);
+    ExpectIsCovariance(model.covariance());
+  }
+  model.Predict(4.0);
+  EXPECT_GT(SpreadOf(model.covariance()).along_m, 0.3) << "it may have braked meanwhile";
+  model.Turn(OnCircle(at + 4), kSeenWell);
+  const Pose next = OnCircle(at + 4) * model.T_now_later();
+  EXPECT_LT(ErrorOf(next, OnCircle(at + 5)).horizontal_m, 0.05) << "a scan's, not four's";
+}
+
 TEST(MotionModelTest, UnseenItStandsAndMayBeFarAhead) {
   MotionModel model({});
   model.Start(Straight(0.0));
