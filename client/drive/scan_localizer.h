@@ -34,7 +34,7 @@ class ScanLocalizer {
   // time after the last one. Errors are those of the map's source.
   virtual Result<LocatedScan> Locate(const PointCloud& cloud,
                                      const Eigen::Quaterniond& R_level_sensor,
-                                     double scans = 1.0) = 0;
+                                     double scans) = 0;
 };
 
 // A scan as it was matched, and where; an error ends the localization.

@@ -65,7 +65,7 @@ TEST_F(LocalizationBenchTest, RawReturnsOfElsewhereAreNoPlace) {
   (*icp)->Start(elsewhere);
   PointCloud cloud;
   cloud.points = {{5.0F, 0.0F, 0.0F}, {6.0F, 0.0F, 0.0F}};
-  EXPECT_EQ((*icp)->Locate(cloud, Eigen::Quaterniond::Identity())->health,
+  EXPECT_EQ((*icp)->Locate(cloud, Eigen::Quaterniond::Identity(), 1.0)->health,
             LocalizationHealth::kLost);
 }
 

@@ -125,7 +125,8 @@ RawIcp::Equations RawIcp::Linearize(const std::vector<Eigen::Vector3f>& scan,
 }
 
 Result<LocatedScan> RawIcp::Locate(const PointCloud& cloud,
-                                   const Eigen::Quaterniond& /*R_level_sensor*/) {
+                                   const Eigen::Quaterniond& /*R_level_sensor*/,
+                                   double /*scans*/) {
   constexpr int kMinPairs = 50;
   const std::vector<Eigen::Vector3f> scan =
       OnePerVoxel(ReturnsOf(cloud, survey_, options_.max_range_m), options_.voxel_m);

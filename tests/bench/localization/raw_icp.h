@@ -42,7 +42,8 @@ class RawIcp : public ScanLocalizer {
   void Start(const Pose& T_world_sensor) override { T_world_sensor_ = T_world_sensor; }
   // Roll and pitch of the start are the IMU's; all six are refined.
   Result<LocatedScan> Locate(const PointCloud& cloud,
-                             const Eigen::Quaterniond& R_level_sensor) override;
+                             const Eigen::Quaterniond& R_level_sensor,
+                             double scans) override;
 
  private:
   RawIcp(const DriveSurvey& survey,
