@@ -38,8 +38,7 @@ Status MissingUploads::CheckTurn(const KeyframeKey& key) const {
 void MissingUploads::NoteEnd(const KeyframeKey& key, const Status& status) {
   const std::lock_guard lock(mutex_);
   auto vehicle = vehicles_.find(key.session.vehicle);
-  // What is damaged is so here: who sent it is told to send it again.
-  if (IsTemporary(status.code()) || status.code() == StatusCode::kInvalidData) {
+  if (IsTemporary(status.code())) {
     if (vehicle == vehicles_.end()) {
       if (vehicles_.size() == kMaxVehicles) {
         is_overfull_ = true;

@@ -7,6 +7,16 @@
 #include "server/store/sqlite/transactions/transactions.h"
 
 namespace atlas {
+namespace {
+
+// What is damaged is so here, for what was sent was looked at before: who sent it is told to send
+// it again.
+Status EndInStore(const Status& end) {
+  return end.code() == StatusCode::kInvalidData ? Status(StatusCode::kUnavailable, end.message())
+                                                : end;
+}
+
+}  // namespace
 
 Result<PutKeyframeResult> PutInTurn(Connection& connection,
                                     const NewKeyframe& keyframe,
@@ -16,10 +26,10 @@ Result<PutKeyframeResult> PutInTurn(Connection& connection,
   }
   try {
     auto result = PutKeyframeInStore(connection, keyframe, room);
-    keyframe.missing->NoteEnd(keyframe.key, result ? Status() : result.error());
+    keyframe.missing->NoteEnd(keyframe.key, result ? Status() : EndInStore(result.error()));
     return result;
   } catch (const std::exception& error) {
-    keyframe.missing->NoteEnd(keyframe.key, StatusFromException(error));
+    keyframe.missing->NoteEnd(keyframe.key, EndInStore(StatusFromException(error)));
     throw;
   }
 }
@@ -30,7 +40,7 @@ std::function<void(Result<PutKeyframeResult>)> Noting(
           done = std::move(done)](Result<PutKeyframeResult> result) {
     const Status end = result ? Status() : result.error();
     if (missing != nullptr) {
-      missing->NoteEnd(key, end);
+      missing->NoteEnd(key, EndInStore(end));
     }
     if (start != nullptr) {
       start->NoteEnd(end);
