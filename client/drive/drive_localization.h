@@ -13,6 +13,7 @@
 #include "client/drive/drive_selection.h"
 #include "client/drive/drive_skew.h"
 #include "client/drive/scan_localizer.h"
+#include "client/drive/unreadable_scan.h"
 #include "client/map/map_view.h"
 #include "client/score/localization_score.h"
 #include "client/score/pose_offset.h"
@@ -66,11 +67,6 @@ struct LocalizedScan {
   double cpu_s = 0.0;
 };
 
-struct UnreadableScan {
-  std::uint32_t scan = 0;
-  Status why;
-};
-
 struct DriveLocalizationReport {
   LocalizationScore score;
   std::uint64_t scans = 0;
@@ -78,10 +74,10 @@ struct DriveLocalizationReport {
   std::uint64_t good = 0;
   std::uint64_t weak = 0;
   std::uint64_t good_failures = 0;
-  std::vector<UnreadableScan> unreadable;  // damaged, while tracking: lost there, and it goes on
-  std::uint64_t restarts = 0;              // after jumps
-  std::uint64_t dropped_returns = 0;       // entries without one (scan_reader.h)
-  double cpu_s = 0.0;                      // segmentation and tiles included
+  UnreadableScans unreadable;         // while tracking: lost there, and it goes on
+  std::uint64_t restarts = 0;         // after jumps
+  std::uint64_t dropped_returns = 0;  // entries without one (scan_reader.h)
+  double cpu_s = 0.0;                 // segmentation and tiles included
   DeskewDecision deskewing;
 
   // Shots a CPU second.

@@ -40,6 +40,16 @@ RelocalizedScan Judged(const DriveScan& scan,
   return result;
 }
 
+std::optional<PlacePrior> PriorOf(const DriveScan& scan,
+                                  const Eigen::Quaterniond& R_level_sensor,
+                                  const DriveRelocalizationOptions& options,
+                                  const TrialSeed& seed) {
+  if (!options.prior_radius_m) return std::nullopt;
+  const double reach_m = *options.prior_radius_m / std::numbers::sqrt2;  // the square in the circle
+  const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
+  return PlacePrior{start.translation().head<2>(), *options.prior_radius_m};
+}
+
 }  // namespace
 
 Status DriveRelocalizationOptions::Validate() const {
@@ -72,18 +82,19 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
   for (const SelectedScan& selected : SelectScans(drive, options.selection)) {
     const DriveScan& scan = drive.scans[selected.index];
     const Result<PointCloud> cloud = ReadScan(scan.scan);
-    if (!cloud) return Error(cloud.error());
+    if (!cloud) {
+      if (cloud.error().code() != StatusCode::kInvalidData) return Error(cloud.error());
+      report.unreadable.push_back({scan.number, cloud.error()});
+      ++report.scans;
+      ++report.unknown;
+      on_scan({scan.number, scan.time_s, {}, {}, {}});
+      continue;
+    }
     report.dropped_returns += cloud->dropped.size();
     const TrialSeed seed{options.seed, scan.number, 0};
     const Eigen::Quaterniond R_level_sensor =
         DisturbedLevel(scan.T_world_sensor, options.tilt_error_rad, seed);
-    std::optional<PlacePrior> prior;
-    if (options.prior_radius_m) {
-      // Within the square in the circle.
-      const double reach_m = *options.prior_radius_m / std::numbers::sqrt2;
-      const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
-      prior = PlacePrior{start.translation().head<2>(), *options.prior_radius_m};
-    }
+    const auto prior = PriorOf(scan, R_level_sensor, options, seed);
     const CpuTimer timer;
     const LeveledScan leveled =
         SegmentScan(*cloud, survey->layout, survey->ring_step, R_level_sensor, {});

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "client/drive/drive_selection.h"
+#include "client/drive/unreadable_scan.h"
 #include "client/map/map_view.h"
 #include "client/score/localization_score.h"
 #include "client/score/pose_offset.h"
@@ -45,6 +46,7 @@ struct DriveRelocalizationReport {
   std::uint64_t wrong = 0;            // found elsewhere
   std::uint64_t unknown = 0;          // "don't know"
   std::size_t places = 0;             // of the map
+  UnreadableScans unreadable;         // of those unknown: damaged
   std::uint64_t dropped_returns = 0;  // entries without one (scan_reader.h)
   double cpu_s = 0.0;                 // of all scans, segmentation and tiles included
   double worst_cpu_s = 0.0;           // of one
@@ -53,7 +55,7 @@ struct DriveRelocalizationReport {
   static constexpr double kRight_m = 0.5;
 };
 
-// Reads the whole map first.
+// Reads the whole map first. `on_scan` is told of each scan, of those that are unreadable, too.
 Result<DriveRelocalizationReport> RelocalizeDrive(
     const DriveFolder& drive,
     const DriveRelocalizationOptions& options,

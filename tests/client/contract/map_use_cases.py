@@ -23,6 +23,20 @@ def relocalized_cases(cases, work, drive):
                        summary["right"] + summary["wrong"])
 
 
+def damaged_scan_cases(cases, work, drives):
+    """A scan that cannot be read is one that was not found: the others are, all is written, and the end is an error."""
+    folder, file = drives.copy("one_cut"), pathlib.Path(work) / "one_cut.csv"
+    scan = folder / "velodyne/000002.bin"
+    scan.write_bytes(scan.read_bytes()[:-3])
+    done = cases.call("localize", folder, "--max-range", "5", "--relocalize", "--output", file, "--json")
+    cases.report.equal("a cut scan: exit code", done.returncode, 6)
+    cases.typed("a cut scan", done.stderr, "invalid_data", "000002.bin")
+    with open(file, newline="", encoding="ascii") as text:
+        rows = list(csv.DictReader(text))
+    cases.report.equal("a cut scan: a line a scan", [int(row["scan"]) for row in rows], list(range(5)))
+    cases.report.equal("a cut scan: its line", (rows[2]["health"], rows[2]["x_m"], rows[2]["places"]), ("lost", "", "0"))
+
+
 def lost_cases(cases, work, drives):
     """Where no scan is localized that is the answer: all is written, and stderr says what it may mean."""
     astray = drives.copy("astray")
@@ -89,5 +103,6 @@ def route_cases(cases, work):
 
 def run(cases, drives, work):
     relocalized_cases(cases, work, drives.good)
+    damaged_scan_cases(cases, work, drives)
     lost_cases(cases, work, drives)
     route_cases(cases, work)

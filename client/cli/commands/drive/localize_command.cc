@@ -169,6 +169,7 @@ class LocalizeCommand : public Command {
     });
     if (!report) return report.error();
     ATLAS_RETURN_IF_ERROR(track_.Write(Title(drive)));
+    ATLAS_RETURN_IF_ERROR(CheckReadable(*report));
     if (context.is_json) {
       context.PrintJson(RelocalizationJson(*report));
     } else {

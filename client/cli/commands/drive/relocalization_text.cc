@@ -80,6 +80,17 @@ void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& 
   facts.Print(out);
 }
 
+// The others were looked for and written.
+Status CheckReadable(const DriveRelocalizationReport& report) {
+  if (report.unreadable.empty()) return {};
+  const Status& first = report.unreadable.front().why;
+  const std::size_t count = report.unreadable.size();
+  return {first.code(), StrCat(count, count == 1 ? " scan" : " scans",
+                               " could not be read, the first: ", first.message(), "; of all ",
+                               report.scans, " scans ", report.right, " were found, ", report.wrong,
+                               " elsewhere than the drive has them")};
+}
+
 void NoteUnknown(const DriveRelocalizationReport& report, std::ostream& err) {
   if (report.scans == 0 || report.unknown < report.scans) return;
   err << "note: none of " << report.scans << " scans was found in the map's " << report.places

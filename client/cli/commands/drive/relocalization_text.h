@@ -15,6 +15,8 @@ namespace atlas {
 boost::json::object RelocalizedScanJson(const RelocalizedScan& scan);
 boost::json::object RelocalizationJson(const DriveRelocalizationReport& report);
 void PrintRelocalization(const DriveRelocalizationReport& report, std::ostream& out);
+// Scans that could not be read, in the words of the first of them.
+Status CheckReadable(const DriveRelocalizationReport& report);
 // Where nothing was found of any scan: what that may mean.
 void NoteUnknown(const DriveRelocalizationReport& report, std::ostream& err);
 
