@@ -8,6 +8,7 @@
 
 #include "client/drive/place_reader.h"
 #include "client/drive/tiles_around.h"
+#include "client/drive/track_line.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/scan/scan_reader.h"
@@ -293,13 +294,13 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates, PartAnchor&
                anchor.tracked, " fit the map there and ", anchor.contradicting, " do not");
   } else if (best.fit.rms_m > options_.max_rms_m) {
     anchor.why_not =
-        StrCat("the drive is found, but bent against the map: ", best.fit.rms_m,
+        StrCat("the drive is found, but bent against the map: ", FixedNumber(best.fit.rms_m, 3),
                " m RMS from one transform, expected at most ", options_.max_rms_m, " m");
   } else if (best.support < options_.min_margin * elsewhere) {
     anchor.why_not =
         StrCat("the drive fits the map in two places: where its scans were found ",
-               best.support / elsewhere, " times as well as elsewhere, expected at least ",
-               options_.min_margin, " times");
+               FixedNumber(best.support / elsewhere, 2),
+               " times as well as elsewhere, expected at least ", options_.min_margin, " times");
   } else {
     anchor.T_map_drive = best.fit.T_map_drive;
   }
