@@ -10,15 +10,12 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/client/drive/split.h"
+
 namespace atlas {
 namespace {
 
-std::vector<std::string> Split(const std::string& text, char separator) {
-  std::vector<std::string> parts;
-  std::istringstream stream(text);
-  for (std::string part; std::getline(stream, part, separator);) parts.push_back(part);
-  return parts;
-}
+using testing::Split;
 
 LocalizedScan Sample() {
   LocalizedScan scan;

@@ -9,14 +9,6 @@
 namespace atlas {
 namespace {
 
-const std::vector<std::string_view> kCorridor = {
-    "........................",  //
-    "........................",  //
-    "..S..................G..",  //
-    "........................",  //
-    "........................",
-};
-
 TEST(PlanLimitsTest, TilesAreLoadedAsNeeded) {
   TinyWorld world;
   for (std::int64_t y = 0; y < 320; ++y) {

@@ -10,14 +10,6 @@
 namespace atlas {
 namespace {
 
-const std::vector<std::string_view> kCorridor = {
-    "........................",  //
-    "........................",  //
-    "..S..................G..",  //
-    "........................",  //
-    "........................",
-};
-
 TEST(RouteEndTest, EndsSayWhereTheyStandAndHowFarTheyWereMoved) {
   TinyWorld decks;
   decks.Draw(kCorridor, 0.0);

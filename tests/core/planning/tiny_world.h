@@ -14,6 +14,15 @@
 
 namespace atlas {
 
+// To be drawn: start and goal at the ends of a street.
+inline const std::vector<std::string_view> kCorridor = {
+    "........................",  //
+    "........................",  //
+    "..S..................G..",  //
+    "........................",  //
+    "........................",
+};
+
 // '.' free, 'S' and 'G' free and remembered, '#' obstacle, '?' seen but never found free, 'c' free
 // with something hanging at 1.5 m, ' ' never seen.
 class TinyWorld : public TileSource {
