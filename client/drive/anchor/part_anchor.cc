@@ -8,7 +8,6 @@
 
 #include "client/drive/place_reader.h"
 #include "client/drive/tiles_around.h"
-#include "client/drive/track_line.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/scan/scan_reader.h"
@@ -77,6 +76,11 @@ bool IsNear(const Pose& found, const Pose& expected, double gap_m, const AnchorO
   return (found.translation() - expected.translation()).norm() <=
              options.max_surprise_m + options.agreement.drift * gap_m &&
          turned.angle() <= options.max_surprise_rad;
+}
+
+// For people.
+double InThousandths(double value) {
+  return std::round(value * 1e3) / 1e3;
 }
 
 }  // namespace
@@ -294,12 +298,12 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates, PartAnchor&
                anchor.tracked, " fit the map there and ", anchor.contradicting, " do not");
   } else if (best.fit.rms_m > options_.max_rms_m) {
     anchor.why_not =
-        StrCat("the drive is found, but bent against the map: ", FixedNumber(best.fit.rms_m, 3),
+        StrCat("the drive is found, but bent against the map: ", InThousandths(best.fit.rms_m),
                " m RMS from one transform, expected at most ", options_.max_rms_m, " m");
   } else if (best.support < options_.min_margin * elsewhere) {
     anchor.why_not =
         StrCat("the drive fits the map in two places: where its scans were found ",
-               FixedNumber(best.support / elsewhere, 2),
+               InThousandths(best.support / elsewhere),
                " times as well as elsewhere, expected at least ", options_.min_margin, " times");
   } else {
     anchor.T_map_drive = best.fit.T_map_drive;
