@@ -209,7 +209,7 @@ def main():
     parser = argparse.ArgumentParser(prog="deploy/bench.sh", description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     parser.add_argument("--nginx", default="nginx", help=argparse.SUPPRESS)
-    parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too; soak: 30 minutes; merge: 10 km, too")
+    parser.add_argument("--long", action="store_true", help="memory: with 5 GiB, too; soak: 90 minutes; merge: 10 km, too")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in BENCHMARKS]

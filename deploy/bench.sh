@@ -6,7 +6,7 @@
 # drives of docs/data.md in $ATLAS_DATA; accuracy takes the meshes there too. curbs prints a line a threshold instead.
 # curbs, online, passes, follow, planning, monitoring, merge and localization, and soak --long, draw docs/images/*.png; localization writes
 # docs/results/localization.csv and .md, too (tracking is its second half alone). --long: memory with an atlas of 5 GiB, too
-# (10 GiB of disk, half an hour), soak for 30 minutes instead of 3. Exit code 1: a figure of soak or restart is not what
+# (10 GiB of disk, half an hour), soak for 90 minutes instead of 3. Exit code 1: a figure of soak or restart is not what
 # was asked.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)

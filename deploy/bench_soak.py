@@ -3,6 +3,7 @@ descriptors or threads grow. Docs/results.md, "Long runs"."""
 
 import contextlib
 import csv
+import math
 import pathlib
 import statistics
 import subprocess
@@ -16,7 +17,9 @@ from bench_daemon import Atlas, Background
 from bench_soak_load import Street, actors_of
 from bench_traffic import Failures, record_street
 
-MINUTES, MINUTES_LONG = 3, 30  # of which the last two thirds count
+MINUTES, MINUTES_LONG = 3, 90  # of which the last two thirds count; 30 minutes cannot tell 4 MiB from what swings
+GROWTH_S = 20 * 60  # growth is told for so long, or for what counts if that is shorter
+PARTS = 20
 # Caches so small that they are full before the last two thirds begin: what grows then is no cache.
 SETTINGS = ("--cache-mib", "32", "--survey-mib", "32", "--reply-mib", "8", "--survey-disk-mib", "64")
 ASKED_SAMPLES = 0.9  # of the seconds; with less the machine had no time for the load either
@@ -54,11 +57,18 @@ class Sampler(Background):
             self.atlas.metric("roadatlas_store_used_bytes") / 2**20, self.atlas.metric("roadatlas_dirty_tiles"))))
 
 
-def growth(rows, field):
-    """Between the first and the last of these rows, by the straight line that fits all of them best."""
+def growth(rows, field, of=statistics.fmean):
+    """In GROWTH_S, by the straight line through `of` each of the PARTS of what counts: (growth, its standard error).
+    Samples one behind the other say less than their number: the error is made of the parts."""
     seconds = [row["second"] for row in rows]
-    line = statistics.linear_regression(seconds, [row[field] for row in rows])
-    return line.slope * (seconds[-1] - seconds[0])
+    span = seconds[-1] - seconds[0]
+    parts = [(statistics.fmean(row["second"] for row in part), of([row[field] for row in part]))
+             for part in (rows[len(rows) * n // PARTS:len(rows) * (n + 1) // PARTS] for n in range(PARTS))]
+    at, values = zip(*parts)
+    line = statistics.linear_regression(at, values)
+    left = sum((value - line.intercept - line.slope * second) ** 2 for second, value in parts) / (PARTS - 2)
+    error = math.sqrt(left / (statistics.variance(at) * (PARTS - 1)))
+    return line.slope * min(GROWTH_S, span), error * min(GROWTH_S, span)
 
 
 def bench_soak(bin_dir, emit, drive):
@@ -92,16 +102,21 @@ def run(atlas, street, failures, seconds):
 def judge(emit, minutes, rows, failures, refused, verified):
     """`rows` are those of the last two thirds."""
     span = f"the last {2 * minutes / 3:g} min"
+    within = f"{min(GROWTH_S / 60, 2 * minutes / 3):g} min"
     for what in (*failures.others[:20], *(f"{kind}: {count}" for kind, count in refused.items())):
         print(f"soak: {what}", file=sys.stderr)
     emit("soak.memory", max(row["resident_mib"] for row in rows), f"MiB, most in {span}", "none", None)
     with bench_asked.Asked(emit) as asked:
         asked.at_least("soak.samples", len(rows), f"in {span}", ASKED_SAMPLES * 40 * minutes)
-        asked.at_most("soak.memory_growth", growth(rows, "resident_mib"), f"MiB in {span}, by a straight line",
-                      ASKED_GROWTH_MIB)
+        grown, error = growth(rows, "resident_mib")
+        asked.at_most("soak.memory_growth", grown, f"MiB in {within}, by a straight line", ASKED_GROWTH_MIB)
+        emit("soak.memory_growth.error", error, "MiB, the line's standard error", "none", None)
+        grown, error = growth(rows, "resident_mib", min)
+        emit("soak.memory_growth.least", grown, f"MiB in {within}, of the least values", "none", None)
+        emit("soak.memory_growth.least.error", error, "MiB, the line's standard error", "none", None)
         asked.at_most("soak.log", max(row["log_mib"] for row in rows), f"MiB, largest in {span}", ASKED_LOG_MIB)
         for what in ("descriptors", "threads"):
-            asked.at_most(f"soak.{what}_growth", growth(rows, what), f"in {span}, by a straight line", ASKED_MORE)
+            asked.at_most(f"soak.{what}_growth", growth(rows, what)[0], f"in {within}", ASKED_MORE)
         asked.at_most("soak.failures", len(failures.others), "seen by those who asked", 0)
         asked.at_most("soak.refused", sum(refused.values()), "counted by the daemon", 0)
         asked.at_most("soak.damaged", verified["damaged"] + verified["mismatched"],
