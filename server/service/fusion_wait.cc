@@ -28,29 +28,23 @@ Status FusionWait::CheckRunning(const std::stop_token& stop) const {
   return {};
 }
 
-// Every mark that is left was tried since it was set, and damage was why it failed.
-bool FusionWait::IsStuck(const DirtyState& state) const {
-  return state.dirty_tiles != 0 && state.failed_tiles == state.dirty_tiles &&
-         damage_.size() >= state.dirty_tiles;
-}
-
 Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtyState&)>& is_done,
-                                          const Patience& patience,
-                                          DirtyState& state) const {
+                                          const Patience& patience) const {
   while (true) {
     const auto begin = Clock::now();
     const std::uint64_t seen = changes_.version();
     const Status start = fusion_.start_problem();
-    const auto read = store_.ReadDirtyState();
-    if (!read) {
-      return Error(read.error());
+    auto state = store_.ReadDirtyState();
+    if (!state) {
+      return Error(state.error());
     }
-    state = *read;
-    if (start.ok() && is_done(state)) {
-      return End::kDone;
+    if (start.ok() && is_done(*state)) {
+      return End{std::move(*state), {}, false};
     }
-    if (start.ok() && IsStuck(state)) {
-      return End::kDamaged;
+    if (start.ok() && state->failed_tiles.size() == state->dirty_tiles) {
+      if (Status damage = damage_.WhatKeepsAll(state->failed_tiles); !damage.ok()) {
+        return End{std::move(*state), std::move(damage), false};
+      }
     }
     const auto end = Clock::now();
     if (!changes_.WaitPast(seen, patience.deadline, patience.stop)) {
@@ -60,25 +54,20 @@ Result<FusionWait::End> FusionWait::Until(const std::function<bool(const DirtySt
       if (!start.ok()) {
         return Error(start);
       }
-      return End::kTimedOut;
+      return End{std::move(*state), {}, true};
     }
-    if (state.dirty_tiles > kMany) {
+    if (state->dirty_tiles > kMany) {
       std::this_thread::sleep_until(std::min(end + kRest * (end - begin), patience.deadline));
     }
   }
 }
 
 Result<WaitOutcome> FusionWait::UntilClean(const Patience& patience) const {
-  DirtyState state;
-  const auto end = Until([](const DirtyState& s) { return s.dirty_tiles == 0; }, patience, state);
+  const auto end = Until([](const DirtyState& s) { return s.dirty_tiles == 0; }, patience);
   if (!end) {
     return Error(end.error());
   }
-  WaitOutcome outcome{state.revision, state.dirty_tiles, *end == End::kTimedOut, {}};
-  if (*end == End::kDamaged) {
-    outcome.damage = damage_.Summary();
-  }
-  return outcome;
+  return WaitOutcome{end->state.revision, end->state.dirty_tiles, end->is_timed_out, end->damage};
 }
 
 Result<WaitOutcome> FusionWait::UntilCleanInTime(const Patience& patience) const {
@@ -96,21 +85,17 @@ Status FusionWait::ForRevision(std::uint64_t revision, const Patience& patience)
                   StrCat("cannot wait for revision ", revision, ", the atlas is at ", current));
   }
   ATLAS_RETURN_IF_ERROR(store_.identity().CheckNotLost(revision));
-  DirtyState state;
   const auto end = Until(
       [revision](const DirtyState& s) { return s.dirty_tiles == 0 || s.oldest_since > revision; },
-      patience, state);
+      patience);
   if (!end) {
     return end.error();
   }
-  if (*end == End::kDamaged) {
-    return damage_.Summary();
+  if (end->is_timed_out) {
+    return Status(StatusCode::kTimeout, StrCat("tiles do not reflect revision ", revision, " yet: ",
+                                               end->state.dirty_tiles, " are to be fused"));
   }
-  if (*end == End::kTimedOut) {
-    return Status(StatusCode::kTimeout, StrCat("tiles do not reflect revision ", revision,
-                                               " yet: ", state.dirty_tiles, " are to be fused"));
-  }
-  return {};
+  return end->damage;
 }
 
 std::function<Status()> FusionWait::Check(const Patience& patience, std::string too_late) const {

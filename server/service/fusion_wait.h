@@ -61,12 +61,15 @@ class FusionWait {
   std::function<Status()> Check(const Patience& patience, std::string too_late) const;
 
  private:
-  enum class End { kDone, kDamaged, kTimedOut };
+  // How a wait ended: done unless damage keeps it from that, or it was too late.
+  struct End {
+    DirtyState state;
+    Status damage;
+    bool is_timed_out = false;
+  };
 
   Result<End> Until(const std::function<bool(const DirtyState&)>& is_done,
-                    const Patience& patience,
-                    DirtyState& state) const;
-  bool IsStuck(const DirtyState& state) const;
+                    const Patience& patience) const;
   Status CheckRunning(const std::stop_token& stop) const;
 
   AtlasStore& store_;

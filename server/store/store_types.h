@@ -190,8 +190,9 @@ struct FinishResult {
 struct DirtyState {
   std::uint64_t revision = 0;
   std::uint64_t dirty_tiles = 0;
-  std::uint64_t failed_tiles = 0;  // of them, those that were tried since they were marked last
   std::uint64_t oldest_since = 0;  // lowest `since` of all marks; 0 without marks
+  // Where each of them was tried since it was marked last, and failed: all. Else none.
+  std::vector<TileId> failed_tiles;
 };
 
 struct StoreCounts {

@@ -1,5 +1,7 @@
 #include "server/service/fusion/damage_list.h"
 
+#include <algorithm>
+
 #include "core/base/str_cat.h"
 
 namespace atlas {
@@ -33,16 +35,15 @@ std::size_t DamageList::size() const {
   return tiles_.size();
 }
 
-Status DamageList::Summary() const {
+Status DamageList::WhatKeepsAll(std::span<const TileId> ids) const {
   const std::lock_guard lock(mutex_);
-  if (tiles_.empty()) {
+  if (ids.empty() ||
+      !std::all_of(ids.begin(), ids.end(), [&](const TileId& id) { return tiles_.contains(id); })) {
     return {};
   }
-  const auto& [id, damage] = *tiles_.begin();
-  return Status(
-      StatusCode::kInvalidData,
-      StrCat(tiles_.size(), " tiles cannot be fused and keep the content they have; tile ", id,
-             ": ", damage.why.message()));
+  return Status(StatusCode::kInvalidData,
+                StrCat(ids.size(), " tiles cannot be fused and keep the content they have; tile ",
+                       ids.front(), ": ", tiles_.at(ids.front()).why.message()));
 }
 
 }  // namespace atlas

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <map>
 #include <mutex>
+#include <span>
 
 #include "core/base/status.h"
 #include "core/geometry/tile_id.h"
@@ -24,8 +25,9 @@ class DamageList {
   // With this reason.
   bool IsNoted(const TileId& id, const Status& why) const;
   std::size_t size() const;
-  // kInvalidData naming how many tiles there are, and of the first what is damaged; ok without any.
-  Status Summary() const;
+  // Why none of these can be fused: kInvalidData naming how many they are, and of one what is
+  // damaged. Ok where one of them is not listed, or where there are none.
+  Status WhatKeepsAll(std::span<const TileId> ids) const;
 
  private:
   struct Damage {

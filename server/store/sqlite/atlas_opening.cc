@@ -35,6 +35,8 @@
 namespace atlas {
 namespace {
 
+constexpr const char* kNothingChanged = "nothing was changed";
+
 DatabaseOptions WriterOptions(const SqliteStoreOptions& options, std::filesystem::path file) {
   return {std::move(file), DatabaseOptions::Mode::kReadWrite, options.writer_cache_kib, 5'000,
           true};
@@ -130,8 +132,8 @@ void WhereThereIsRoom(const std::function<void()>& write) {
 
 // Part of what is lost may have been copied into the database before the damage: then pages of
 // different commits are in it, and what is left of the log goes to none of them. Nothing is written
-// then.
-Status CheckWhatIsLeft(Connection& writer, const std::string& loss) {
+// then. `changed`: what was before this, for people.
+Status CheckWhatIsLeft(Connection& writer, const std::string& loss, const char* changed) {
   writer.KeepLog(true);
   Status left;
   try {
@@ -143,7 +145,7 @@ Status CheckWhatIsLeft(Connection& writer, const std::string& loss) {
     return {};
   }
   return {StatusCode::kInvalidData, StrCat(loss, ", and what is left is no atlas (", left.message(),
-                                           "): nothing was changed; restore a backup")};
+                                           "): ", changed, "; restore a backup")};
 }
 
 // Before anything is read of it, or written. What was copied of lost commits may be longer than
@@ -151,8 +153,8 @@ Status CheckWhatIsLeft(Connection& writer, const std::string& loss) {
 Status CheckFiles(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
   Status status = origin.Check(writer, log.is_lossy());
   if (status.ok()) {
-    status =
-        log.is_lossy() ? CheckWhatIsLeft(writer, LossOf(log)) : CheckEnd(writer, origin.database());
+    status = log.is_lossy() ? CheckWhatIsLeft(writer, LossOf(log), kNothingChanged)
+                            : CheckEnd(writer, origin.database());
   }
   if (!status.ok() && log.damage.turned.empty() && !log.kept.empty()) {
     std::error_code ignored;
@@ -166,7 +168,8 @@ Status CheckFiles(Connection& writer, const DamagedLog& log, const LogOrigin& or
 Result<std::string> FindLoss(Connection& writer,
                              const StoreIdentity& identity,
                              const DamagedLog& log,
-                             const std::optional<NotedRevision>& noted) {
+                             const std::optional<NotedRevision>& noted,
+                             const char* changed) {
   if (log.is_lossy()) {
     return LossOf(log);
   }
@@ -183,8 +186,9 @@ Result<std::string> FindLoss(Connection& writer,
              ": its log (atlas.db-wal) was removed or cut, or an older copy was put in its place");
   // A copy of an earlier version is checked by nobody: it lacks what is made of it behind this.
   const auto version = ReadSchemaVersion(writer);
-  const Status left =
-      version && *version == kStoreSchemaVersion ? CheckWhatIsLeft(writer, loss) : Status();
+  const Status left = version && *version == kStoreSchemaVersion
+                          ? CheckWhatIsLeft(writer, loss, changed)
+                          : Status();
   return left.ok() ? Result<std::string>(std::move(loss)) : Error(left);
 }
 
@@ -283,11 +287,16 @@ void DropUnfinished(Connection& writer, const DamagedLog& log, const LogOrigin& 
   }
 }
 
-// Nothing is read by a schema that is damaged. What was put right of it, for people.
-Result<std::string> MakeReadable(Connection& writer,
-                                 const DamagedLog& log,
-                                 const LogOrigin& origin,
-                                 const SqliteStoreOptions& options) {
+struct Readable {
+  std::string schema;  // what was put right of it, for people
+  const char* changed = kNothingChanged;
+};
+
+// Nothing is read by a schema that is damaged.
+Result<Readable> MakeReadable(Connection& writer,
+                              const DamagedLog& log,
+                              const LogOrigin& origin,
+                              const SqliteStoreOptions& options) {
   if (Status status = CheckFiles(writer, log, origin); !status.ok()) {
     return Error(std::move(status));
   }
@@ -297,11 +306,14 @@ Result<std::string> MakeReadable(Connection& writer,
   };
   Result<std::string> schema = RepairSchema(writer, has_rest ? drop : nullptr);
   if (!schema) {
-    return schema;
+    return Error(schema.error());
   }
+  Readable readable{*schema,
+                    schema->empty() ? kNothingChanged : "nothing but its schema was changed"};
   Status status = MigrateStore(writer, [&](std::int64_t from) {
     if (from < kFirstReadableVersion) {  // the others are written later
       drop();
+      readable.changed = "nothing but its version was changed";
     }
     if (options.on_upgrade) {
       options.on_upgrade(from);
@@ -310,7 +322,7 @@ Result<std::string> MakeReadable(Connection& writer,
   if (status.ok()) {
     status = CheckPagesAreTheirs(writer);
   }
-  return status.ok() ? std::move(schema) : Error(std::move(status));
+  return status.ok() ? Result<Readable>(std::move(readable)) : Error(std::move(status));
 }
 
 void BeginWriting(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
@@ -350,15 +362,15 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
     auto writer = std::make_unique<Connection>(WriterOptions(options, directory.database_file()));
     writer->KeepLog(origin.has_log());  // whoever refuses leaves all as it was
     AddRowHash(*writer);
-    const Result<std::string> schema = MakeReadable(*writer, *log, origin, options);
-    if (!schema) {
-      return Error(Refusal(directory, schema.error(), has_note_alone));
+    const Result<Readable> readable = MakeReadable(*writer, *log, origin, options);
+    if (!readable) {
+      return Error(Refusal(directory, readable.error(), has_note_alone));
     }
     auto identity = ReadMeta(*writer);
     if (!identity) {
       return Error(identity.error().WithContext(directory.database_file().string()));
     }
-    const Result<std::string> loss = FindLoss(*writer, *identity, *log, noted);
+    const Result<std::string> loss = FindLoss(*writer, *identity, *log, noted, readable->changed);
     if (!loss) {
       return Error(Refusal(directory, loss.error(), has_note_alone));
     }
@@ -370,7 +382,7 @@ Result<OpenedAtlas> OpenAtlas(const DataDirectory& directory, const SqliteStoreO
       WhereThereIsRoom([&] { DropRest(*writer, origin.log_file()); });
     }
     WhereThereIsRoom([&] { DropAllLeases(*writer); });
-    for (const std::string& what : Mend(*writer, identity->profile.levels, *schema)) {
+    for (const std::string& what : Mend(*writer, identity->profile.levels, readable->schema)) {
       Tell(options.on_repair, what);
     }
     if (!log->damage.turned.empty()) {

@@ -1,6 +1,9 @@
 // What the workers know of a tile that fails.
 #include "server/service/fusion/damage_list.h"
 
+#include <array>
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace atlas {
@@ -33,9 +36,25 @@ TEST(DamageListTest, WhatIsRemovedIsNewsAgain) {
   DamageList list;
   list.Add(kTile, kWhy, true);
   list.Remove(kTile);
-  EXPECT_TRUE(list.Summary().ok());
+  EXPECT_TRUE(list.WhatKeepsAll(std::array{kTile}).ok());
   EXPECT_FALSE(list.IsNoted(kTile, kWhy));
   EXPECT_TRUE(list.Add(kTile, kWhy, true));
+}
+
+// One that was written may be listed a moment longer, and another may fail for want of room.
+TEST(DamageListTest, DamageKeepsAllTilesOnlyWhereEachOfThemIsListed) {
+  constexpr TileId kOther{0, 4, 3};
+  constexpr TileId kLate{1, 7, 7};
+  DamageList list;
+  list.Add(kOther, kOtherWhy, true);
+  list.Add(kLate, kOtherWhy, true);
+  EXPECT_TRUE(list.WhatKeepsAll({}).ok());
+  EXPECT_TRUE(list.WhatKeepsAll(std::array{kTile, kOther}).ok());
+  list.Add(kTile, kWhy, true);
+  const Status why = list.WhatKeepsAll(std::array{kTile, kOther});
+  EXPECT_EQ(why.code(), StatusCode::kInvalidData);
+  EXPECT_THAT(why.message(), ::testing::HasSubstr("2 tiles cannot be fused"));
+  EXPECT_THAT(why.message(), ::testing::HasSubstr("keyframe 4 is damaged"));
 }
 
 }  // namespace

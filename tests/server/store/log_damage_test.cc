@@ -14,6 +14,7 @@
 
 #include "server/store/event_types.h"
 #include "server/store/sqlite/connection/connection.h"
+#include "server/store/sqlite/connection/log_renewal.h"
 #include "server/store/sqlite/damaged_log.h"
 #include "tests/core/support/test_scale.h"
 #include "tests/server/store/faulty_vfs.h"
@@ -349,6 +350,8 @@ TEST_F(LogDamageTest, ATornEndAfterAPowerCutIsNoLoss) {
   EXPECT_TRUE(HasRunSince(Log()));
   fs::last_write_time(Log(), std::chrono::file_clock::from_sys(std::chrono::sys_seconds()));
   EXPECT_FALSE(HasRunSince(Log()));
+  ASSERT_TRUE(RenewLog(Database()).ok());
+  EXPECT_FALSE(HasRunSince(Log())) << "a start that went no further than that is no run";
   Open();
   EXPECT_EQ(store_->identity().epoch, 1u);
   EXPECT_EQ(Keyframes(), std::size_t{kCommits - 1});

@@ -147,11 +147,11 @@ TEST_F(TileStoreTest, AClaimThatFailedAfterItsTileWasMarkedAgainIsFreeAtOnce) {
     return Await<bool>([&](auto done) { store_->ReleaseClaim(claim, 5'000, std::move(done)); });
   };
   ASSERT_TRUE(release(old).value());
-  EXPECT_EQ(Dirty().failed_tiles, 0u);
+  EXPECT_TRUE(Dirty().failed_tiles.empty());
   const TileClaim current = Claim().claims.at(0);
   EXPECT_GT(current.generation, old.generation);
   ASSERT_TRUE(release(current).value());
-  EXPECT_EQ(Dirty().failed_tiles, 1u);
+  EXPECT_EQ(Dirty().failed_tiles, std::vector{id});
   EXPECT_TRUE(Claim().claims.empty());
 }
 

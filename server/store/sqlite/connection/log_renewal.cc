@@ -68,12 +68,16 @@ Status RenewLog(const std::filesystem::path& database) {
   if (error || size == 0) {
     return {};  // none; one that cannot be looked at is met again when it is read
   }
+  const auto written_at = std::filesystem::last_write_time(path, error);
   sqlite3_initialize();
   LayerFile file(*sqlite3_vfs_find(nullptr), path);
   if (file.open_code() != SQLITE_OK) {
     return StatusFromSqliteCode(file.open_code(), "the log cannot be opened");
   }
   const int code = file.WriteAgain();
+  if (!error) {
+    std::filesystem::last_write_time(path, written_at, error);
+  }
   return code == SQLITE_OK ? Status()
                            : StatusFromSqliteCode(code, "the log cannot be written again");
 }

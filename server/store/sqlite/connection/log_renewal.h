@@ -11,7 +11,9 @@
 namespace atlas {
 
 // To be called before the database is opened, by whoever holds its directory. Nothing without a
-// log; others may read it meanwhile. Errors as of sqlite_error.h.
+// log; others may read it meanwhile. The file's time stays: it tells what a power cut may have left
+// (HasRunSince), also to the next start if this one is refused or killed. Errors as of
+// sqlite_error.h.
 Status RenewLog(const std::filesystem::path& database);
 
 }  // namespace atlas

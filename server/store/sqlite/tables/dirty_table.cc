@@ -136,6 +136,18 @@ Result<std::vector<TileClaim>> FreeMarks(Connection& connection,
   return claims;
 }
 
+// Those whose key is damaged are left out: then not all that failed are here.
+std::vector<TileId> FailedTiles(Connection& connection) {
+  std::vector<TileId> tiles;
+  Query row = connection.Prepare("SELECT key FROM dirty_tiles WHERE attempts > 0");
+  while (row.Step()) {
+    if (const auto id = TileId::FromKey(row.Unsigned())) {
+      tiles.push_back(*id);
+    }
+  }
+  return tiles;
+}
+
 }  // namespace
 
 void MarkAtTheEnd(Connection& connection) {
@@ -259,13 +271,17 @@ void ForgetMarks(Connection& connection) {
 DirtyState ReadDirty(Connection& connection) {
   WriteLateMarks(connection);
   DirtyState state;
+  std::uint64_t failed = 0;
   state.revision = ReadCounter(connection, Counter::kRevision);
   Query row = connection.Prepare(
       "SELECT count(*), coalesce(sum(attempts > 0), 0), coalesce(min(since), 0) FROM dirty_tiles");
   if (row.Step()) {
     state.dirty_tiles = row.Unsigned();
-    state.failed_tiles = row.Unsigned();
+    failed = row.Unsigned();
     state.oldest_since = row.Unsigned();
+  }
+  if (failed != 0 && failed == state.dirty_tiles) {
+    state.failed_tiles = FailedTiles(connection);
   }
   return state;
 }
