@@ -54,6 +54,10 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
 
 bool Localizer::IsLookedFor() const {
   const int since = astray_ - options_.looked_after;
+  const PlaceTracker& told = places_.front().tracker;
+  if (told.is_carried() && told.reach_m() < options_.adrift_m) {
+    return false;
+  }
   return relocalizer_ && since >= 0 && since % options_.looked_again_after == 0;
 }
 
@@ -76,7 +80,7 @@ Result<std::vector<Localizer::SupposedPlace>> Localizer::Look(
     }
     Pose T_world_sensor = place.registration.T_world_level;
     T_world_sensor.linear() *= R_level_sensor.toRotationMatrix();
-    if (IsFollowed(T_world_sensor)) {
+    if (IsFollowed(T_world_sensor) || !places_.front().tracker.IsReachable(T_world_sensor)) {
       continue;
     }
     places.emplace_back(NewTracker());

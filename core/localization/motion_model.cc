@@ -36,17 +36,24 @@ void MotionModel::ForgetMotion() {
   covariance_.bottomRightCorner<4, 4>() = UnknownMotion(options_).asDiagonal();
 }
 
+Eigen::Matrix4d MotionModel::PlaceByMotion(const Pose& from, double scans) const {
+  const Eigen::Matrix3d R = TurnAboutVertical(0.5 * scans * motion_(3)) * from.linear();
+  const Eigen::Vector3d step = scans * R * motion_.head<3>();
+  Eigen::Matrix4d by_motion = Eigen::Matrix4d::Zero();
+  by_motion.topLeftCorner<3, 3>() = scans * R;
+  by_motion.topRightCorner<3, 1>() = 0.5 * scans * Eigen::Vector3d::UnitZ().cross(step);
+  by_motion(3, 3) = scans;
+  return by_motion;
+}
+
 void MotionModel::Predict(double scans) {
   last_ = pose_;
   since_ = scans;
-  const Eigen::Matrix3d R = TurnAboutVertical(0.5 * scans * motion_(3)) * pose_.linear();
-  const Eigen::Vector3d step = scans * R * motion_.head<3>();
-  const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(step);  // d step / d yaw
+  const Eigen::Matrix4d by_motion = PlaceByMotion(pose_, scans);
+  const Eigen::Vector3d step = by_motion.topLeftCorner<3, 3>() * motion_.head<3>();
   Matrix8d F = Matrix8d::Identity();
-  F.block<3, 1>(0, 3) = across;
-  F.block<3, 3>(0, 4) = scans * R;
-  F.block<3, 1>(0, 7) = 0.5 * scans * across;
-  F(3, 7) = scans;
+  F.block<3, 1>(0, 3) = Eigen::Vector3d::UnitZ().cross(step);  // d step / d yaw
+  F.topRightCorner<4, 4>() = by_motion;
   covariance_.bottomRightCorner<4, 4>().diagonal() +=
       scans * scans *
       Squares(options_.ahead_change_m, options_.beside_change_m, options_.up_change_m,
@@ -64,6 +71,19 @@ Pose MotionModel::T_now_later() const {
   T_now_later.translation() = R_world_sensor.transpose() * TurnAboutVertical(0.5 * motion_(3)) *
                               R_world_sensor * motion_.head<3>();
   return T_now_later;
+}
+
+void MotionModel::Carry(const Pose& T_world_sensor, const PoseCovariance& covariance) {
+  const Eigen::Matrix4d by_motion = PlaceByMotion(last_, since_);
+  const Eigen::Matrix<double, 8, 4> with_step = covariance_.rightCols<4>() * by_motion.transpose();
+  const Eigen::Matrix4d step =
+      by_motion * covariance_.bottomRightCorner<4, 4>() * by_motion.transpose() + covariance;
+  const Eigen::Matrix<double, 8, 4> gain = with_step * step.inverse();
+  const Eigen::Matrix<double, 8, 1> change = gain * PoseDifference(pose_, T_world_sensor);
+  pose_.translation() += change.head<3>();
+  pose_.linear() = TurnAboutVertical(change(3)) * pose_.linear();
+  motion_ += change.tail<4>();
+  covariance_ -= (gain * with_step.transpose()).eval();
 }
 
 void MotionModel::Correct(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) {

@@ -41,6 +41,9 @@ class MotionModel {
   void Start(const Pose& T_world_sensor);
   // To the next scan, after so many times the usual time between two: some may be missing.
   void Predict(double scans = 1.0);
+  // What was seen of the way from the last scan to this one, behind Predict(): the motion follows,
+  // and the place with it. `covariance`: of (x, y, z, yaw) of that step.
+  void Carry(const Pose& T_world_sensor, const PoseCovariance& covariance);
   // All three: the scan placed the vehicle, prior included, and `seen` is the scan's information
   // about (x, y, z, yaw).
   // As predicted, more or less: speeds follow as far as they are correlated with the place.
@@ -64,6 +67,9 @@ class MotionModel {
 
  private:
   using Matrix8d = Eigen::Matrix<double, 8, 8>;
+
+  // What a change of the motion makes of the place so many scans later.
+  Eigen::Matrix4d PlaceByMotion(const Pose& from, double scans) const;
 
   MotionOptions options_;
   Pose pose_ = Pose::Identity();

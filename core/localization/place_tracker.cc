@@ -34,7 +34,8 @@ PlaceTracker::PlaceTracker(const MapProfile& profile,
       cell_size_m_(profile.cell_size_m()),
       map_(profile, std::move(tiles), options.map),
       motion_(options.motion),
-      confirmation_(options.confirmation, options.registration) {}
+      confirmation_(options.confirmation, options.registration),
+      recent_(options.odometry.scans) {}
 
 void PlaceTracker::Start(const Pose& T_world_sensor) {
   motion_.Start(T_world_sensor);
@@ -44,6 +45,8 @@ void PlaceTracker::Start(const Pose& T_world_sensor) {
   lost_ = 0;
   unheld_ = 0;
   without_map_ = 0;
+  recent_.Clear();
+  carried_ = 0;
 }
 
 void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
@@ -69,8 +72,18 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   if (!is_first_) {
     motion_.Predict(scans_);
   }
+  if (carried_ > 0) {
+    ++carried_;
+    if (!CarryOn(features)) {
+      lost_ = std::exchange(carried_, 0);  // as anyone who is
+    }
+  }
   LocalizationResult result;
   Tracked tracked = Follow(features);
+  if (LeavesMap(tracked.place.registration, features)) {
+    carried_ = 1;
+    tracked = Follow(features);
+  }
   result.registration = std::move(tracked.place.registration);
   bool is_found = false;
   if (IsDoubtful(result.registration) || IsAdrift()) {
@@ -83,7 +96,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   const Surprise surprise = SurpriseOf(result.registration, features, is_found);
   result.health = Judge(result.registration, features, surprise);
   Confirm(features, surprise, result);
-  unheld_ = IsHeld(result.registration, features) ? 0 : unheld_ + 1;
+  unheld_ = carried_ > 0 || IsHeld(result.registration, features) ? 0 : unheld_ + 1;
   result.T_world_sensor = result.health == LocalizationHealth::kLost
                               ? Prior().T_world_level
                               : result.registration.T_world_level;
@@ -96,6 +109,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
     result.health = LocalizationHealth::kWeak;
   }
   Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
+  Keep(features, result);
   result.covariance = Covariance(result);
   const double up_m = std::sqrt(result.covariance(2, 2));
   if (result.health == LocalizationHealth::kGood && up_m > options_.max_weak_up_m) {
@@ -167,7 +181,7 @@ void PlaceTracker::Remember(const LocalizationResult& result,
   }
   if (result.health == LocalizationHealth::kLost) {
     motion_.SetTilt(result.T_world_sensor.linear());
-    if (++lost_ > options_.max_coasting) {
+    if (carried_ == 0 && ++lost_ > options_.max_coasting) {
       motion_.ForgetMotion();  // looked for where it got to
     }
     return;
@@ -181,6 +195,17 @@ void PlaceTracker::Remember(const LocalizationResult& result,
     motion_.Relocate(result.T_world_sensor, seen);
   }
   lost_ = 0;
+}
+
+void PlaceTracker::Keep(const ScanFeatures& features, const LocalizationResult& result) {
+  const bool is_lost = result.health == LocalizationHealth::kLost;
+  const bool is_good = result.health == LocalizationHealth::kGood;
+  if (carried_ > 0 || is_good) {
+    recent_.Add(features, is_lost ? Prior().T_world_level : result.registration.T_world_level);
+  } else if (is_lost || !confirmation_.is_confirmed()) {
+    recent_.Clear();
+  }
+  if (is_good) carried_ = 0;
 }
 
 PosePrior PlaceTracker::Prior() const {
@@ -250,6 +275,49 @@ bool PlaceTracker::IsDoubtful(const RegistrationResult& result) const {
          result.column_fit < options_.doubtful_column_fit;
 }
 
+bool PlaceTracker::CarryOn(const ScanFeatures& features) {
+  if (recent_.is_empty()) {
+    return false;
+  }
+  const ScanMotion moved = MotionSince(recent_, features, Prior().T_world_level, options_.odometry);
+  if (moved.fit < options_.odometry.min_fit) {
+    recent_.Clear();
+    return false;
+  }
+  motion_.Carry(moved.T_world_level, moved.covariance);
+  return true;
+}
+
+bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features) {
+  return carried_ == 0 && lost_ == 0 && IsDoubtful(tracked) &&
+         !IsGroundMapped(features, Prior().T_world_level) && CarryOn(features);
+}
+
+bool PlaceTracker::IsGroundMapped(const ScanFeatures& features, const Pose& T_world_level) const {
+  const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
+  const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
+  int near = 0;
+  int mapped = 0;
+  for (const Eigen::Vector3f& p : features.ground) {
+    if (p.norm() > options_.near_ground_m) {
+      continue;
+    }
+    ++near;
+    mapped += map_.window().NearestSurface(R * p + t, options_.ground_reach_m) ? 1 : 0;
+  }
+  return mapped >= options_.min_ground_mapped * near;
+}
+
+bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
+  const double most = options_.reachable_sigmas;
+  return carried_ == 0 || LogDensity(Prior(), T_world_sensor) >= -0.5 * most * most;
+}
+
+bool PlaceTracker::IsBack(const RegistrationResult& result, const ScanFeatures& features) const {
+  return !IsDoubtful(result) && IsReachable(result.T_world_level) &&
+         IsGroundMapped(features, result.T_world_level);
+}
+
 bool PlaceTracker::IsAdrift() const {
   return lost_ == 0 && SpreadOf(motion_.covariance()).along_m > options_.adrift_sigma_m;
 }
@@ -291,8 +359,9 @@ std::optional<RegistrationResult> PlaceTracker::Search(const ScanFeatures& featu
   std::vector<Place> places{At(tracked, is_as_expected)};
   for (const Pose& start : SearchPoses(map_.coarse(), map_.window().origin(), features,
                                        Prior().T_world_level, Reach(), search)) {
-    places.push_back(
-        At(Register(map_.window(), features, start, options_.registration), is_as_expected));
+    Place place =
+        At(Register(map_.window(), features, start, options_.registration), is_as_expected);
+    if (IsReachable(place.registration.T_world_level)) places.push_back(std::move(place));
   }
   const auto best = std::max_element(places.begin() + 1, places.end(), IsLessLikely);
   if (best == places.end() || !StandsOut(places, *best)) {

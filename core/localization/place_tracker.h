@@ -16,6 +16,8 @@
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
 #include "core/localization/motion_model.h"
+#include "core/localization/odometry/recent_scans.h"
+#include "core/localization/odometry/scan_odometry.h"
 #include "core/localization/pose_search.h"
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
@@ -28,6 +30,7 @@ struct PlaceTrackerOptions {
   MotionOptions motion;
   PoseSearchOptions search;
   ConfirmationOptions confirmation;
+  ScanOdometryOptions odometry;
 
   // Of RegistrationResult; less is lost. Wrong places on real drives, found from starts up to 6 m
   // and 20 degrees off, fit 0.385 at most, right ones 0.48 and more but for two in a hundred.
@@ -83,6 +86,15 @@ struct PlaceTrackerOptions {
   // too.
   int asked_again_after = 5;
 
+  // Where less than this share of the ground within `near_ground_m` was mapped at its height, a
+  // vehicle that is known goes on by its own motion when the scan does not fit: what else is near
+  // in the map is another deck, or looks like it. Until that motion has a break in it, no place
+  // counts that is further than so many standard deviations from where it came to.
+  double min_ground_mapped = 0.5;
+  float near_ground_m = 15.0F;
+  float ground_reach_m = 0.6F;
+  double reachable_sigmas = 3.0;
+
   int told_lost_after = 5;  // scans, from which on its covariance is that of an unknown place
 
   // Found where the prior's log density is below this, the vehicle moved as nobody expected.
@@ -131,6 +143,12 @@ class PlaceTracker {
   // The last answer, when another place may be the right one as well.
   LocalizationResult Doubted(LocalizationResult result) const;
   double usual_fit() const { return usual_fit_; }
+  // Whether it went off the map and is carried on by its own motion from where it was known.
+  bool is_carried() const { return carried_ > 0; }
+  // Whether it can be there by now; everywhere, where it is not carried.
+  bool IsReachable(const Pose& T_world_sensor) const;
+  // How far from where it is expected that is, in the direction in which that is least known.
+  double reach_m() const { return options_.reachable_sigmas * spread_m(); }
   // How uncertain its place is in the direction in which it is least known, standard deviation.
   double spread_m() const { return SpreadOf(motion_.covariance()).along_m; }
 
@@ -158,6 +176,13 @@ class PlaceTracker {
   Tracked Follow(const ScanFeatures& features);
   std::optional<Eigen::Vector2d> RivalOf(const std::vector<Place>& places, const Place& best) const;
   bool IsDoubtful(const RegistrationResult& result) const;
+  // By what the last scans saw, where there are any and this one goes with them.
+  bool CarryOn(const ScanFeatures& features);
+  // Goes off the map, if that is where it drove.
+  bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
+  bool IsGroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
+  // On the map again.
+  bool IsBack(const RegistrationResult& result, const ScanFeatures& features) const;
   bool IsAdrift() const;
   double AdriftReach(const PoseCovariance& covariance) const;
   SearchReach Reach() const;
@@ -191,6 +216,8 @@ class PlaceTracker {
   Eigen::Matrix4d Seen(const RegistrationResult& registration,
                        const Cover& cover,
                        const std::optional<Eigen::Vector2d>& rival) const;
+  // The scan, for those that follow, where it is known where it was taken.
+  void Keep(const ScanFeatures& features, const LocalizationResult& result);
   void Remember(const LocalizationResult& result, const Eigen::Matrix4d& seen, bool is_found);
 
   PlaceTrackerOptions options_;
@@ -205,6 +232,8 @@ class PlaceTracker {
   int lost_ = 0;            // scans in a row
   int unheld_ = 0;          // scans in a row
   int without_map_ = 0;     // scans in a row on which the map was not all there
+  RecentScans recent_;      // while it is known where each was taken
+  int carried_ = 0;         // scans in a row, the one at hand as well
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;

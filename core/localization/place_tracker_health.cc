@@ -18,6 +18,9 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
         off.head<3>().norm() <= options_.told_m && std::abs(off(3)) <= options_.told_rad;
     return is_told ? Surprise::kNone : Surprise::kNew;
   }
+  if (carried_ > 0) {
+    return Surprise::kOdd;
+  }
   if (lost_ == 0 && !is_found) {
     return Surprise::kNone;
   }
@@ -62,6 +65,9 @@ bool PlaceTracker::IsHeld(const RegistrationResult& result, const ScanFeatures& 
 LocalizationHealth PlaceTracker::Judge(const RegistrationResult& result,
                                        const ScanFeatures& features,
                                        Surprise surprise) const {
+  if (carried_ > 0 && !IsBack(result, features)) {
+    return LocalizationHealth::kLost;
+  }
   if ((surprise != Surprise::kNone && !is_first_) || !confirmation_.is_confirmed()
           ? !confirmation_.IsEnough(result, features)
           : result.fit < options_.min_fit) {

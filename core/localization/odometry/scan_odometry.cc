@@ -1,0 +1,229 @@
+#include "core/localization/odometry/scan_odometry.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "core/localization/icp/point_index.h"
+#include "core/localization/normal_equations.h"
+
+namespace atlas {
+namespace {
+
+// Geman-McClure, as of a scan in a map.
+float RobustWeight(float residual, float reach) {
+  constexpr float kScale = 0.4F;
+  const float ratio = residual / (kScale * reach);
+  const float denominator = 1.0F + ratio * ratio;
+  return 1.0F / (denominator * denominator);
+}
+
+// What a cloud is around one of its points.
+struct Neighbourhood {
+  Eigen::Vector3f center = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
+  std::size_t points = 0;
+};
+
+class Cloud {
+ public:
+  Cloud(std::vector<Eigen::Vector3f> points, float radius_m)
+      : index_(std::move(points)), radius_m_(radius_m), known_(index_.points().size()) {}
+
+  // Around the point that is nearest to `p`.
+  const Neighbourhood* Near(const Eigen::Vector3f& p, float reach_m) {
+    const std::optional<NearPoint> nearest = index_.Nearest(p, reach_m);
+    if (!nearest) {
+      return nullptr;
+    }
+    std::optional<Neighbourhood>& known = known_[nearest->index];
+    if (!known) known = Around(index_.points()[nearest->index]);
+    return &*known;
+  }
+
+ private:
+  Neighbourhood Around(const Eigen::Vector3f& p) {
+    constexpr std::size_t kNeighbours = 12;
+    index_.Nearest(p, radius_m_, kNeighbours, near_);
+    Neighbourhood around;
+    around.points = near_.size();
+    for (const NearPoint& point : near_) around.center += index_.points()[point.index];
+    around.center /= static_cast<float>(near_.size());
+    for (const NearPoint& point : near_) {
+      const Eigen::Vector3f offset = index_.points()[point.index] - around.center;
+      around.covariance += offset * offset.transpose();
+    }
+    return around;
+  }
+
+  PointIndex index_;
+  float radius_m_;
+  std::vector<std::optional<Neighbourhood>> known_;
+  std::vector<NearPoint> near_;
+};
+
+// The fit of one scan to those before.
+class ScanFit {
+ public:
+  ScanFit(const RecentScans& recent,
+          const ScanFeatures& features,
+          const Eigen::Vector3d& origin,
+          const ScanOdometryOptions& options)
+      : features_(features),
+        options_(options),
+        columns_(recent.Columns(origin), 0.8F),
+        ground_(recent.Ground(origin), 2.5F) {}
+
+  struct Evidence {
+    NormalEquations equations;
+    int near = 0;
+    double fit = 0.0;
+  };
+
+  Evidence At(const Pose& pose, float reach_m) {
+    Evidence evidence;
+    const Eigen::Matrix3f R = pose.linear().cast<float>();
+    const Eigen::Vector3f t = pose.translation().cast<float>();
+    for (const Eigen::Vector3f& p : features_.columns) {
+      Add(p, AddColumn(R * p, t, reach_m, evidence.equations), evidence);
+    }
+    for (const Eigen::Vector3f& p : features_.ground) {
+      Add(p, AddGround(R * p, t, reach_m, evidence.equations), evidence);
+    }
+    return evidence;
+  }
+
+ private:
+  void Add(const Eigen::Vector3f& p, float weight, Evidence& evidence) const {
+    if (p.norm() > options_.max_range_m) {
+      return;
+    }
+    ++evidence.near;
+    evidence.fit += double{weight};
+  }
+
+  // A wall's line holds across itself, what is no wall in both directions. Its robust weight; 0
+  // where nothing is near.
+  float AddColumn(const Eigen::Vector3f& arm,
+                  const Eigen::Vector3f& t,
+                  float reach_m,
+                  NormalEquations& equations) {
+    constexpr float kWall = 0.1F;  // of its spread along, across
+    constexpr std::size_t kFewest = 4;
+    const Neighbourhood* near = columns_.Near(arm + t, reach_m);
+    if (near == nullptr) {
+      return 0.0F;
+    }
+    const Eigen::Vector2f offset = (arm + t - near->center).head<2>();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f> spread(
+        near->covariance.topLeftCorner<2, 2>());
+    const bool is_wall =
+        near->points >= kFewest && spread.eigenvalues()(0) < kWall * spread.eigenvalues()(1);
+    const Eigen::Vector2f normal = spread.eigenvectors().col(0);
+    const float residual = is_wall ? std::abs(normal.dot(offset)) : offset.norm();
+    const float robust = RobustWeight(residual, reach_m);
+    const double weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
+    if (is_wall) {
+      AddAlong(normal, arm, normal.dot(offset), weight, equations);
+    } else {
+      AddAlong(Eigen::Vector2f::UnitX(), arm, offset.x(), weight, equations);
+      AddAlong(Eigen::Vector2f::UnitY(), arm, offset.y(), weight, equations);
+    }
+    return robust;
+  }
+
+  static void AddAlong(const Eigen::Vector2f& direction,
+                       const Eigen::Vector3f& arm,
+                       float residual,
+                       double weight,
+                       NormalEquations& equations) {
+    equations.Add({double{direction.x()}, double{direction.y()}, 0.0}, arm.cast<double>(),
+                  double{residual}, weight);
+  }
+
+  float AddGround(const Eigen::Vector3f& arm,
+                  const Eigen::Vector3f& t,
+                  float reach_m,
+                  NormalEquations& equations) {
+    constexpr float kSteepest = 0.8F;  // cosine: more is no ground
+    constexpr std::size_t kFewest = 5;
+    constexpr float kNeighbour_m = 1.5F;
+    const Neighbourhood* near = ground_.Near(arm + t, kNeighbour_m);
+    if (near == nullptr || near->points < kFewest) {
+      return 0.0F;
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> spread(near->covariance);
+    Eigen::Vector3f normal = spread.eigenvectors().col(0);
+    if (std::abs(normal.z()) < kSteepest) {
+      return 0.0F;
+    }
+    const float residual = normal.dot(arm + t - near->center);
+    const float robust = RobustWeight(std::abs(residual), 0.5F * reach_m);
+    equations.Add(normal.cast<double>(), arm.cast<double>(), double{residual},
+                  robust / (options_.ground_sigma_m * options_.ground_sigma_m));
+    return robust;
+  }
+
+  const ScanFeatures& features_;
+  const ScanOdometryOptions& options_;
+  Cloud columns_;
+  Cloud ground_;
+};
+
+Eigen::Vector4d Squares(double horizontal, double up, double turn) {
+  return Eigen::Vector4d(horizontal, horizontal, up, turn).cwiseAbs2();
+}
+
+// What is left uncertain of a step that is held by `equations`.
+PoseCovariance StepCovariance(const NormalEquations& equations,
+                              const ScanOdometryOptions& options) {
+  constexpr std::array<int, 4> kAxes{0, 1, 2, 5};
+  const NormalEquations::Matrix6 information = equations.H.selfadjointView<Eigen::Lower>();
+  Eigen::Matrix4d held = options.information_share * information(kAxes, kAxes);
+  held.diagonal() +=
+      Squares(options.start_sigma_m, options.start_sigma_m, options.start_sigma_rad).cwiseInverse();
+  PoseCovariance covariance = held.inverse();
+  covariance.diagonal() += Squares(options.step_m, options.step_up_m, options.step_rad);
+  return covariance;
+}
+
+}  // namespace
+
+ScanMotion MotionSince(const RecentScans& recent,
+                       const ScanFeatures& features,
+                       const Pose& T_world_level_start,
+                       const ScanOdometryOptions& options) {
+  const Eigen::Vector3d origin = T_world_level_start.translation();
+  Pose start = T_world_level_start;
+  start.translation().setZero();
+  const Eigen::Matrix4d expected =
+      Squares(options.start_sigma_m, options.start_sigma_m, options.start_sigma_rad)
+          .cwiseInverse()
+          .asDiagonal();
+  ScanFit scan(recent, features, origin, options);
+  Pose pose = start;
+  for (int i = 0; i < options.iterations + options.fine_iterations; ++i) {
+    const float left =
+        std::max(0.0F, 1.0F - static_cast<float>(i) / static_cast<float>(options.iterations));
+    const float reach_m =
+        options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m);
+    NormalEquations equations = scan.At(pose, reach_m).equations;
+    equations.AddTiltPrior(pose, options.tilt_sigma_rad);
+    equations.AddPrior(pose, start, expected);
+    pose = Moved(pose, equations.Solve());
+  }
+  const ScanFit::Evidence last = scan.At(pose, options.fine_reach_m);
+  ScanMotion motion;
+  motion.T_world_level = pose;
+  motion.T_world_level.translation() += origin;
+  motion.covariance = StepCovariance(last.equations, options);
+  motion.fit = last.near == 0 ? 0.0 : last.fit / last.near;
+  return motion;
+}
+
+}  // namespace atlas

@@ -1,0 +1,52 @@
+// How a vehicle moved since its last scans, by those alone: its scan is fitted to what they saw,
+// columns to lines and ground to planes (robust Gauss-Newton on SE(3), as Register does in a map).
+#pragma once
+
+#include <cstddef>
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+#include "core/localization/odometry/recent_scans.h"
+#include "core/localization/pose_prior.h"
+#include "core/localization/scan_features.h"
+
+namespace atlas {
+
+struct ScanOdometryOptions {
+  std::size_t scans = 8;        // that are kept
+  float coarse_reach_m = 1.5F;  // how far a neighbour is looked for at first ...
+  float fine_reach_m = 0.4F;    // ... and in the end
+  int iterations = 10;          // while the reach becomes smaller,
+  int fine_iterations = 6;      // and then
+  float column_sigma_m = 0.12F;
+  float ground_sigma_m = 0.05F;
+  double tilt_sigma_rad = 0.0087;  // the IMU's: 0.5 degrees
+  double start_sigma_m = 0.5;      // of where it was expected
+  double start_sigma_rad = 0.05;
+  float max_range_m = 25.0F;  // the fit is that of nearer features: further off much is new
+
+  // A scan that fits less was taken elsewhere: the vehicle was moved, or saw too little.
+  double min_fit = 0.35;
+  // Neighbouring features err together (PlaceTrackerOptions); and however many there are, a step is
+  // known no better than this, standard deviations.
+  double information_share = 0.08;
+  double step_m = 0.02;
+  double step_up_m = 0.015;
+  double step_rad = 0.0015;
+};
+
+struct ScanMotion {
+  Pose T_world_level = Pose::Identity();
+  PoseCovariance covariance = PoseCovariance::Zero();  // of the step since the last scans
+  double fit = 0.0;  // mean robust weight of the features that are near, 0..1
+};
+
+// Where the scan was taken, near `T_world_level_start`. Requires scans. A `fit` below `min_fit`:
+// not where it can have been driven to.
+ScanMotion MotionSince(const RecentScans& recent,
+                       const ScanFeatures& features,
+                       const Pose& T_world_level_start,
+                       const ScanOdometryOptions& options);
+
+}  // namespace atlas
