@@ -1,0 +1,125 @@
+// How a vehicle moved, from its scans alone.
+#include "core/localization/odometry/scan_odometry.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "tests/core/localization/painted_map.h"
+
+namespace atlas {
+namespace {
+
+using testing::CastLeveledScan;
+using testing::ErrorOf;
+using testing::kDegree;
+using testing::ShapeWorld;
+using testing::UprightPose;
+
+ScanFeatures Seen(const ShapeWorld& world, const Pose& truth) {
+  return ExtractFeatures(CastLeveledScan(testing::QuickSensor(), world, truth),
+                         testing::QuickOptions().features);
+}
+
+// On the street's slope, in a slight bend.
+Pose OnStreet(double x_m) {
+  return UprightPose({x_m, 0.4 * std::sin(0.2 * x_m), 1.8 + 0.01 * x_m},
+                     0.08 * std::cos(0.2 * x_m));
+}
+
+Pose Moved(const Pose& from, double x_m, double y_m, double z_m, double yaw_rad) {
+  Pose moved = from;
+  moved.translation() += Eigen::Vector3d(x_m, y_m, z_m);
+  moved.linear() =
+      Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix() * from.linear();
+  return moved;
+}
+
+TEST(ScanOdometryTest, OneStepIsFoundFromAroundIt) {
+  const ScanOdometryOptions options;
+  RecentScans recent(options.scans);
+  for (const double x : {-8.0, -7.0, -6.0})
+    recent.Add(Seen(testing::Street(), OnStreet(x)), OnStreet(x));
+  const Pose truth = OnStreet(-5.0);
+  const ScanFeatures scan = Seen(testing::Street(), truth);
+  for (const double off : {-1.0, 0.0, 1.0}) {
+    const Pose start = Moved(truth, 0.6 * off, 0.3 * off, 0.05, -3.0 * kDegree * off);
+    const ScanMotion motion = MotionSince(recent, scan, start, options);
+    EXPECT_GT(motion.fit, options.min_fit) << off;
+    EXPECT_LT(ErrorOf(motion.T_world_level, truth).horizontal_m, 0.06) << off;
+    EXPECT_LT(ErrorOf(motion.T_world_level, truth).vertical_m, 0.03) << off;
+    EXPECT_LT(ErrorOf(motion.T_world_level, truth).angle_rad, 0.4 * kDegree) << off;
+  }
+}
+
+TEST(ScanOdometryTest, AlongAStreetItDriftsLittle) {
+  const ScanOdometryOptions options;
+  RecentScans recent(options.scans);
+  Pose pose = OnStreet(-15.0);
+  recent.Add(Seen(testing::Street(), pose), pose);
+  Pose before = pose;
+  Pose start = OnStreet(-14.0);
+  for (int i = 1; i <= 30; ++i) {
+    const ScanFeatures scan = Seen(testing::Street(), OnStreet(-15.0 + i));
+    const ScanMotion motion = MotionSince(recent, scan, start, options);
+    ASSERT_GT(motion.fit, options.min_fit) << i;
+    before = pose;
+    pose = motion.T_world_level;
+    recent.Add(scan, pose);
+    start = pose;
+    start.translation() += pose.translation() - before.translation();
+  }
+  EXPECT_LT(ErrorOf(pose, OnStreet(15.0)).horizontal_m, 0.25);
+  EXPECT_LT(ErrorOf(pose, OnStreet(15.0)).vertical_m, 0.15);
+  EXPECT_LT(ErrorOf(pose, OnStreet(15.0)).angle_rad, 1.0 * kDegree);
+}
+
+TEST(ScanOdometryTest, WhoWasMovedElsewhereFitsNothing) {
+  const ScanOdometryOptions options;
+  RecentScans recent(options.scans);
+  for (const double x : {-12.0, -11.0, -10.0})
+    recent.Add(Seen(testing::Street(), OnStreet(x)), OnStreet(x));
+  const ScanFeatures elsewhere =
+      Seen(testing::Street(), Moved(OnStreet(9.0), 0.0, 1.0, 0.0, 0.5 * std::numbers::pi));
+  EXPECT_LT(MotionSince(recent, elsewhere, OnStreet(-9.0), options).fit, options.min_fit);
+  const ScanFeatures in_a_garage =
+      Seen(testing::GarageCorner(), UprightPose({-4.0, -1.0, 1.8}, 0.2));
+  EXPECT_LT(MotionSince(recent, in_a_garage, OnStreet(-9.0), options).fit, options.min_fit);
+}
+
+// Along two endless walls nothing tells how far it went.
+TEST(ScanOdometryTest, BetweenWallsAStepIsUncertainAlongThem) {
+  const ScanOdometryOptions options;
+  RecentScans recent(options.scans);
+  const auto at = [](double x_m) {
+    return UprightPose({x_m, 0.0, 1.8}, 0.0);
+  };
+  for (const double x : {0.0, 1.0, 2.0}) recent.Add(Seen(testing::Corridor(), at(x)), at(x));
+  const ScanMotion motion =
+      MotionSince(recent, Seen(testing::Corridor(), at(3.0)), at(3.0), options);
+  EXPECT_GT(std::sqrt(motion.covariance(0, 0)), 0.1);
+  EXPECT_LT(std::sqrt(motion.covariance(1, 1)), 0.04);
+}
+
+TEST(RecentScansTest, TheOldestGoesFirst) {
+  RecentScans recent(2);
+  EXPECT_TRUE(recent.is_empty());
+  ScanFeatures scan;
+  for (const float x : {1.0F, 2.0F, 3.0F}) {
+    scan.columns.assign(1, {x, 0.0F, 0.0F});
+    scan.ground.assign(1, {0.0F, x, 0.0F});
+    recent.Add(scan, UprightPose({10.0, 0.0, 0.0}, 0.0));
+  }
+  const std::vector<Eigen::Vector3f> columns = recent.Columns({5.0, 0.0, 0.0});
+  ASSERT_EQ(columns.size(), 2U);
+  EXPECT_FLOAT_EQ(columns[0].x() + columns[1].x(), 5.0F + 5.0F + 2.0F + 3.0F);
+  EXPECT_EQ(recent.Ground({5.0, 0.0, 0.0}).size(), 2U);
+  recent.Clear();
+  EXPECT_TRUE(recent.is_empty());
+  recent.Add(scan, Pose::Identity());
+  EXPECT_EQ(recent.Columns(Eigen::Vector3d::Zero()).size(), 1U);
+}
+
+}  // namespace
+}  // namespace atlas

@@ -1,0 +1,104 @@
+// Vehicles that drive off the map: what they find there may look like what was mapped.
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "core/localization/localizer.h"
+#include "tests/core/localization/painted_map.h"
+
+namespace atlas {
+namespace {
+
+using testing::CastLeveledScan;
+using testing::ErrorOf;
+using testing::PaintedMap;
+using testing::ShapeWorld;
+using testing::UprightPose;
+
+// Of two yards that look the same the map has the first.
+PaintedMap FirstYard() {
+  ShapeWorld mapped = testing::TwoYards();
+  mapped.patches.front().high.x() = -4.0;
+  std::erase_if(mapped.boxes, [](const testing::Box& box) { return box.low.x() > 0.0; });
+  PaintedMap map;
+  map.Paint(mapped, 38.0);
+  return map;
+}
+
+LocalizerOptions NearOptions() {
+  LocalizerOptions options = testing::QuickOptions();
+  options.features.max_range_m = 15.0F;
+  return options;
+}
+
+Localizer LocalizerIn(const PaintedMap& map) {
+  RelocalizerOptions options;
+  options.features = NearOptions().features;
+  auto relocalizer = std::make_shared<const Relocalizer>(map.profile(), testing::PlacesOf(map),
+                                                         map.Source(), options);
+  return {map.profile(), map.Source(), NearOptions(),
+          [relocalizer]() -> Result<std::shared_ptr<const Relocalizer>> {
+            return relocalizer;
+          }};
+}
+
+LocalizationResult At(Localizer& localizer, const Pose& truth) {
+  return localizer
+      .Localize(CastLeveledScan(testing::QuickSensor(), testing::TwoYards(), truth),
+                Eigen::Quaterniond::Identity())
+      .value();
+}
+
+Pose InYards(double x_m) {
+  return UprightPose({x_m, 0.5, 1.8}, 0.0);
+}
+
+class UnmappedTest : public ::testing::Test {
+ protected:
+  void Drive(double from_m, double to_m, double step_m) {
+    for (double x = from_m; (to_m - x) * step_m >= 0.0; x += step_m) {
+      last_ = At(localizer_, InYards(x));
+      const double off_m = ErrorOf(last_.T_world_sensor, InYards(x)).horizontal_m;
+      EXPECT_FALSE(last_.health == LocalizationHealth::kGood && off_m > 0.3) << x << ": " << off_m;
+      off_m_ = off_m;
+    }
+  }
+
+  const PaintedMap map_ = FirstYard();
+  Localizer localizer_ = LocalizerIn(map_);
+  LocalizationResult last_;
+  double off_m_ = 0.0;
+};
+
+TEST_F(UnmappedTest, WhoWasKnownIsCarriedOnByHisOwnMotion) {
+  localizer_.Start(InYards(-26.0));
+  Drive(-26.0, -16.0, 1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kGood);
+  Drive(-15.0, 26.0, 1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kLost) << "it is in the yard that was not mapped";
+  EXPECT_LT(off_m_, 0.5);
+  const Eigen::Vector4d off = PoseDifference(InYards(26.0), last_.T_world_sensor);
+  EXPECT_LT(off.dot(last_.covariance.inverse() * off), 16.0) << "of four expected";
+}
+
+TEST_F(UnmappedTest, BackOnTheMapItIsFoundWhereItCameTo) {
+  localizer_.Start(InYards(-26.0));
+  Drive(-26.0, 24.0, 1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kLost);
+  Drive(24.0, -20.0, -1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kGood);
+  EXPECT_LT(off_m_, 0.06);
+}
+
+// A break in its motion: it may be anywhere, and is looked for everywhere.
+TEST_F(UnmappedTest, WhoIsMovedWhileHeIsOffTheMapIsFoundWhereHeIs) {
+  localizer_.Start(InYards(-26.0));
+  Drive(-26.0, 14.0, 1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kLost);
+  Drive(-30.0, -12.0, 0.75);
+  EXPECT_EQ(last_.health, LocalizationHealth::kGood);
+  EXPECT_LT(off_m_, 0.06);
+}
+
+}  // namespace
+}  // namespace atlas
