@@ -200,7 +200,7 @@ void PlaceTracker::Remember(const LocalizationResult& result,
 void PlaceTracker::Keep(const ScanFeatures& features, const LocalizationResult& result) {
   const bool is_lost = result.health == LocalizationHealth::kLost;
   const bool is_good = result.health == LocalizationHealth::kGood;
-  if (carried_ > 0 || is_good) {
+  if (carried_ > 0 || is_good || IsNearEdge(features, result)) {
     recent_.Add(features, is_lost ? Prior().T_world_level : result.registration.T_world_level);
   } else if (is_lost || !confirmation_.is_confirmed()) {
     recent_.Clear();
@@ -290,10 +290,11 @@ bool PlaceTracker::CarryOn(const ScanFeatures& features) {
 
 bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features) {
   return carried_ == 0 && lost_ == 0 && IsDoubtful(tracked) &&
-         !IsGroundMapped(features, Prior().T_world_level) && CarryOn(features);
+         GroundMapped(features, Prior().T_world_level) < options_.min_ground_mapped &&
+         CarryOn(features);
 }
 
-bool PlaceTracker::IsGroundMapped(const ScanFeatures& features, const Pose& T_world_level) const {
+double PlaceTracker::GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const {
   const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
   int near = 0;
@@ -305,7 +306,19 @@ bool PlaceTracker::IsGroundMapped(const ScanFeatures& features, const Pose& T_wo
     ++near;
     mapped += map_.window().NearestSurface(R * p + t, options_.ground_reach_m) ? 1 : 0;
   }
-  return mapped >= options_.min_ground_mapped * near;
+  return near == 0 ? 1.0 : static_cast<double>(mapped) / near;
+}
+
+bool PlaceTracker::IsNearEdge(const ScanFeatures& features,
+                              const LocalizationResult& result) const {
+  const Pose& there = result.registration.T_world_level;
+  if (result.health != LocalizationHealth::kWeak || !confirmation_.is_confirmed() ||
+      recent_.is_empty() || GroundMapped(features, there) > options_.edge_ground_mapped) {
+    return false;
+  }
+  const ScanMotion moved = MotionSince(recent_, features, there, options_.odometry);
+  return moved.fit >= options_.odometry.min_fit &&
+         !AreApart(moved.T_world_level, there, options_.same_step_m, options_.same_step_rad);
 }
 
 bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
@@ -315,7 +328,7 @@ bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
 
 bool PlaceTracker::IsBack(const RegistrationResult& result, const ScanFeatures& features) const {
   return !IsDoubtful(result) && IsReachable(result.T_world_level) &&
-         IsGroundMapped(features, result.T_world_level);
+         GroundMapped(features, result.T_world_level) >= options_.min_ground_mapped;
 }
 
 bool PlaceTracker::IsAdrift() const {

@@ -91,6 +91,10 @@ struct PlaceTrackerOptions {
   // in the map is another deck, or looks like it. Until that motion has a break in it, no place
   // counts that is further than so many standard deviations from where it came to.
   double min_ground_mapped = 0.5;
+  // Where less than this share is, weak places are checked by that motion, which is to agree.
+  double edge_ground_mapped = 0.9;
+  double same_step_m = 0.5;
+  double same_step_rad = 0.05;
   float near_ground_m = 15.0F;
   float ground_reach_m = 0.6F;
   double reachable_sigmas = 3.0;
@@ -180,7 +184,10 @@ class PlaceTracker {
   bool CarryOn(const ScanFeatures& features);
   // Goes off the map, if that is where it drove.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
-  bool IsGroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
+  // Share of the ground near the vehicle that is in the map at its height.
+  double GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
+  // Whether little of the map is left to hold it, and its own motion brought it there, too.
+  bool IsNearEdge(const ScanFeatures& features, const LocalizationResult& result) const;
   // On the map again.
   bool IsBack(const RegistrationResult& result, const ScanFeatures& features) const;
   bool IsAdrift() const;

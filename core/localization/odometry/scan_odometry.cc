@@ -79,10 +79,17 @@ class ScanFit {
         columns_(recent.Columns(origin), 0.8F),
         ground_(recent.Ground(origin), 2.5F) {}
 
-  struct Evidence {
-    NormalEquations equations;
+  // Of the features that are near: how many, and the sum of their robust weights.
+  struct Share {
     int near = 0;
     double fit = 0.0;
+
+    double mean() const { return near == 0 ? 0.0 : fit / near; }
+  };
+  struct Evidence {
+    NormalEquations equations;
+    Share columns;
+    Share ground;
   };
 
   Evidence At(const Pose& pose, float reach_m) {
@@ -90,21 +97,21 @@ class ScanFit {
     const Eigen::Matrix3f R = pose.linear().cast<float>();
     const Eigen::Vector3f t = pose.translation().cast<float>();
     for (const Eigen::Vector3f& p : features_.columns) {
-      Add(p, AddColumn(R * p, t, reach_m, evidence.equations), evidence);
+      Add(p, AddColumn(R * p, t, reach_m, evidence.equations), evidence.columns);
     }
     for (const Eigen::Vector3f& p : features_.ground) {
-      Add(p, AddGround(R * p, t, reach_m, evidence.equations), evidence);
+      Add(p, AddGround(R * p, t, reach_m, evidence.equations), evidence.ground);
     }
     return evidence;
   }
 
  private:
-  void Add(const Eigen::Vector3f& p, float weight, Evidence& evidence) const {
+  void Add(const Eigen::Vector3f& p, float weight, Share& share) const {
     if (p.norm() > options_.max_range_m) {
       return;
     }
-    ++evidence.near;
-    evidence.fit += double{weight};
+    ++share.near;
+    share.fit += double{weight};
   }
 
   // A wall's line holds across itself, what is no wall in both directions. Its robust weight; 0
@@ -116,14 +123,13 @@ class ScanFit {
     constexpr float kWall = 0.1F;  // of its spread along, across
     constexpr std::size_t kFewest = 4;
     const Neighbourhood* near = columns_.Near(arm + t, reach_m);
-    if (near == nullptr) {
+    if (near == nullptr || near->points < kFewest) {
       return 0.0F;
     }
     const Eigen::Vector2f offset = (arm + t - near->center).head<2>();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f> spread(
         near->covariance.topLeftCorner<2, 2>());
-    const bool is_wall =
-        near->points >= kFewest && spread.eigenvalues()(0) < kWall * spread.eigenvalues()(1);
+    const bool is_wall = spread.eigenvalues()(0) < kWall * spread.eigenvalues()(1);
     const Eigen::Vector2f normal = spread.eigenvectors().col(0);
     const float residual = is_wall ? std::abs(normal.dot(offset)) : offset.norm();
     const float robust = RobustWeight(residual, reach_m);
@@ -222,7 +228,7 @@ ScanMotion MotionSince(const RecentScans& recent,
   motion.T_world_level = pose;
   motion.T_world_level.translation() += origin;
   motion.covariance = StepCovariance(last.equations, options);
-  motion.fit = last.near == 0 ? 0.0 : last.fit / last.near;
+  motion.fit = last.columns.near < options.few_columns ? last.ground.mean() : last.columns.mean();
   return motion;
 }
 

@@ -28,6 +28,7 @@ struct ScanOdometryOptions {
 
   // A scan that fits less was taken elsewhere: the vehicle was moved, or saw too little.
   double min_fit = 0.35;
+  int few_columns = 30;  // with fewer that are near it is the ground that fits, or not
   // Neighbouring features err together (PlaceTrackerOptions); and however many there are, a step is
   // known no better than this, standard deviations.
   double information_share = 0.08;
@@ -39,7 +40,7 @@ struct ScanOdometryOptions {
 struct ScanMotion {
   Pose T_world_level = Pose::Identity();
   PoseCovariance covariance = PoseCovariance::Zero();  // of the step since the last scans
-  double fit = 0.0;  // mean robust weight of the features that are near, 0..1
+  double fit = 0.0;  // mean robust weight of the columns that are near, 0..1
 };
 
 // Where the scan was taken, near `T_world_level_start`. Requires scans. A `fit` below `min_fit`:

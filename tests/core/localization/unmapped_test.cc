@@ -1,5 +1,6 @@
 // Vehicles that drive off the map: what they find there may look like what was mapped.
 #include <memory>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -49,18 +50,19 @@ LocalizationResult At(Localizer& localizer, const Pose& truth) {
       .value();
 }
 
-Pose InYards(double x_m) {
-  return UprightPose({x_m, 0.5, 1.8}, 0.0);
+Pose InYards(double x_m, double yaw_rad = 0.0) {
+  return UprightPose({x_m, 0.5, 1.8}, yaw_rad);
 }
 
 class UnmappedTest : public ::testing::Test {
  protected:
-  void Drive(double from_m, double to_m, double step_m) {
+  void Drive(double from_m, double to_m, double step_m, double yaw_rad = 0.0) {
     for (double x = from_m; (to_m - x) * step_m >= 0.0; x += step_m) {
-      last_ = At(localizer_, InYards(x));
-      const double off_m = ErrorOf(last_.T_world_sensor, InYards(x)).horizontal_m;
-      EXPECT_FALSE(last_.health == LocalizationHealth::kGood && off_m > 0.3) << x << ": " << off_m;
-      off_m_ = off_m;
+      const Pose truth = InYards(x, yaw_rad);
+      last_ = At(localizer_, truth);
+      off_m_ = ErrorOf(last_.T_world_sensor, truth).horizontal_m;
+      EXPECT_FALSE(last_.health == LocalizationHealth::kGood && off_m_ > 0.3)
+          << x << ": " << off_m_;
     }
   }
 
@@ -95,7 +97,7 @@ TEST_F(UnmappedTest, WhoIsMovedWhileHeIsOffTheMapIsFoundWhereHeIs) {
   localizer_.Start(InYards(-26.0));
   Drive(-26.0, 14.0, 1.0);
   EXPECT_EQ(last_.health, LocalizationHealth::kLost);
-  Drive(-30.0, -12.0, 0.75);
+  Drive(-10.0, -26.0, -0.75, std::numbers::pi);
   EXPECT_EQ(last_.health, LocalizationHealth::kGood);
   EXPECT_LT(off_m_, 0.06);
 }
