@@ -271,6 +271,26 @@ def second(bin_dir):
         assert wrong <= 1 and len(good) >= 35 and carried[-1]["error_m"] < 0.2
 
 
+def unmapped(bin_dir):
+    """A garage of which one deck is mapped: who drives off it goes on by his own motion, and is taken to no other deck."""
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        for seed in (0, 2):
+            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed)],
+                           check=True, stdout=subprocess.DEVNULL)
+        atlas.run("ingest", f"{work}/0", "--range", "0:60")
+        atlas.run("wait")
+        done = atlas.call("localize", f"{work}/2", "--no-restart").stdout.splitlines()
+        assert atlas.stop() == 0
+    scans = [json.loads(line) for line in done[:-1]]
+    good = [scan for scan in scans if scan["health"] == "good"]
+    wrong = sum(scan["error_m"] > 1.0 for scan in good)
+    print(f"one deck mapped: {len(good)} of {len(scans)} scans good, {wrong} of them elsewhere; "
+          f"the last one {scans[-1]['health']}, {scans[-1]['error_m']} m off")
+    assert len(good) >= 40 and wrong == 0
+    assert scans[-1]["health"] == "lost" and scans[-1]["error_m"] < 1.0
+
+
 def ground(bin_dir):
     """The map's ground near the path, which mostly no ray reached, against labelled returns of other scans."""
     for piece in ("00", "02", "04", "08"):
@@ -428,7 +448,7 @@ def main():
             finally:
                 assert atlas.stop() == 0
     else:
-        {"localization": localization, "places": places, "anchor": anchor, "second": second,
+        {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped,
          "segmentation": segmentation, "order": order, "ground": ground, "street": street}[name](bin_dir)
 
 
