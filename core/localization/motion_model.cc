@@ -74,16 +74,18 @@ Pose MotionModel::T_now_later() const {
 }
 
 void MotionModel::Carry(const Pose& T_world_sensor, const PoseCovariance& covariance) {
-  const Eigen::Matrix4d by_motion = PlaceByMotion(last_, since_);
-  const Eigen::Matrix<double, 8, 4> with_step = covariance_.rightCols<4>() * by_motion.transpose();
-  const Eigen::Matrix4d step =
-      by_motion * covariance_.bottomRightCorner<4, 4>() * by_motion.transpose() + covariance;
-  const Eigen::Matrix<double, 8, 4> gain = with_step * step.inverse();
+  Eigen::Matrix<double, 4, 8> H = Eigen::Matrix<double, 4, 8>::Zero();
+  H.rightCols<4>() = PlaceByMotion(last_, since_);
+  const Eigen::Matrix4d step = H * covariance_ * H.transpose() + covariance;
+  const Eigen::Matrix<double, 8, 4> gain = covariance_ * H.transpose() * step.inverse();
   const Eigen::Matrix<double, 8, 1> change = gain * PoseDifference(pose_, T_world_sensor);
   pose_.translation() += change.head<3>();
   pose_.linear() = TurnAboutVertical(change(3)) * pose_.linear();
   motion_ += change.tail<4>();
-  covariance_ -= (gain * with_step.transpose()).eval();
+  // Joseph's form: hundreds of steps without a place in the map leave it a covariance.
+  const Matrix8d left = Matrix8d::Identity() - gain * H;
+  covariance_ =
+      (left * covariance_ * left.transpose() + gain * covariance * gain.transpose()).eval();
 }
 
 void MotionModel::Correct(const Pose& T_world_sensor, const Eigen::Matrix4d& seen) {

@@ -90,6 +90,10 @@ class ScanFit {
     NormalEquations equations;
     Share columns;
     Share ground;
+
+    double Fit(int few_columns) const {
+      return columns.near < few_columns ? ground.mean() : columns.mean();
+    }
   };
 
   Evidence At(const Pose& pose, float reach_m) {
@@ -198,20 +202,15 @@ PoseCovariance StepCovariance(const NormalEquations& equations,
   return covariance;
 }
 
-}  // namespace
-
-ScanMotion MotionSince(const RecentScans& recent,
-                       const ScanFeatures& features,
-                       const Pose& T_world_level_start,
-                       const ScanOdometryOptions& options) {
-  const Eigen::Vector3d origin = T_world_level_start.translation();
-  Pose start = T_world_level_start;
-  start.translation().setZero();
-  const Eigen::Matrix4d expected =
+// From `start` downhill; near where it is `expected` as far as nothing else holds it.
+Pose Descend(ScanFit& scan,
+             const Pose& start,
+             const Pose& expected,
+             const ScanOdometryOptions& options) {
+  const Eigen::Matrix4d information =
       Squares(options.start_sigma_m, options.start_sigma_m, options.start_sigma_rad)
           .cwiseInverse()
           .asDiagonal();
-  ScanFit scan(recent, features, origin, options);
   Pose pose = start;
   for (int i = 0; i < options.iterations + options.fine_iterations; ++i) {
     const float left =
@@ -220,16 +219,48 @@ ScanMotion MotionSince(const RecentScans& recent,
         options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m);
     NormalEquations equations = scan.At(pose, reach_m).equations;
     equations.AddTiltPrior(pose, options.tilt_sigma_rad);
-    equations.AddPrior(pose, start, expected);
+    equations.AddPrior(pose, expected, information);
     pose = Moved(pose, equations.Solve());
   }
-  const ScanFit::Evidence last = scan.At(pose, options.fine_reach_m);
-  ScanMotion motion;
-  motion.T_world_level = pose;
-  motion.T_world_level.translation() += origin;
-  motion.covariance = StepCovariance(last.equations, options);
-  motion.fit = last.columns.near < options.few_columns ? last.ground.mean() : last.columns.mean();
-  return motion;
+  return pose;
+}
+
+// The likeliest first: as expected, then turned, the least first.
+std::vector<Pose> StartsAround(const Pose& expected, const ScanOdometryOptions& options) {
+  std::vector<Pose> starts{expected};
+  for (int step = 1; step <= options.turns; ++step) {
+    for (const double side : {-1.0, 1.0}) {
+      const Eigen::AngleAxisd turn(side * step * options.turn_rad, Eigen::Vector3d::UnitZ());
+      starts.push_back(expected);
+      starts.back().linear() = turn.toRotationMatrix() * expected.linear();
+    }
+  }
+  return starts;
+}
+
+}  // namespace
+
+ScanMotion MotionSince(const RecentScans& recent,
+                       const ScanFeatures& features,
+                       const Pose& T_world_level_start,
+                       const ScanOdometryOptions& options) {
+  const Eigen::Vector3d origin = T_world_level_start.translation();
+  Pose expected = T_world_level_start;
+  expected.translation().setZero();
+  ScanFit scan(recent, features, origin, options);
+  ScanMotion best;
+  for (const Pose& start : StartsAround(expected, options)) {
+    const Pose pose = Descend(scan, start, expected, options);
+    const ScanFit::Evidence evidence = scan.At(pose, options.fine_reach_m);
+    if (const double fit = evidence.Fit(options.few_columns); fit > best.fit) {
+      best.T_world_level = pose;
+      best.covariance = StepCovariance(evidence.equations, options);
+      best.fit = fit;
+    }
+    if (best.fit >= options.sure_fit) break;
+  }
+  best.T_world_level.translation() += origin;
+  return best;
 }
 
 }  // namespace atlas

@@ -24,6 +24,11 @@ struct ScanOdometryOptions {
   double tilt_sigma_rad = 0.0087;  // the IMU's: 0.5 degrees
   double start_sigma_m = 0.5;      // of where it was expected
   double start_sigma_rad = 0.05;
+  // Where a scan fits by less than this, it may have turned more than expected: so many times so
+  // much is tried to either side.
+  double sure_fit = 0.5;
+  int turns = 3;
+  double turn_rad = 0.12;
   float max_range_m = 25.0F;  // the fit is that of nearer features: further off much is new
 
   // A scan that fits less was taken elsewhere: the vehicle was moved, or saw too little.
