@@ -122,6 +122,48 @@ TEST(MotionModelTest, APlaceFoundAfterManyScansTellsTheSpeedOfAllOfThem) {
   EXPECT_LT(ErrorOf(model.T_world_sensor(), Straight(2.5 * 17)).horizontal_m, 0.2);
 }
 
+// Its own scans tell each step, no map where it is. The sum of hundreds of uncertain steps is as
+// uncertain as it has to be, and stays a covariance.
+TEST(MotionModelTest, CarriedAlongItsPlaceBecomesSlowlyLessCertain) {
+  constexpr double kStep_m = 0.02;
+  const PoseCovariance step =
+      Eigen::Vector4d(kStep_m, kStep_m, 0.015, 0.0015).cwiseAbs2().asDiagonal();
+  MotionModel model({});
+  model.Start(OnCircle(0));
+  for (int i = 1; i <= 5; ++i) {
+    model.Predict();
+    model.Correct(OnCircle(i), kSeenWell);
+  }
+  double before_m = 0.0;
+  for (int i = 6; i <= 400; ++i) {
+    model.Predict();
+    model.Carry(OnCircle(i), step);
+    ExpectIsCovariance(model.covariance());
+    ASSERT_LT(ErrorOf(model.T_world_sensor(), OnCircle(i)).horizontal_m, 0.2) << i;
+    if (i == 105) before_m = SpreadOf(model.covariance()).along_m;
+  }
+  EXPECT_GT(before_m, 10 * kStep_m) << "a hundred steps";
+  EXPECT_GT(SpreadOf(model.covariance()).along_m, before_m);
+  EXPECT_NEAR(std::sqrt(model.covariance()(2, 2)), 0.015 * std::sqrt(395.0), 0.1);
+}
+
+// Where a step says nothing along the way, the vehicle goes on as it did.
+TEST(MotionModelTest, AStepThatSaysNothingIsThatOfItsMotion) {
+  MotionModel model({});
+  model.Start(Straight(0.0));
+  for (int i = 1; i <= 5; ++i) {
+    model.Predict();
+    model.Correct(Straight(1.5 * i), kSeenWell);
+  }
+  const PoseCovariance blind = Eigen::Vector4d(1e4, 1e-4, 1e-4, 1e-6).asDiagonal();
+  for (int i = 6; i <= 15; ++i) {
+    model.Predict();
+    model.Carry(Straight(1.5 * i - 40.0), blind);
+  }
+  EXPECT_LT(ErrorOf(model.T_world_sensor(), Straight(1.5 * 15)).horizontal_m, 0.2);
+  EXPECT_GT(SpreadOf(model.covariance()).along_m, 0.5);
+}
+
 TEST(MotionModelTest, ADirectionThatIsNoLongerSeenKeepsItsSpeed) {
   MotionModel model({});
   model.Start(Straight(0.0));
