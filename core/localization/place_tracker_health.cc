@@ -19,7 +19,9 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
     return is_told ? Surprise::kNone : Surprise::kNew;
   }
   if (carried_ > 0) {
-    return Surprise::kOdd;
+    const bool is_as_usual =
+        carried_ <= options_.max_coasting && confirmation_.IsAsUsual(result, features, usual_fit_);
+    return is_as_usual ? Surprise::kNone : Surprise::kOdd;
   }
   if (lost_ == 0 && !is_found) {
     return Surprise::kNone;

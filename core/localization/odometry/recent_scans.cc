@@ -13,6 +13,12 @@ void Append(const std::vector<Eigen::Vector3f>& points,
   for (const Eigen::Vector3f& p : points) all.push_back(R * p + t);
 }
 
+// With room for more than this: after some scans nothing is allocated any more.
+void Assign(const std::vector<Eigen::Vector3f>& points, std::vector<Eigen::Vector3f>& kept) {
+  if (kept.capacity() < points.size()) kept.reserve(2 * points.size());
+  kept.assign(points.begin(), points.end());
+}
+
 Pose From(const Eigen::Vector3d& origin, Pose T_world_level) {
   T_world_level.translation() -= origin;
   return T_world_level;
@@ -25,8 +31,8 @@ void RecentScans::Add(const ScanFeatures& features, const Pose& T_world_level) {
   if (scans_.size() < most_) scans_.resize(most_);
   Scan& scan = scans_[next_];
   scan.T_world_level = T_world_level;
-  scan.columns.assign(features.columns.begin(), features.columns.end());
-  scan.ground.assign(features.ground.begin(), features.ground.end());
+  Assign(features.columns, scan.columns);
+  Assign(features.ground, scan.ground);
   next_ = (next_ + 1) % most_;
   count_ = std::min(count_ + 1, most_);
 }
