@@ -51,6 +51,10 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
   const double up_m = result.registration.T_world_level.translation().z();
   if (auto there = confirmation_.Weigh(map_.window(), features, result.registration, usual_fit_,
                                        IsDoubtful(result.registration))) {
+    if (!IsReachable(there->T_world_level)) {
+      result.health = LocalizationHealth::kLost;
+      return;
+    }
     result.registration = *std::move(there);
     motion_.Raise(result.registration.T_world_level.translation().z() - up_m);
   }
