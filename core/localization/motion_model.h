@@ -61,6 +61,10 @@ class MotionModel {
   void SetTilt(const Eigen::Matrix3d& R_world_sensor);
 
   const Pose& T_world_sensor() const { return pose_; }
+  // (x, y, z, yaw) from where it was before Predict() to there.
+  Eigen::Vector4d LastStep(const Pose& T_world_sensor) const {
+    return PoseDifference(last_, T_world_sensor);
+  }
   // From one scan to the next, as it is known: identity while nothing is.
   Pose T_now_later() const;
   PoseCovariance covariance() const { return covariance_.topLeftCorner<4, 4>(); }

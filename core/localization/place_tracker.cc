@@ -109,7 +109,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
     result.health = LocalizationHealth::kWeak;
   }
   Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
-  Keep(features, result);
+  Keep(features, result, is_found);
   result.covariance = Covariance(result);
   const double up_m = std::sqrt(result.covariance(2, 2));
   if (result.health == LocalizationHealth::kGood && up_m > options_.max_weak_up_m) {
@@ -184,6 +184,10 @@ void PlaceTracker::Remember(const LocalizationResult& result,
     if (carried_ == 0 && ++lost_ > options_.max_coasting) {
       motion_.ForgetMotion();  // looked for where it got to
     }
+    return;
+  }
+  if (carried_ > 0 && !confirmation_.is_confirmed()) {
+    motion_.SetTilt(result.T_world_sensor.linear());
     return;
   }
   if (!is_found ||

@@ -98,6 +98,19 @@ struct PlaceTrackerOptions {
   float near_ground_m = 15.0F;
   float ground_reach_m = 0.6F;
   double reachable_sigmas = 3.0;
+  // ... nor does less of the ground keep it on the map where the scan fits well enough.
+  double least_ground_mapped = 0.25;
+  // However well scans fit to each other, a step of a metre or more is known no better than this,
+  // standard deviations; a shorter one as much better as it is shorter.
+  double step_m = 0.02;
+  double step_up_m = 0.015;
+  double step_rad = 0.0015;
+  // What errs all the way, the IMU's tilt first of all: standard deviations, a metre of the way.
+  double drift = 0.003;
+  double drift_up = 0.003;
+  // Scans are kept that are so far from each other: of one spot one is enough.
+  double kept_apart_m = 0.3;
+  double kept_apart_rad = 0.1;
 
   int told_lost_after = 5;  // scans, from which on its covariance is that of an unknown place
 
@@ -184,10 +197,17 @@ class PlaceTracker {
   bool CarryOn(const ScanFeatures& features);
   // Goes off the map, if that is where it drove.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
-  // Share of the ground near the vehicle that is in the map at its height.
-  double GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
+  // Of a step, with what errs on the way there.
+  PoseCovariance StepCovariance(const ScanMotion& moved);
+  // Whether so much of the ground is mapped that the scan would fit if this were the place.
+  bool IsOnMap(const RegistrationResult& result,
+               const ScanFeatures& features,
+               double unknown_share) const;
+  // Share of the ground near the vehicle that is in the map at its height; none where no ground is
+  // seen.
+  std::optional<double> GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
   // Whether little of the map is left to hold it, and its own motion brought it there, too.
-  bool IsNearEdge(const ScanFeatures& features, const LocalizationResult& result) const;
+  bool IsNearEdge(const ScanFeatures& features, const LocalizationResult& result);
   // On the map again.
   bool IsBack(const RegistrationResult& result, const ScanFeatures& features) const;
   bool IsAdrift() const;
@@ -224,7 +244,7 @@ class PlaceTracker {
                        const Cover& cover,
                        const std::optional<Eigen::Vector2d>& rival) const;
   // The scan, for those that follow, where it is known where it was taken.
-  void Keep(const ScanFeatures& features, const LocalizationResult& result);
+  void Keep(const ScanFeatures& features, const LocalizationResult& result, bool is_found);
   void Remember(const LocalizationResult& result, const Eigen::Matrix4d& seen, bool is_found);
 
   PlaceTrackerOptions options_;
@@ -234,13 +254,15 @@ class PlaceTracker {
   MotionModel motion_;
   Confirmation confirmation_;
   bool is_first_ = true;
-  double scans_ = 1.0;      // from the last scan to the next
-  double usual_fit_ = 0.0;  // of good results, exponentially forgotten
-  int lost_ = 0;            // scans in a row
-  int unheld_ = 0;          // scans in a row
-  int without_map_ = 0;     // scans in a row on which the map was not all there
-  RecentScans recent_;      // while it is known where each was taken
-  int carried_ = 0;         // scans in a row, the one at hand as well
+  double scans_ = 1.0;                 // from the last scan to the next
+  double usual_fit_ = 0.0;             // of good results, exponentially forgotten
+  int lost_ = 0;                       // scans in a row
+  int unheld_ = 0;                     // scans in a row
+  int without_map_ = 0;                // scans in a row on which the map was not all there
+  RecentScans recent_;                 // while it is known where each was taken
+  int carried_ = 0;                    // scans in a row, the one at hand as well
+  double carried_m_ = 0.0;             // the way that it made meanwhile
+  Pose last_kept_ = Pose::Identity();  // where the last of recent_ was taken
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;

@@ -1,13 +1,22 @@
 // A vehicle that drove off the map, carried on by its own motion from where it was known (decision
-// 0624).
+// 0624). Until it is known again the map does not move it: what fits there may be another place.
+#include <algorithm>
+
 #include "core/localization/place_tracker.h"
 
 namespace atlas {
 
 bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features) {
-  return carried_ == 0 && lost_ == 0 && IsDoubtful(tracked) &&
-         GroundMapped(features, Prior().T_world_level) < options_.min_ground_mapped &&
-         CarryOn(features);
+  if (carried_ > 0 || lost_ > 0 || !IsDoubtful(tracked)) {
+    return false;
+  }
+  RegistrationResult here = tracked;
+  here.T_world_level = Prior().T_world_level;
+  if (IsOnMap(here, features, 1.0)) {
+    return false;
+  }
+  carried_m_ = 0.0;
+  return CarryOn(features);
 }
 
 bool PlaceTracker::CarryOn(const ScanFeatures& features) {
@@ -19,34 +28,70 @@ bool PlaceTracker::CarryOn(const ScanFeatures& features) {
     recent_.Clear();
     return false;
   }
-  motion_.Carry(moved.T_world_level, moved.covariance);
+  motion_.Carry(moved.T_world_level, StepCovariance(moved));
   return true;
 }
 
-void PlaceTracker::Keep(const ScanFeatures& features, const LocalizationResult& result) {
-  const bool is_lost = result.health == LocalizationHealth::kLost;
-  const bool is_good = result.health == LocalizationHealth::kGood;
-  if (carried_ > 0 || is_good || IsNearEdge(features, result)) {
-    recent_.Add(features, is_lost ? Prior().T_world_level : result.registration.T_world_level);
-  } else if (is_lost || !confirmation_.is_confirmed()) {
-    recent_.Clear();
-  }
-  if (is_good) carried_ = 0;
+// What errs alike all the way adds the more to the variance the longer that is.
+PoseCovariance PlaceTracker::StepCovariance(const ScanMotion& moved) {
+  const double step_m = motion_.LastStep(moved.T_world_level).head<3>().norm();
+  carried_m_ += step_m;
+  const Eigen::Vector4d each(options_.step_m, options_.step_m, options_.step_up_m,
+                             options_.step_rad);
+  const Eigen::Vector4d drift(options_.drift, options_.drift, options_.drift_up, 0.0);
+  PoseCovariance covariance = moved.covariance;
+  covariance.diagonal() +=
+      std::min(1.0, step_m) * each.cwiseAbs2() + 2.0 * carried_m_ * step_m * drift.cwiseAbs2();
+  return covariance;
 }
 
-bool PlaceTracker::IsNearEdge(const ScanFeatures& features,
-                              const LocalizationResult& result) const {
+void PlaceTracker::Keep(const ScanFeatures& features,
+                        const LocalizationResult& result,
+                        bool is_found) {
+  const bool is_lost = result.health == LocalizationHealth::kLost;
+  const bool is_known = !is_lost && confirmation_.is_confirmed();
+  const bool is_carried = carried_ > 0 && !is_known;
+  if (!is_carried && (carried_ > 0 || is_found || is_lost)) {
+    recent_.Clear();  // they lie where it is not
+  }
+  if (!is_carried) {
+    carried_ = 0;
+    if (result.health != LocalizationHealth::kGood && !IsNearEdge(features, result)) {
+      return;
+    }
+  }
+  const Pose there = is_carried ? Prior().T_world_level : result.registration.T_world_level;
+  if (recent_.is_empty() ||
+      AreApart(there, last_kept_, options_.kept_apart_m, options_.kept_apart_rad)) {
+    recent_.Add(features, there);
+    last_kept_ = there;
+  }
+}
+
+bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationResult& result) {
   const Pose& there = result.registration.T_world_level;
-  if (result.health != LocalizationHealth::kWeak || !confirmation_.is_confirmed() ||
-      recent_.is_empty() || GroundMapped(features, there) > options_.edge_ground_mapped) {
+  if (result.health != LocalizationHealth::kWeak || recent_.is_empty() ||
+      GroundMapped(features, there).value_or(1.0) > options_.edge_ground_mapped) {
     return false;
   }
   const ScanMotion moved = MotionSince(recent_, features, there, options_.odometry);
-  return moved.fit >= options_.odometry.min_fit &&
-         !AreApart(moved.T_world_level, there, options_.same_step_m, options_.same_step_rad);
+  const bool agrees =
+      confirmation_.is_confirmed() && moved.fit >= options_.odometry.min_fit &&
+      !AreApart(moved.T_world_level, there, options_.same_step_m, options_.same_step_rad);
+  if (!agrees) recent_.Clear();
+  return agrees;
 }
 
-double PlaceTracker::GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const {
+bool PlaceTracker::IsOnMap(const RegistrationResult& result,
+                           const ScanFeatures& features,
+                           double unknown_share) const {
+  const double asked = confirmation_.IsEnough(result, features) ? options_.least_ground_mapped
+                                                                : options_.min_ground_mapped;
+  return GroundMapped(features, result.T_world_level).value_or(unknown_share) >= asked;
+}
+
+std::optional<double> PlaceTracker::GroundMapped(const ScanFeatures& features,
+                                                 const Pose& T_world_level) const {
   const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
   int near = 0;
@@ -58,7 +103,7 @@ double PlaceTracker::GroundMapped(const ScanFeatures& features, const Pose& T_wo
     ++near;
     mapped += map_.window().NearestSurface(R * p + t, options_.ground_reach_m) ? 1 : 0;
   }
-  return near == 0 ? 1.0 : static_cast<double>(mapped) / near;
+  return near == 0 ? std::nullopt : std::optional(static_cast<double>(mapped) / near);
 }
 
 bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
@@ -67,8 +112,8 @@ bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
 }
 
 bool PlaceTracker::IsBack(const RegistrationResult& result, const ScanFeatures& features) const {
-  return !IsDoubtful(result) && IsReachable(result.T_world_level) &&
-         GroundMapped(features, result.T_world_level) >= options_.min_ground_mapped;
+  return confirmation_.IsEnough(result, features) && IsReachable(result.T_world_level) &&
+         IsOnMap(result, features, 0.0);
 }
 
 }  // namespace atlas

@@ -95,8 +95,10 @@ LocalizationResult PlaceTracker::Doubted(LocalizationResult result) const {
 PoseCovariance PlaceTracker::Covariance(const LocalizationResult& result) const {
   const bool is_poor =
       result.health == LocalizationHealth::kWeak && result.registration.fit < options_.good_fit;
-  const bool is_known = confirmation_.is_confirmed() && !is_poor &&
-                        unheld_ <= options_.most_unheld && lost_ < options_.told_lost_after;
+  const bool is_carried = carried_ > 0 && result.health == LocalizationHealth::kLost;
+  const bool is_known =
+      is_carried || (confirmation_.is_confirmed() && !is_poor && unheld_ <= options_.most_unheld &&
+                     lost_ < options_.told_lost_after);
   return is_known ? motion_.covariance() : motion_.covariance() + confirmation_.Spread();
 }
 

@@ -189,17 +189,14 @@ Eigen::Vector4d Squares(double horizontal, double up, double turn) {
   return Eigen::Vector4d(horizontal, horizontal, up, turn).cwiseAbs2();
 }
 
-// What is left uncertain of a step that is held by `equations`.
-PoseCovariance StepCovariance(const NormalEquations& equations,
-                              const ScanOdometryOptions& options) {
+// What the scan leaves uncertain: where it holds nothing, all. What was expected is no part of it.
+PoseCovariance UncertaintyOf(const NormalEquations& equations, double information_share) {
   constexpr std::array<int, 4> kAxes{0, 1, 2, 5};
+  constexpr double kNothing = 1e-4;  // of 100 m, or as many radians
   const NormalEquations::Matrix6 information = equations.H.selfadjointView<Eigen::Lower>();
-  Eigen::Matrix4d held = options.information_share * information(kAxes, kAxes);
-  held.diagonal() +=
-      Squares(options.start_sigma_m, options.start_sigma_m, options.start_sigma_rad).cwiseInverse();
-  PoseCovariance covariance = held.inverse();
-  covariance.diagonal() += Squares(options.step_m, options.step_up_m, options.step_rad);
-  return covariance;
+  Eigen::Matrix4d held = information_share * information(kAxes, kAxes);
+  held.diagonal().array() += kNothing;
+  return held.inverse();
 }
 
 // From `start` downhill; near where it is `expected` as far as nothing else holds it.
@@ -254,7 +251,7 @@ ScanMotion MotionSince(const RecentScans& recent,
     const ScanFit::Evidence evidence = scan.At(pose, options.fine_reach_m);
     if (const double fit = evidence.Fit(options.few_columns); fit > best.fit) {
       best.T_world_level = pose;
-      best.covariance = StepCovariance(evidence.equations, options);
+      best.covariance = UncertaintyOf(evidence.equations, options.information_share);
       best.fit = fit;
     }
     if (best.fit >= options.sure_fit) break;

@@ -33,18 +33,13 @@ struct ScanOdometryOptions {
 
   // A scan that fits less was taken elsewhere: the vehicle was moved, or saw too little.
   double min_fit = 0.35;
-  int few_columns = 30;  // with fewer that are near it is the ground that fits, or not
-  // Neighbouring features err together (PlaceTrackerOptions); and however many there are, a step is
-  // known no better than this, standard deviations.
-  double information_share = 0.08;
-  double step_m = 0.02;
-  double step_up_m = 0.015;
-  double step_rad = 0.0015;
+  int few_columns = 30;             // with fewer that are near it is the ground that fits, or not
+  double information_share = 0.08;  // neighbouring features err together (PlaceTrackerOptions)
 };
 
 struct ScanMotion {
   Pose T_world_level = Pose::Identity();
-  PoseCovariance covariance = PoseCovariance::Zero();  // of the step since the last scans
+  PoseCovariance covariance = PoseCovariance::Zero();  // as far as the scans tell
   double fit = 0.0;  // mean robust weight of the columns that are near, 0..1
 };
 

@@ -300,6 +300,7 @@ void FusionScheduler::PostponeFailed(Worker& worker, const TileClaim& claim, con
   const bool has_keyframes = is_invalid && claim.id.level == 0;
   const std::optional<bool> has_damage = has_keyframes ? LookForDamage(claim, why) : std::nullopt;
   if (has_damage == false && claim.attempts < kQuietTries) {
+    damage_.Remove(claim.id);
     log_(LogLevel::kDebug, StrCat("fusion: tile ", claim.id, " is tried again: ", why.message()));
     worker.returns.push_back({claim, clock_() + 1});
     return;

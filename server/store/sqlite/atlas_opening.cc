@@ -313,7 +313,7 @@ Result<Readable> MakeReadable(Connection& writer,
   Status status = MigrateStore(writer, [&](std::int64_t from) {
     if (from < kFirstReadableVersion) {  // the others are written later
       drop();
-      readable.changed = "nothing but its version was changed";
+      readable.changed = "nothing but what an upgrade changes, its schema included, was changed";
     }
     if (options.on_upgrade) {
       options.on_upgrade(from);

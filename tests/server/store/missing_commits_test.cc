@@ -238,7 +238,9 @@ TEST_F(MissingCommitsTest, WhatIsLeftIsNoAtlas) {
   EXPECT_EQ(Look(), mixed) << "nothing was changed";
 
   Connection({Database(), DatabaseOptions::Mode::kReadWrite})
-      .Execute("PRAGMA writable_schema = ON; DELETE FROM sqlite_schema WHERE name = 'dirty_since'");
+      .Execute(
+          "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'INTEGER', "
+          "'INUEGER')");
   const auto put_right = OpenSqliteStore(options_);
   ASSERT_FALSE(put_right);
   EXPECT_NE(put_right.error().message().find("nothing but its schema was changed"),

@@ -152,6 +152,11 @@ TEST_F(TileStoreTest, AClaimThatFailedAfterItsTileWasMarkedAgainIsFreeAtOnce) {
   EXPECT_GT(current.generation, old.generation);
   ASSERT_TRUE(release(current).value());
   EXPECT_EQ(Dirty().failed_tiles, std::vector{id});
+  const TileId other{0, 2, 2};
+  ASSERT_TRUE(Put(MakeKeyframe(2, {other})).has_value());
+  EXPECT_TRUE(Dirty().failed_tiles.empty()) << "not all have";
+  ASSERT_TRUE(release(Claim().claims.at(0)).value());
+  EXPECT_EQ(Dirty().failed_tiles, (std::vector{id, other}));
   EXPECT_TRUE(Claim().claims.empty());
 }
 

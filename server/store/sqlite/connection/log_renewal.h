@@ -12,7 +12,7 @@ namespace atlas {
 
 // To be called before the database is opened, by whoever holds its directory. Nothing without a
 // log; others may read it meanwhile. The file's time stays: it tells what a power cut may have left
-// (HasRunSince), also to the next start if this one is refused or killed. Errors as of
+// (HasRunSince), also to the next start if this one is refused. Errors as of
 // sqlite_error.h.
 Status RenewLog(const std::filesystem::path& database);
 

@@ -141,6 +141,7 @@ std::vector<TileId> FailedTiles(Connection& connection) {
   std::vector<TileId> tiles;
   Query row = connection.Prepare("SELECT key FROM dirty_tiles WHERE attempts > 0");
   while (row.Step()) {
+    row.Rewind();
     if (const auto id = TileId::FromKey(row.Unsigned())) {
       tiles.push_back(*id);
     }
