@@ -308,12 +308,11 @@ Result<Readable> MakeReadable(Connection& writer,
   if (!schema) {
     return Error(schema.error());
   }
-  Readable readable{*schema,
-                    schema->empty() ? kNothingChanged : "nothing but its schema was changed"};
+  Readable readable{*schema};  // which is put back only where what is left is an atlas
   Status status = MigrateStore(writer, [&](std::int64_t from) {
     if (from < kFirstReadableVersion) {  // the others are written later
       drop();
-      readable.changed = "nothing but what an upgrade changes, its schema included, was changed";
+      readable.changed = "nothing but what an upgrade changes was changed";
     }
     if (options.on_upgrade) {
       options.on_upgrade(from);
