@@ -1,25 +1,34 @@
 #!/usr/bin/env bash
-# Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize [--without-fuzzers]] [--long]
+# Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize [--without-fuzzers] [--minutes N]] [--long]
 #   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, but those that
 #               compute for minutes (label compute), TSan over the tests labelled threads, and 10 s of
 #               each fuzzer
 #   --without-fuzzers
 #               these not: what they found before and mutations of it are tried under ASan all the same
+#   --minutes N what a sanitizer has to build or to run is left out, and said so, where so many minutes are over
+#               before it is done: for whoever has a limit and, on a slow machine, nothing in ccache yet
 #   --long      ten times as many random worlds in the tests that make them, the same payloads from
 #               g++ and clang++, a daemon's life under valgrind, and clang-tidy over all sources
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
+usage() {
+  echo "usage: deploy/test.sh [--sanitize [--without-fuzzers] [--minutes N]] [--long]" >&2
+  exit 2
+}
 sanitize=0
 fuzzers=1
 long=0
-for argument in "$@"; do
-  case $argument in
+minutes=
+while (($#)); do
+  case $1 in
     --sanitize) sanitize=1 ;;
     --without-fuzzers) fuzzers=0 ;;
+    --minutes) minutes=${2:-}; shift; [[ $minutes =~ ^[1-9][0-9]*$ ]] || usage ;;
     --long) long=1 ;;
-    *) echo "usage: deploy/test.sh [--sanitize [--without-fuzzers]] [--long]" >&2; exit 2 ;;
+    *) usage ;;
   esac
+  shift
 done
 . deploy/packages.sh
 . deploy/data.sh
@@ -47,6 +56,23 @@ run() {
   report_property "$preset"
 }
 
+# run_in_time SECONDS PRESET TARGET CTEST_ARGUMENT...: the same, if it is built so long before the time is up.
+run_in_time() {
+  local tests_s=$1 preset=$2 target=$3
+  shift
+  if [[ -n $minutes ]]; then
+    local left_s=$((60 * minutes - SECONDS - tests_s)) status=0
+    cmake --preset "$preset" >/dev/null
+    ((left_s > 0)) && timeout "$left_s" cmake --build "build/$preset" --target "$target" || status=$?
+    if ((left_s <= 0 || status == 124)); then
+      echo "== $preset: LEFT OUT, $((SECONDS / 60)) of $minutes minutes are over; deploy/test.sh --sanitize has all of it"
+      return
+    fi
+    ((status == 0)) || return "$status"
+  fi
+  run "$@"
+}
+
 scale=1
 ((long)) && scale=10
 # How many lives of an atlas there are is the script's to say.
@@ -57,8 +83,8 @@ run dev all
 if ((sanitize)); then
   unset ATLAS_PROPERTY_CASES
   export ATLAS_TEST_SCALE=0.1
-  run asan all -L 'unit|integration' -LE 'data|compute'
-  run tsan threads_tests -L threads
+  run_in_time 900 asan all -L 'unit|integration' -LE 'data|compute'
+  run_in_time 420 tsan threads_tests -L threads
   ((fuzzers == 0)) || deploy/fuzz.sh 10
 fi
 if ((long)); then
