@@ -13,12 +13,6 @@ void Append(const std::vector<Eigen::Vector3f>& points,
   for (const Eigen::Vector3f& p : points) all.push_back(R * p + t);
 }
 
-// With room for more than this: after some scans nothing is allocated any more.
-void Assign(const std::vector<Eigen::Vector3f>& points, std::vector<Eigen::Vector3f>& kept) {
-  if (kept.capacity() < points.size()) kept.reserve(2 * points.size());
-  kept.assign(points.begin(), points.end());
-}
-
 Pose From(const Eigen::Vector3d& origin, Pose T_world_level) {
   T_world_level.translation() -= origin;
   return T_world_level;
@@ -28,11 +22,17 @@ Pose From(const Eigen::Vector3d& origin, Pose T_world_level) {
 
 void RecentScans::Add(const ScanFeatures& features, const Pose& T_world_level) {
   if (count_ == 0) next_ = 0;
-  if (scans_.size() < most_) scans_.resize(most_);
+  if (scans_.size() < most_) {
+    scans_.resize(most_);
+    for (Scan& scan : scans_) {  // room for more than this: scans that follow allocate nothing
+      scan.columns.reserve(2 * features.columns.size());
+      scan.ground.reserve(2 * features.ground.size());
+    }
+  }
   Scan& scan = scans_[next_];
   scan.T_world_level = T_world_level;
-  Assign(features.columns, scan.columns);
-  Assign(features.ground, scan.ground);
+  scan.columns.assign(features.columns.begin(), features.columns.end());
+  scan.ground.assign(features.ground.begin(), features.ground.end());
   next_ = (next_ + 1) % most_;
   count_ = std::min(count_ + 1, most_);
 }
