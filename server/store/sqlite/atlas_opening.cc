@@ -15,9 +15,9 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 #include "server/store/sqlite/damaged_log.h"
 #include "server/store/sqlite/log_origin.h"
+#include "server/store/sqlite/lost_commits.h"
 #include "server/store/sqlite/migrations/migration.h"
 #include "server/store/sqlite/revision_note.h"
-#include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/row_hash.h"
 #include "server/store/sqlite/schema/schema.h"
 #include "server/store/sqlite/schema/stored_bytes.h"
@@ -27,7 +27,6 @@
 #include "server/store/sqlite/tables/session_table.h"
 #include "server/store/sqlite/transactions/atlas_past.h"
 #include "server/store/sqlite/transactions/counter_check.h"
-#include "server/store/sqlite/transactions/new_line.h"
 #include "server/store/sqlite/transactions/page_owners.h"
 #include "server/store/sqlite/transactions/schema_repair.h"
 #include "server/store/sqlite/transactions/transactions.h"
@@ -130,24 +129,6 @@ void WhereThereIsRoom(const std::function<void()>& write) {
   }
 }
 
-// Part of what is lost may have been copied into the database before the damage: then pages of
-// different commits are in it, and what is left of the log goes to none of them. Nothing is written
-// then. `changed`: what was before this, for people.
-Status CheckWhatIsLeft(Connection& writer, const std::string& loss, const char* changed) {
-  writer.KeepLog(true);
-  Status left;
-  try {
-    left = CheckCounters(writer);
-  } catch (const std::exception& error) {
-    left = StatusFromException(error);
-  }
-  if (left.ok()) {
-    return {};
-  }
-  return {StatusCode::kInvalidData, StrCat(loss, ", and what is left is no atlas (", left.message(),
-                                           "): ", changed, "; restore a backup")};
-}
-
 // Before anything is read of it, or written. What was copied of lost commits may be longer than
 // what is left.
 Status CheckFiles(Connection& writer, const DamagedLog& log, const LogOrigin& origin) {
@@ -163,35 +144,6 @@ Status CheckFiles(Connection& writer, const DamagedLog& log, const LogOrigin& or
   return status;
 }
 
-// Which commits are lost, for people: by what the log is, else by how far the atlas is known to
-// have been. Empty: none.
-Result<std::string> FindLoss(Connection& writer,
-                             const StoreIdentity& identity,
-                             const DamagedLog& log,
-                             const std::optional<NotedRevision>& noted,
-                             const char* changed) {
-  if (log.is_lossy()) {
-    return LossOf(log);
-  }
-  if (!noted || !IsCounterIntact(writer, Counter::kRevision)) {
-    return std::string();
-  }
-  const std::uint64_t revision = ReadCounter(writer, Counter::kRevision);
-  if (!noted->IsBeyond(identity, revision)) {
-    return std::string();
-  }
-  std::string loss =
-      StrCat("commits are missing: the atlas was at revision ", noted->revision, " of epoch ",
-             noted->epoch, ", and is at revision ", revision, " of epoch ", identity.epoch,
-             ": its log (atlas.db-wal) was removed or cut, or an older copy was put in its place");
-  // A copy of an earlier version is checked by nobody: it lacks what is made of it behind this.
-  const auto version = ReadSchemaVersion(writer);
-  const Status left = version && *version == kStoreSchemaVersion
-                          ? CheckWhatIsLeft(writer, loss, changed)
-                          : Status();
-  return left.ok() ? Result<std::string>(std::move(loss)) : Error(left);
-}
-
 // Of bits that were turned back.
 std::string NoteMended(Connection& writer, const DamagedLog& log) {
   std::string what =
@@ -201,24 +153,6 @@ std::string NoteMended(Connection& writer, const DamagedLog& log) {
              log.kept.filename().string());
   writer.Begin();
   AddEvent(writer, {EventKind::kTablesRepaired, kAtlasItself, log.kept.filename().string(), what});
-  writer.Commit();
-  return what;
-}
-
-// Vehicles are told by the epoch, as after a restore from a backup.
-std::string NoteLoss(Connection& writer,
-                     StoreIdentity& identity,
-                     const std::string& loss,
-                     const std::filesystem::path& kept,
-                     const std::optional<NotedRevision>& noted) {
-  writer.Begin();
-  const std::uint64_t before = ReadCounter(writer, Counter::kRevision);
-  const PlaceInLine line = BeginLine(writer, identity, PlaceOf(noted, identity));
-  identity.epoch = line.epoch;
-  const std::string copy = kept.filename().string();
-  std::string what = StrCat(loss, "; the atlas goes on from revision ", before, " in epoch ",
-                            line.epoch, copy.empty() ? "" : "; a copy of the log is ", copy);
-  AddEvent(writer, {EventKind::kLogDamaged, kAtlasItself, copy, what});
   writer.Commit();
   return what;
 }
