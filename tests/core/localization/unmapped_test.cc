@@ -1,6 +1,7 @@
 // Vehicles that drive off the map: what they find there may look like what was mapped.
 #include <memory>
 #include <numbers>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -43,9 +44,21 @@ Localizer LocalizerIn(const PaintedMap& map) {
           }};
 }
 
-LocalizationResult At(Localizer& localizer, const Pose& truth) {
+// Whoever takes the second yard for standing while it is moved errs by as much.
+ShapeWorld WithSecondYardMovedBy(const Eigen::Vector2d& moved_m) {
+  ShapeWorld world = testing::TwoYards();
+  for (testing::Box& box : world.boxes) {
+    if (box.low.x() > 0.0) {
+      box.low.head<2>() += moved_m;
+      box.high.head<2>() += moved_m;
+    }
+  }
+  return world;
+}
+
+LocalizationResult At(Localizer& localizer, const ShapeWorld& world, const Pose& truth) {
   return localizer
-      .Localize(CastLeveledScan(testing::QuickSensor(), testing::TwoYards(), truth),
+      .Localize(CastLeveledScan(testing::QuickSensor(), world, truth),
                 Eigen::Quaterniond::Identity())
       .value();
 }
@@ -59,10 +72,18 @@ class UnmappedTest : public ::testing::Test {
   void Drive(double from_m, double to_m, double step_m, double yaw_rad = 0.0) {
     for (double x = from_m; (to_m - x) * step_m >= 0.0; x += step_m) {
       const Pose truth = InYards(x, yaw_rad);
-      last_ = At(localizer_, truth);
+      last_ = At(localizer_, WithSecondYardMovedBy(moved_m_), truth);
       off_m_ = ErrorOf(last_.T_world_sensor, truth).horizontal_m;
       EXPECT_FALSE(last_.health == LocalizationHealth::kGood && off_m_ > 0.3)
           << x << ": " << off_m_;
+    }
+  }
+
+  // Where of the yards only the second is seen.
+  void DriftBy(const Eigen::Vector2d& drift_m) {
+    for (int step = 1; step <= 8; ++step) {
+      moved_m_ = drift_m * (step / 8.0);
+      Drive(16.0 + step, 16.0 + step, 1.0);
     }
   }
 
@@ -70,6 +91,7 @@ class UnmappedTest : public ::testing::Test {
   Localizer localizer_ = LocalizerIn(map_);
   LocalizationResult last_;
   double off_m_ = 0.0;
+  Eigen::Vector2d moved_m_ = Eigen::Vector2d::Zero();
 };
 
 TEST_F(UnmappedTest, WhoWasKnownIsCarriedOnByHisOwnMotion) {
@@ -91,6 +113,30 @@ TEST_F(UnmappedTest, BackOnTheMapItIsFoundWhereItCameTo) {
   EXPECT_EQ(last_.health, LocalizationHealth::kGood);
   EXPECT_LT(off_m_, 0.06);
 }
+
+class DriftTest : public UnmappedTest,
+                  public ::testing::WithParamInterface<std::pair<double, double>> {};
+
+// The way back is carried on from where it was taken to be.
+TEST_P(DriftTest, WhoErredOffTheMapIsRightAgainOnIt) {
+  const Eigen::Vector2d drift_m(GetParam().first, GetParam().second);
+  localizer_.Start(InYards(-26.0));
+  Drive(-26.0, 16.0, 1.0);
+  DriftBy(drift_m);
+  Drive(24.0, 6.0, -1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kLost);
+  EXPECT_NEAR(off_m_, drift_m.norm(), 0.2) << "it was to be led astray";
+  Drive(5.0, -26.0, -1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kGood);
+  EXPECT_LT(off_m_, 0.06);
+}
+
+INSTANTIATE_TEST_SUITE_P(Metres,
+                         DriftTest,
+                         ::testing::Values(std::pair(0.3, 0.0),
+                                           std::pair(0.0, -0.3),
+                                           std::pair(-1.0, 0.0),
+                                           std::pair(0.0, 1.0)));
 
 // A break in its motion: it may be anywhere, and is looked for everywhere.
 TEST_F(UnmappedTest, WhoIsMovedWhileHeIsOffTheMapIsFoundWhereHeIs) {
