@@ -1,5 +1,6 @@
 #include "client/drive/drive_localization.h"
 
+#include <numbers>
 #include <utility>
 
 #include "client/drive/drive_survey.h"
@@ -48,8 +49,8 @@ class DriveLocalization {
       const Eigen::Quaterniond R_level_sensor =
           DisturbedLevel(scan.T_world_sensor, options_.tilt_error_rad, seed);
       localizer_.Start(PerturbedStart(scan.T_world_sensor, R_level_sensor,
-                                      options_.shots->translation_m, options_.shots->yaw_rad,
-                                      seed));
+                                      options_.shots->translation_m, options_.shots->yaw_rad, seed),
+                       std::nullopt);
       LocalizedScan localized;
       localized.trial = trial;
       ATLAS_RETURN_IF_ERROR(Localize(scan, cloud, R_level_sensor, localized));
@@ -59,7 +60,7 @@ class DriveLocalization {
 
   Status Track(const DriveScan& scan, const PointCloud& cloud, bool is_start, bool is_after_jump) {
     if (is_start && (options_.is_restarted || !is_after_jump)) {
-      localizer_.Start(scan.T_world_sensor);
+      Start(scan);
       clock_.Restart();
       report_.restarts += is_after_jump ? 1U : 0U;
     }
@@ -68,6 +69,26 @@ class DriveLocalization {
     LocalizedScan localized;
     localized.is_after_jump = is_start && is_after_jump && options_.is_restarted;
     return Localize(scan, cloud, R_level_sensor, localized);
+  }
+
+  void Start(const DriveScan& scan) {
+    if (!options_.start) {
+      localizer_.Start(scan.T_world_sensor, std::nullopt);
+      return;
+    }
+    const double radius_m = options_.start->radius_m;
+    const double height_m = options_.start->height_m;
+    const double reach_m = radius_m / std::numbers::sqrt2;  // the square in the circle
+    const TrialSeed seed{options_.seed, scan.number, 0};
+    const Eigen::Quaterniond R_level_sensor =
+        DisturbedLevel(scan.T_world_sensor, options_.tilt_error_rad, seed);
+    Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
+    start.translation().z() = PerturbedHeight(scan.T_world_sensor, height_m, seed);
+    const PlaceTrackerOptions believed;
+    const double sigma_m = radius_m / believed.reachable_sigmas;
+    const Eigen::Vector4d sigmas(sigma_m, sigma_m, height_m / believed.reachable_up_sigmas,
+                                 MotionOptions().start_rad);
+    localizer_.Start(start, PoseCovariance(sigmas.cwiseAbs2().asDiagonal()));
   }
 
   Status Localize(const DriveScan& scan,
@@ -177,6 +198,17 @@ Status DriveLocalizationOptions::Validate() const {
   }
   if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
+  }
+  if (start) {
+    if (shots || mode != LocalizationMode::kAtlas) {
+      return {
+          StatusCode::kInvalidArgument,
+          "a start that is known to be near: only a drive that is tracked in mode atlas has it"};
+    }
+    PlacePrior prior;
+    prior.radius_m = start->radius_m;
+    prior.height_m = start->height_m;
+    ATLAS_RETURN_IF_ERROR(prior.Validate());
   }
   if (monitor != nullptr && (shots || mode != LocalizationMode::kAtlas)) {
     return {StatusCode::kInvalidArgument,

@@ -32,6 +32,12 @@ struct DriveLocalizationOptions {
     std::uint32_t trials = 10;  // a scan
   };
 
+  // Where tracking starts is told, off by up to this, and believed (core/localization/localizer.h).
+  struct ToldStart {
+    double radius_m = 1.5;
+    double height_m = 1.5;
+  };
+
   LocalizationMode mode = LocalizationMode::kAtlas;
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
@@ -39,7 +45,8 @@ struct DriveLocalizationOptions {
   Deskewing deskewing = Deskewing::kOff;  // by the predicted motion: not for single shots
   std::optional<Shots> shots;             // tracking, if not given
   std::uint64_t seed = 0;
-  bool is_restarted = true;  // tracking is told where it is after a jump
+  bool is_restarted = true;        // tracking is told where it is after a jump
+  std::optional<ToldStart> start;  // else it is told without an error, and has it for a hint
   // Tracking in mode kAtlas: is shown each scan that is not lost, and outlives the run; may be
   // null.
   DriveMonitor* monitor = nullptr;

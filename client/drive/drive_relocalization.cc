@@ -40,14 +40,27 @@ RelocalizedScan Judged(const DriveScan& scan,
   return result;
 }
 
-std::optional<PlacePrior> PriorOf(const DriveScan& scan,
-                                  const Eigen::Quaterniond& R_level_sensor,
-                                  const DriveRelocalizationOptions& options,
-                                  const TrialSeed& seed) {
-  if (!options.prior_radius_m) return std::nullopt;
-  const double reach_m = *options.prior_radius_m / std::numbers::sqrt2;  // the square in the circle
-  const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
-  return PlacePrior{start.translation().head<2>(), *options.prior_radius_m};
+PlacePrior ReachOf(const DriveRelocalizationOptions& options) {
+  PlacePrior prior;
+  if (options.prior_radius_m) prior.radius_m = *options.prior_radius_m;
+  if (options.prior_height_m) prior.height_m = *options.prior_height_m;
+  return prior;
+}
+
+PlacePrior PriorOf(const DriveScan& scan,
+                   const Eigen::Quaterniond& R_level_sensor,
+                   const DriveRelocalizationOptions& options,
+                   const TrialSeed& seed) {
+  PlacePrior prior = ReachOf(options);
+  if (options.prior_radius_m) {
+    const double reach_m = prior.radius_m / std::numbers::sqrt2;  // the square in the circle
+    const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
+    prior.center = start.translation().head<2>();
+  }
+  if (options.prior_height_m) {
+    prior.z_m = PerturbedHeight(scan.T_world_sensor, prior.height_m, seed);
+  }
+  return prior;
 }
 
 }  // namespace
@@ -58,11 +71,7 @@ Status DriveRelocalizationOptions::Validate() const {
     return {StatusCode::kInvalidArgument,
             StrCat("maximum range ", max_range_m, " m: expected 1 to 200")};
   }
-  if (prior_radius_m && !(*prior_radius_m > 0.0 && *prior_radius_m <= 1e5)) {
-    return {StatusCode::kInvalidArgument,
-            StrCat("radius ", *prior_radius_m, " m: expected more than 0, at most 100,000")};
-  }
-  return {};
+  return ReachOf(*this).Validate();
 }
 
 Result<DriveRelocalizationReport> RelocalizeDrive(
@@ -94,7 +103,7 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
     const TrialSeed seed{options.seed, scan.number, 0};
     const Eigen::Quaterniond R_level_sensor =
         DisturbedLevel(scan.T_world_sensor, options.tilt_error_rad, seed);
-    const auto prior = PriorOf(scan, R_level_sensor, options, seed);
+    const PlacePrior prior = PriorOf(scan, R_level_sensor, options, seed);
     const CpuTimer timer;
     const LeveledScan leveled =
         SegmentScan(*cloud, survey->layout, survey->ring_step, R_level_sensor, {});

@@ -1,6 +1,6 @@
 // A recorded drive's scans found in an atlas, each alone, with no idea of where it was taken or
-// within the radius of a position such as GNSS gives. The drive's poses go to the scorer, and
-// disturbed into that position.
+// near a position such as GNSS gives, or a height such as a barometer gives. The drive's poses go
+// to the scorer, and disturbed into these.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,8 @@ struct DriveRelocalizationOptions {
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
   double max_range_m = 40.0;
-  std::optional<double> prior_radius_m;  // the position is given, off by up to this
+  std::optional<double> prior_radius_m;  // the position is given, off by up to this,
+  std::optional<double> prior_height_m;  // and the height, by up to this
   std::uint64_t seed = 0;                // of how far it is off, and of the IMU's error
   double tilt_error_rad = 0.5 * std::numbers::pi / 180.0;
 

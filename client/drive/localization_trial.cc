@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kStartHeightError_m = 0.2;
 
-// One stream for the tilt, another for the start: neither depends on the other's number of draws.
+// One stream for the tilt, one for the start, one for a height: none depends on the number of
+// draws of another.
 HashRandom Stream(const TrialSeed& seed, std::uint64_t purpose) {
   return HashRandom(seed.seed, (std::uint64_t{seed.scan} << 32) | seed.trial, purpose);
 }
@@ -45,6 +46,10 @@ Pose PerturbedStart(const Pose& T_world_sensor,
                    R_level_sensor.toRotationMatrix();
   start.translation() = T_world_sensor.translation() + Eigen::Vector3d(dx_m, dy_m, dz_m);
   return start;
+}
+
+double PerturbedHeight(const Pose& T_world_sensor, double error_m, const TrialSeed& seed) {
+  return T_world_sensor.translation().z() + Stream(seed, 3).Uniform(-error_m, error_m);
 }
 
 }  // namespace atlas

@@ -29,4 +29,7 @@ Pose PerturbedStart(const Pose& T_world_sensor,
                     double yaw_rad,
                     const TrialSeed& seed);
 
+// z uniform in +- error_m.
+double PerturbedHeight(const Pose& T_world_sensor, double error_m, const TrialSeed& seed);
+
 }  // namespace atlas

@@ -37,7 +37,9 @@ class AtlasScanLocalizer : public ScanLocalizer {
         localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})),
         on_localization_(std::move(on_localization)) {}
 
-  void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
+  void Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance) override {
+    localizer_.Start(T_world_sensor, covariance);
+  }
 
   Result<LocatedScan> Locate(const PointCloud& cloud,
                              const Eigen::Quaterniond& R_level_sensor,
@@ -77,7 +79,10 @@ class PaperScanLocalizer : public ScanLocalizer {
   PaperScanLocalizer(KeyframeBuilder builder, const PaperLocalizerOptions& options, MapView& view)
       : builder_(std::move(builder)), localizer_(view.profile(), TilesOf(view), options) {}
 
-  void Start(const Pose& T_world_sensor) override { localizer_.Start(T_world_sensor); }
+  void Start(const Pose& T_world_sensor,
+             const std::optional<PoseCovariance>& /*covariance*/) override {
+    localizer_.Start(T_world_sensor);
+  }
 
   // The paper starts from the last pose, whenever that was.
   Result<LocatedScan> Locate(const PointCloud& cloud,

@@ -25,9 +25,9 @@ PlaceTracker Localizer::NewTracker() const {
   return {profile_, tiles_, options_.tracker, static_cast<double>(options_.features.max_range_m)};
 }
 
-void Localizer::Start(const Pose& T_world_sensor) {
+void Localizer::Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance) {
   places_.erase(places_.begin() + 1, places_.end());
-  places_.front().tracker.Start(T_world_sensor);
+  places_.front().tracker.Start(T_world_sensor, covariance);
   astray_ = 0;
 }
 
@@ -55,7 +55,8 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
 bool Localizer::IsLookedFor() const {
   const int since = astray_ - options_.looked_after;
   const PlaceTracker& told = places_.front().tracker;
-  if (told.is_carried() && told.reach_m() < options_.adrift_m) {
+  const bool was_known = told.usual_fit() > 0.0;
+  if (told.is_carried() && was_known && told.reach_m() < options_.adrift_m) {
     return false;
   }
   return relocalizer_ && since >= 0 && since % options_.looked_again_after == 0;
@@ -69,7 +70,7 @@ Result<std::vector<Localizer::SupposedPlace>> Localizer::Look(
   if (*relocalizer == nullptr) {
     return places;
   }
-  const auto looked = (*relocalizer)->Find(scan, R_level_sensor);
+  const auto looked = (*relocalizer)->Find(scan, R_level_sensor, places_.front().tracker.Within());
   if (!looked) return Error(looked.error());
   const double usual_fit = places_.front().tracker.usual_fit();
   for (const RelocalizedPlace& place : looked->places) {

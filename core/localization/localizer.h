@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
 #include "core/localization/place_tracker.h"
+#include "core/localization/pose_prior.h"
 #include "core/localization/relocalizer.h"
 #include "core/localization/scan_features.h"
 #include "core/scan/leveled_scan.h"
@@ -59,8 +61,13 @@ class Localizer {
             const LocalizerOptions& options,
             RelocalizerSource relocalizer = {});
 
-  // Forgets the motion; the next scan is near `T_world_sensor`.
-  void Start(const Pose& T_world_sensor);
+  // Forgets the motion; the next scan is near `T_world_sensor`. With a `covariance`, positive
+  // definite, that is believed: no place counts that is further than 3.5 standard deviations from
+  // it in the plane, or three in height, and where the map has none so near, the vehicle goes on
+  // from there by its own motion, lost, until it has. Without one the start is a hint: the scan is
+  // believed where they differ.
+  void Start(const Pose& T_world_sensor,
+             const std::optional<PoseCovariance>& covariance = std::nullopt);
 
   // How the sensor is taken to move from one scan to the next, in its own frame: what scans are to
   // be deskewed by. Identity as long as nothing is known of it.

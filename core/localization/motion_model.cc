@@ -21,12 +21,17 @@ Eigen::Vector4d UnknownMotion(const MotionOptions& options) {
 
 MotionModel::MotionModel(const MotionOptions& options) : options_(options) {}
 
-void MotionModel::Start(const Pose& T_world_sensor) {
+void MotionModel::Start(const Pose& T_world_sensor, const PoseCovariance& covariance) {
   pose_ = T_world_sensor;
   covariance_.setZero();
-  covariance_.topLeftCorner<4, 4>().diagonal() =
-      Squares(options_.start_m, options_.start_m, options_.start_m, options_.start_rad);
+  covariance_.topLeftCorner<4, 4>() = covariance;
   ForgetMotion();
+}
+
+void MotionModel::Start(const Pose& T_world_sensor) {
+  Start(T_world_sensor,
+        Squares(options_.start_m, options_.start_m, options_.start_m, options_.start_rad)
+            .asDiagonal());
 }
 
 void MotionModel::ForgetMotion() {
@@ -73,10 +78,15 @@ Pose MotionModel::T_now_later() const {
   return T_now_later;
 }
 
+PoseCovariance MotionModel::StepCovariance() const {
+  const Eigen::Matrix4d by_motion = PlaceByMotion(last_, since_);
+  return by_motion * covariance_.bottomRightCorner<4, 4>() * by_motion.transpose();
+}
+
 void MotionModel::Carry(const Pose& T_world_sensor, const PoseCovariance& covariance) {
   Eigen::Matrix<double, 4, 8> H = Eigen::Matrix<double, 4, 8>::Zero();
   H.rightCols<4>() = PlaceByMotion(last_, since_);
-  const Eigen::Matrix4d step = H * covariance_ * H.transpose() + covariance;
+  const Eigen::Matrix4d step = StepCovariance() + covariance;
   const Eigen::Matrix<double, 8, 4> gain = covariance_ * H.transpose() * step.inverse();
   const Eigen::Matrix<double, 8, 1> change = gain * PoseDifference(pose_, T_world_sensor);
   pose_.translation() += change.head<3>();

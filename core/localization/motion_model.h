@@ -37,7 +37,9 @@ class MotionModel {
  public:
   explicit MotionModel(const MotionOptions& options);
 
-  // Forgets all motion: the vehicle stands at `T_world_sensor`, as uncertain as a start is.
+  // Forgets all motion: the vehicle stands at `T_world_sensor`, as uncertain as that, or as a start
+  // is.
+  void Start(const Pose& T_world_sensor, const PoseCovariance& covariance);
   void Start(const Pose& T_world_sensor);
   // To the next scan, after so many times the usual time between two: some may be missing.
   void Predict(double scans = 1.0);
@@ -65,6 +67,8 @@ class MotionModel {
   Eigen::Vector4d LastStep(const Pose& T_world_sensor) const {
     return PoseDifference(last_, T_world_sensor);
   }
+  // How uncertain that step is, by what is known of the motion.
+  PoseCovariance StepCovariance() const;
   // From one scan to the next, as it is known: identity while nothing is.
   Pose T_now_later() const;
   PoseCovariance covariance() const { return covariance_.topLeftCorner<4, 4>(); }

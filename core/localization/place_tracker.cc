@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/localization/other_decks.h"
+
 namespace atlas {
 namespace {
 
@@ -37,10 +39,16 @@ PlaceTracker::PlaceTracker(const MapProfile& profile,
       confirmation_(options.confirmation, options.registration),
       recent_(options.odometry.scans) {}
 
-void PlaceTracker::Start(const Pose& T_world_sensor) {
-  motion_.Start(T_world_sensor);
+void PlaceTracker::Start(const Pose& T_world_sensor,
+                         const std::optional<PoseCovariance>& covariance) {
+  if (covariance) {
+    motion_.Start(T_world_sensor, *covariance);
+  } else {
+    motion_.Start(T_world_sensor);
+  }
   confirmation_.Trust();
   is_first_ = true;
+  is_told_ = covariance.has_value();
   usual_fit_ = 0.0;
   lost_ = 0;
   unheld_ = 0;
@@ -50,7 +58,7 @@ void PlaceTracker::Start(const Pose& T_world_sensor) {
 }
 
 void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
-  Start(T_world_sensor);
+  Start(T_world_sensor, std::nullopt);
   confirmation_.Doubt();
   usual_fit_ = usual_fit;
 }
@@ -80,7 +88,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   }
   LocalizationResult result;
   Tracked tracked = Follow(features);
-  if (LeavesMap(tracked.place.registration, features)) {
+  if (carried_ == 0 && lost_ == 0 && LeavesMap(tracked.place.registration, features)) {
     carried_ = 1;
     tracked = Follow(features);
   }
@@ -213,7 +221,7 @@ PlaceTracker::Place PlaceTracker::At(const RegistrationResult& registration, boo
 void PlaceTracker::SpreadStarts(const PosePrior& prior) {
   starts_.assign(1, prior.T_world_level);
   const HorizontalSpread spread = SpreadOf(prior.covariance);
-  if (is_first_ || spread.along_m < options_.fan_sigma_m) {
+  if (spread.along_m < options_.fan_sigma_m) {
     return;
   }
   const double reach_m = 2.0 * std::min(spread.along_m, options_.adrift_sigma_m);
@@ -227,9 +235,21 @@ void PlaceTracker::SpreadStarts(const PosePrior& prior) {
   }
 }
 
+void PlaceTracker::RaiseStarts(const PosePrior& prior, const ScanFeatures& features) {
+  DeckFinder surfaces({.reach_m = options_.reachable_up_sigmas * std::sqrt(prior.covariance(2, 2)),
+                       .apart_m = options_.told_step_m});
+  const std::size_t level = starts_.size();
+  for (const double up_m : surfaces.Find(map_.window(), features, prior.T_world_level)) {
+    for (std::size_t i = 0; i < level; ++i) {
+      starts_.push_back(starts_[i]);
+      starts_.back().translation().z() += up_m;
+    }
+  }
+}
+
 PlaceTracker::Tracked PlaceTracker::Follow(const ScanFeatures& features) {
   const PosePrior prior = Prior();
-  if (is_first_) {
+  if (is_first_ && !is_told_) {
     return {
         At(Register(map_.window(), features, prior.T_world_level, options_.registration), false),
         std::nullopt};
@@ -237,6 +257,7 @@ PlaceTracker::Tracked PlaceTracker::Follow(const ScanFeatures& features) {
   const PosePrior among_features{prior.T_world_level,
                                  options_.information_share * prior.covariance};
   SpreadStarts(prior);
+  if (is_first_) RaiseStarts(prior, features);
   places_.clear();
   for (const Pose& start : starts_) {
     places_.push_back(

@@ -18,6 +18,7 @@
 #include "core/localization/motion_model.h"
 #include "core/localization/odometry/recent_scans.h"
 #include "core/localization/odometry/scan_odometry.h"
+#include "core/localization/places/place_index.h"
 #include "core/localization/pose_search.h"
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
@@ -97,7 +98,8 @@ struct PlaceTrackerOptions {
   double same_step_rad = 0.05;
   float near_ground_m = 15.0F;
   float ground_reach_m = 0.6F;
-  double reachable_sigmas = 3.0;
+  double reachable_sigmas = 3.5;     // of (x, y, yaw) in all, and of the height: 0.997 of what
+  double reachable_up_sigmas = 3.0;  // a covariance says. A deck is no further than that is.
   // ... nor does less of the ground keep it on the map where the scan fits well enough.
   double least_ground_mapped = 0.25;
   // However well scans fit to each other, a step of a metre or more is known no better than this,
@@ -123,6 +125,8 @@ struct PlaceTrackerOptions {
   // A first scan that is found further than this from the start that was told has to be, too.
   double told_m = 1.0;
   double told_rad = 0.1;
+  // One whose height is not sure is tried on surfaces so far from each other.
+  double told_step_m = 0.4;
 };
 
 class PlaceTracker {
@@ -133,9 +137,10 @@ class PlaceTracker {
                const PlaceTrackerOptions& options,
                double max_range_m);
 
-  // Forgets the motion; the next scan is near `T_world_sensor`: known to be there, or supposed,
-  // until scans confirm it by fitting as those before did (`usual_fit`; 0 where none did).
-  void Start(const Pose& T_world_sensor);
+  // Forgets the motion; the next scan is near `T_world_sensor`: known to be there, so well or
+  // more or less, or supposed, until scans confirm it by fitting as those before did (`usual_fit`;
+  // 0 where none did).
+  void Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance);
   void Suppose(const Pose& T_world_sensor, double usual_fit);
 
   // How the sensor is taken to move from one scan to the next, in its own frame. Identity as long
@@ -166,6 +171,8 @@ class PlaceTracker {
   bool IsReachable(const Pose& T_world_sensor) const;
   // How far from where it is expected that is, in the direction in which that is least known.
   double reach_m() const { return options_.reachable_sigmas * spread_m(); }
+  // The same around where the next scan is expected; nothing where it is not carried.
+  std::optional<PlacePrior> Within() const;
   // How uncertain its place is in the direction in which it is least known, standard deviation.
   double spread_m() const { return SpreadOf(motion_.covariance()).along_m; }
 
@@ -190,15 +197,19 @@ class PlaceTracker {
   Place At(const RegistrationResult& registration, bool has_prior) const;
   // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
   void SpreadStarts(const PosePrior& prior);
+  // ... and where the ground that is seen would lie on what was mapped, for a start that was told.
+  void RaiseStarts(const PosePrior& prior, const ScanFeatures& features);
   Tracked Follow(const ScanFeatures& features);
   std::optional<Eigen::Vector2d> RivalOf(const std::vector<Place>& places, const Place& best) const;
   bool IsDoubtful(const RegistrationResult& result) const;
   // By what the last scans saw, where there are any and this one goes with them.
   bool CarryOn(const ScanFeatures& features);
-  // Goes off the map, if that is where it drove.
+  // Goes off the map, if that is where it drove, or where it was told to be.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
   // Of a step, with what errs on the way there.
   PoseCovariance StepCovariance(const ScanMotion& moved);
+  // Whether that is near enough to where it is expected.
+  bool IsWithinReach(const Pose& T_world_level) const;
   // Whether so much of the ground is mapped that the scan would fit if this were the place.
   bool IsOnMap(const RegistrationResult& result,
                const ScanFeatures& features,
@@ -254,6 +265,7 @@ class PlaceTracker {
   MotionModel motion_;
   Confirmation confirmation_;
   bool is_first_ = true;
+  bool is_told_ = false;               // where it is at the first scan, and how surely
   double scans_ = 1.0;                 // from the last scan to the next
   double usual_fit_ = 0.0;             // of good results, exponentially forgotten
   int lost_ = 0;                       // scans in a row

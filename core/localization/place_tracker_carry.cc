@@ -1,13 +1,23 @@
-// A vehicle that drove off the map, carried on by its own motion from where it was known (decision
-// 0624). Until it is known again the map does not move it: what fits there may be another place.
+// A vehicle that drove off the map, carried on by its own motion from where it was known or told to
+// be (decision 0624). Until it is known again the map does not move it: what fits there may be
+// another place.
 #include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/LU>
 
 #include "core/localization/place_tracker.h"
 
 namespace atlas {
 
 bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features) {
-  if (carried_ > 0 || lost_ > 0 || !IsDoubtful(tracked)) {
+  carried_m_ = 0.0;
+  if (is_first_) {
+    return is_told_ && (IsDoubtful(tracked) || !IsWithinReach(tracked.T_world_level) ||
+                        !IsOnMap(tracked, features, 1.0));
+  }
+  if (!IsDoubtful(tracked)) {
     return false;
   }
   RegistrationResult here = tracked;
@@ -15,7 +25,6 @@ bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatur
   if (IsOnMap(here, features, 1.0)) {
     return false;
   }
-  carried_m_ = 0.0;
   return CarryOn(features);
 }
 
@@ -23,7 +32,8 @@ bool PlaceTracker::CarryOn(const ScanFeatures& features) {
   if (recent_.is_empty()) {
     return false;
   }
-  const ScanMotion moved = MotionSince(recent_, features, Prior().T_world_level, options_.odometry);
+  const PosePrior expected{Prior().T_world_level, motion_.StepCovariance()};
+  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
   if (moved.fit < options_.odometry.min_fit) {
     recent_.Clear();
     return false;
@@ -74,7 +84,8 @@ bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationRe
       GroundMapped(features, there).value_or(1.0) > options_.edge_ground_mapped) {
     return false;
   }
-  const ScanMotion moved = MotionSince(recent_, features, there, options_.odometry);
+  const PosePrior expected{there, PoseCovariance::Zero()};
+  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
   const bool agrees =
       confirmation_.is_confirmed() && moved.fit >= options_.odometry.min_fit &&
       !AreApart(moved.T_world_level, there, options_.same_step_m, options_.same_step_rad);
@@ -106,9 +117,34 @@ std::optional<double> PlaceTracker::GroundMapped(const ScanFeatures& features,
   return near == 0 ? std::nullopt : std::optional(static_cast<double>(mapped) / near);
 }
 
+bool PlaceTracker::IsWithinReach(const Pose& T_world_sensor) const {
+  constexpr std::array<int, 3> kPlane{0, 1, 3};
+  const PosePrior prior = Prior();
+  const Eigen::Vector4d off = PoseDifference(prior.T_world_level, T_world_sensor);
+  const Eigen::Vector3d in_plane = off(kPlane);
+  const Eigen::Matrix3d plane = prior.covariance(kPlane, kPlane);
+  const double sigmas = std::sqrt(in_plane.dot(plane.inverse() * in_plane));
+  return sigmas <= options_.reachable_sigmas &&
+         std::abs(off(2)) <= options_.reachable_up_sigmas * std::sqrt(prior.covariance(2, 2));
+}
+
 bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
-  const double most = options_.reachable_sigmas;
-  return carried_ == 0 || LogDensity(Prior(), T_world_sensor) >= -0.5 * most * most;
+  return carried_ == 0 || IsWithinReach(T_world_sensor);
+}
+
+std::optional<PlacePrior> PlaceTracker::Within() const {
+  if (carried_ == 0) {
+    return std::nullopt;
+  }
+  const MotionModel next = Next();
+  const Eigen::Vector3d& expected = next.T_world_sensor().translation();
+  const PoseCovariance covariance = next.covariance();
+  PlacePrior prior;
+  prior.center = expected.head<2>();
+  prior.radius_m = options_.reachable_sigmas * SpreadOf(covariance).along_m;
+  prior.z_m = expected.z();
+  prior.height_m = options_.reachable_up_sigmas * std::sqrt(covariance(2, 2));
+  return prior;
 }
 
 bool PlaceTracker::IsBack(const RegistrationResult& result, const ScanFeatures& features) const {

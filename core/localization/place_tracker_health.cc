@@ -13,7 +13,7 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
                                                 bool is_found) const {
   const PosePrior prior = Prior();
   const Eigen::Vector4d off = PoseDifference(prior.T_world_level, result.T_world_level);
-  if (is_first_) {
+  if (is_first_ && carried_ == 0) {
     const bool is_told =
         off.head<3>().norm() <= options_.told_m && std::abs(off(3)) <= options_.told_rad;
     return is_told ? Surprise::kNone : Surprise::kNew;

@@ -108,9 +108,10 @@ Result<Relocalization> Relocalizer::Find(const LeveledScan& scan,
   if (!ground_z_m || features.columns.empty()) {
     return result;
   }
-  const std::vector<PlaceCandidate> candidates = places_->Find(
-      ProfileOf(scan, *ground_z_m), prior, options_.candidates, options_.candidates_apart_m);
-  auto places = Refine(features, Check(features, candidates, -*ground_z_m));
+  const std::vector<PlaceCandidate> candidates =
+      places_->Find(ProfileOf(scan, *ground_z_m), -*ground_z_m, prior, options_.candidates,
+                    options_.candidates_apart_m);
+  auto places = Refine(features, Check(features, candidates, -*ground_z_m), prior);
   if (!places) return Error(places.error());
   result.places = *std::move(places);
   if (result.places.empty()) {
@@ -161,8 +162,10 @@ std::vector<Relocalizer::Start> Relocalizer::Check(const ScanFeatures& features,
 }
 
 // One map window serves all decks of a place, and all of them are tried: they look alike.
-Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& features,
-                                                          const std::vector<Start>& starts) const {
+Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(
+    const ScanFeatures& features,
+    const std::vector<Start>& starts,
+    const std::optional<PlacePrior>& prior) const {
   const auto radius_m = static_cast<double>(options_.features.max_range_m) + 3.0;
   std::vector<RelocalizedPlace> places;
   MapWindow window(profile_, options_.window);
@@ -181,6 +184,10 @@ Result<std::vector<RelocalizedPlace>> Relocalizer::Refine(const ScanFeatures& fe
       Add(Placed(window, features, pose), places);
     }
   }
+  std::erase_if(places, [&](const RelocalizedPlace& place) {
+    const double z_m = place.registration.T_world_level.translation().z();
+    return prior && std::abs(z_m - prior->z_m) > prior->height_m;
+  });
   std::stable_sort(places.begin(), places.end(),
                    [](const auto& a, const auto& b) { return a.score > b.score; });
   return places;

@@ -65,7 +65,8 @@ class Relocalizer {
               TilesAround tiles,
               const RelocalizerOptions& options = {});
 
-  // `scan` is levelled by `R_level_sensor`. Errors are those of the tiles' source.
+  // `scan` is levelled by `R_level_sensor`. A place that is not at the height of `prior` counts for
+  // nothing. Errors are those of the tiles' source.
   Result<Relocalization> Find(const LeveledScan& scan,
                               const Eigen::Quaterniond& R_level_sensor,
                               const std::optional<PlacePrior>& prior = std::nullopt) const;
@@ -81,7 +82,8 @@ class Relocalizer {
                            const std::vector<PlaceCandidate>& candidates,
                            double sensor_height_m) const;
   Result<std::vector<RelocalizedPlace>> Refine(const ScanFeatures& features,
-                                               const std::vector<Start>& starts) const;
+                                               const std::vector<Start>& starts,
+                                               const std::optional<PlacePrior>& prior) const;
   RelocalizedPlace Placed(const MapWindow& window,
                           const ScanFeatures& features,
                           const Pose& start) const;

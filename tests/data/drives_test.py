@@ -291,6 +291,36 @@ def unmapped(bin_dir):
     assert scans[-1]["health"] == "lost" and scans[-1]["error_m"] < 1.0
 
 
+def told(bin_dir):
+    """The same garage, whoever starts off the map: told how high he is he is taken to no other deck, in none of three ways."""
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        for seed in (0, 1):
+            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed)],
+                           check=True, stdout=subprocess.DEVNULL)
+        atlas.run("ingest", f"{work}/0", "--range", "0:60")
+        atlas.run("wait")
+        near = ("--prior-height", 1, "--prior-radius", 1)
+        tracked = atlas.call("localize", f"{work}/1", "--no-restart", *near).stdout.splitlines()
+        alone = [json.loads(atlas.call("localize", f"{work}/1", "--scans", "odd", "--relocalize", *height).stdout
+                            .splitlines()[-1]) for height in ((), ("--prior-height", 1.5))]
+        up_m = float(pathlib.Path(f"{work}/1/poses.txt").read_text().splitlines()[110].split()[11])
+        anchored = atlas.call("ingest", f"{work}/1", "--range", "110:150", "--anchor", "--prior-height",
+                              f"{up_m + 0.5},1.5")
+        states = [session["state"] for session in json.loads(anchored.stdout)["session_states"]]
+        assert atlas.stop() == 0
+    scans = [json.loads(line) for line in tracked[:-1]]
+    good = [scan for scan in scans if scan["health"] == "good"]
+    wrong = sum(scan["error_m"] > 1.0 for scan in good)
+    print(f"started off the map: {len(good)} of {len(scans)} scans good, {wrong} of them elsewhere; the last one "
+          f"{scans[-1]['health']}, {scans[-1]['error_m']} m off; alone {alone[0]['wrong']} wrong, with a height "
+          f"{alone[1]['wrong']}, {alone[1]['right']} right; anchored: {anchored.returncode}, {states}")
+    assert len(good) >= 40 and wrong == 0 and scans[-1]["health"] == "good"
+    assert alone[0]["wrong"] > 20, "else there is nothing to tell"
+    assert alone[1]["wrong"] <= 1 and alone[1]["right"] >= alone[0]["right"]
+    assert anchored.returncode == 3 and states == ["staged"]
+
+
 def ground(bin_dir):
     """The map's ground near the path, which mostly no ray reached, against labelled returns of other scans."""
     for piece in ("00", "02", "04", "08"):
@@ -448,7 +478,7 @@ def main():
             finally:
                 assert atlas.stop() == 0
     else:
-        {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped,
+        {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped, "told": told,
          "segmentation": segmentation, "order": order, "ground": ground, "street": street}[name](bin_dir)
 
 

@@ -87,7 +87,7 @@ double InThousandths(double value) {
 
 // Scans that were looked for in the whole map.
 struct PartAnchoring::Probes {
-  std::optional<PlacePrior> prior;
+  PlacePrior prior;  // of the first scan
   std::set<std::size_t> probed;
   std::vector<AnchorGuess> guesses;
 };
@@ -102,10 +102,7 @@ struct PartAnchoring::Candidate {
 };
 
 Status AnchorOptions::Validate() const {
-  if (prior && !(prior->radius_m > 0.0 && prior->radius_m <= 1e5)) {
-    return {StatusCode::kInvalidArgument,
-            StrCat("radius ", prior->radius_m, " m: expected more than 0, at most 100,000")};
-  }
+  ATLAS_RETURN_IF_ERROR(prior.Validate());
   if (probes < 1 || min_agreeing < 2) {
     return {StatusCode::kInvalidArgument, "anchor: expected a probe, and two that agree"};
   }
@@ -140,13 +137,14 @@ Status PartAnchoring::Probe(Scans scans, std::size_t index, Probes& probes) cons
   const DriveScan& scan = *scans[index];
   const Result<PointCloud> cloud = ReadScan(scan.scan);
   if (!cloud) return cloud.error();
-  std::optional<PlacePrior> prior = probes.prior;
-  if (prior) {
-    // Wherever the drive begins, this scan is as far from there as in the drive's own frame.
-    const Eigen::Vector3d way =
-        scan.T_world_sensor.translation() - scans.front()->T_world_sensor.translation();
-    prior->radius_m += (1.0 + options_.agreement.drift) * way.head<2>().norm();
-  }
+  // Wherever the drive begins, this scan is as far from there as in the drive's own frame.
+  const Eigen::Vector3d way =
+      scan.T_world_sensor.translation() - scans.front()->T_world_sensor.translation();
+  const double drift_m = options_.agreement.drift * way.norm();
+  PlacePrior prior = probes.prior;
+  prior.radius_m += way.head<2>().norm() + drift_m;
+  prior.z_m += way.z();
+  prior.height_m += drift_m;
   const Eigen::Quaterniond R_level_sensor = LevelOf(scan);
   const LeveledScan leveled =
       SegmentScan(*cloud, survey_.layout, survey_.ring_step, R_level_sensor, {});
@@ -239,7 +237,7 @@ Result<std::optional<FoundScan>> PartAnchoring::FindNear(const DriveScan& scan,
                                                          double& fit) {
   const Result<PointCloud> cloud = ReadScan(scan.scan);
   if (!cloud) return Error(cloud.error());
-  localizer_->Start(T_map_sensor);
+  localizer_->Start(T_map_sensor, std::nullopt);
   const Result<LocatedScan> located = localizer_->Locate(*cloud, LevelOf(scan), 1.0);
   if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
   fit = located->fit;

@@ -22,7 +22,7 @@
 namespace atlas {
 
 struct AnchorOptions {
-  std::optional<PlacePrior> prior;  // where the drive begins, in the atlas's frame
+  PlacePrior prior;  // where the drive begins, in the atlas's frame
   // Scans that are looked for in the whole map, evenly spread over the drive, and as many again
   // around those that were found: a drive may be on the map for a small part of its way.
   std::size_t probes = 32;

@@ -199,16 +199,18 @@ PoseCovariance UncertaintyOf(const NormalEquations& equations, double informatio
   return held.inverse();
 }
 
-// From `start` downhill; near where it is `expected` as far as nothing else holds it.
-Pose Descend(ScanFit& scan,
-             const Pose& start,
-             const Pose& expected,
-             const ScanOdometryOptions& options) {
+struct Start {
+  Pose pose;
+  Pose expected;  // where the scan lies as far as nothing else holds it
+};
+
+// Downhill.
+Pose Descend(ScanFit& scan, const Start& start, const ScanOdometryOptions& options) {
   const Eigen::Matrix4d information =
       Squares(options.start_sigma_m, options.start_sigma_m, options.start_sigma_rad)
           .cwiseInverse()
           .asDiagonal();
-  Pose pose = start;
+  Pose pose = start.pose;
   for (int i = 0; i < options.iterations + options.fine_iterations; ++i) {
     const float left =
         std::max(0.0F, 1.0F - static_cast<float>(i) / static_cast<float>(options.iterations));
@@ -216,21 +218,35 @@ Pose Descend(ScanFit& scan,
         options.fine_reach_m + left * (options.coarse_reach_m - options.fine_reach_m);
     NormalEquations equations = scan.At(pose, reach_m).equations;
     equations.AddTiltPrior(pose, options.tilt_sigma_rad);
-    equations.AddPrior(pose, expected, information);
+    equations.AddPrior(pose, start.expected, information);
     pose = Moved(pose, equations.Solve());
   }
   return pose;
 }
 
-// The likeliest first: as expected, then turned, the least first.
-std::vector<Pose> StartsAround(const Pose& expected, const ScanOdometryOptions& options) {
-  std::vector<Pose> starts{expected};
+// As expected, then turned, the least first.
+std::vector<Start> TurnedStarts(const Pose& expected, const ScanOdometryOptions& options) {
+  std::vector<Start> starts{{expected, expected}};
   for (int step = 1; step <= options.turns; ++step) {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::AngleAxisd turn(side * step * options.turn_rad, Eigen::Vector3d::UnitZ());
-      starts.push_back(expected);
-      starts.back().linear() = turn.toRotationMatrix() * expected.linear();
+      starts.push_back({expected, expected});
+      starts.back().pose.linear() = turn.toRotationMatrix() * expected.linear();
     }
+  }
+  return starts;
+}
+
+// Of a vehicle of whose motion little is known.
+std::vector<Start> FannedStarts(const Pose& expected,
+                                const HorizontalSpread& spread,
+                                const ScanOdometryOptions& options) {
+  const int steps = static_cast<int>(options.fan_sigmas * spread.along_m / options.fan_step_m);
+  std::vector<Start> starts;
+  for (int step = -steps; step <= steps; ++step) {
+    Pose start = expected;
+    start.translation().head<2>() += step * options.fan_step_m * spread.direction;
+    starts.push_back({start, start});
   }
   return starts;
 }
@@ -239,22 +255,25 @@ std::vector<Pose> StartsAround(const Pose& expected, const ScanOdometryOptions& 
 
 ScanMotion MotionSince(const RecentScans& recent,
                        const ScanFeatures& features,
-                       const Pose& T_world_level_start,
+                       const PosePrior& expected,
                        const ScanOdometryOptions& options) {
-  const Eigen::Vector3d origin = T_world_level_start.translation();
-  Pose expected = T_world_level_start;
-  expected.translation().setZero();
+  const Eigen::Vector3d origin = expected.T_world_level.translation();
+  Pose here = expected.T_world_level;
+  here.translation().setZero();
   ScanFit scan(recent, features, origin, options);
   ScanMotion best;
-  for (const Pose& start : StartsAround(expected, options)) {
-    const Pose pose = Descend(scan, start, expected, options);
+  const HorizontalSpread spread = SpreadOf(expected.covariance);
+  const bool is_fanned = spread.along_m > options.fan_sigma_m;
+  for (const Start& start :
+       is_fanned ? FannedStarts(here, spread, options) : TurnedStarts(here, options)) {
+    const Pose pose = Descend(scan, start, options);
     const ScanFit::Evidence evidence = scan.At(pose, options.fine_reach_m);
     if (const double fit = evidence.Fit(options.few_columns); fit > best.fit) {
       best.T_world_level = pose;
       best.covariance = UncertaintyOf(evidence.equations, options.information_share);
       best.fit = fit;
     }
-    if (best.fit >= options.sure_fit) break;
+    if (!is_fanned && best.fit >= options.sure_fit) break;
   }
   best.T_world_level.translation() += origin;
   return best;

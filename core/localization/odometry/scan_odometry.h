@@ -22,8 +22,13 @@ struct ScanOdometryOptions {
   float column_sigma_m = 0.12F;
   float ground_sigma_m = 0.05F;
   double tilt_sigma_rad = 0.0087;  // the IMU's: 0.5 degrees
-  double start_sigma_m = 0.5;      // of where it was expected
+  double start_sigma_m = 0.5;      // of each start
   double start_sigma_rad = 0.05;
+  // Where the step is less certain than this, starts are tried along the least certain direction,
+  // up to so many standard deviations either way; all of them, and the best counts.
+  double fan_sigma_m = 0.8;
+  double fan_sigmas = 1.5;
+  double fan_step_m = 0.75;
   // Where a scan fits by less than this, it may have turned more than expected: so many times so
   // much is tried to either side.
   double sure_fit = 0.5;
@@ -43,11 +48,11 @@ struct ScanMotion {
   double fit = 0.0;  // mean robust weight of the columns that are near, 0..1
 };
 
-// Where the scan was taken, near `T_world_level_start`. Requires scans. A `fit` below `min_fit`:
-// not where it can have been driven to.
+// Where the scan was taken, near where it is `expected`; the covariance is that of the step to
+// there. Requires scans. A `fit` below `min_fit`: not where it can have been driven to.
 ScanMotion MotionSince(const RecentScans& recent,
                        const ScanFeatures& features,
-                       const Pose& T_world_level_start,
+                       const PosePrior& expected,
                        const ScanOdometryOptions& options);
 
 }  // namespace atlas

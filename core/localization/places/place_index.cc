@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/base/integer_math.h"
+#include "core/base/str_cat.h"
 
 namespace atlas {
 namespace {
@@ -30,7 +31,24 @@ double HeadingBetween(std::uint32_t a, std::uint32_t b) {
   return kSector_rad * std::min(difference, turns - difference);
 }
 
+Status CheckReach(const char* name, double reach_m) {
+  constexpr double kMost_m = 1e5;
+  if (std::isinf(reach_m) || (reach_m > 0.0 && reach_m <= kMost_m)) {
+    return {};
+  }
+  return {StatusCode::kInvalidArgument,
+          StrCat("prior: ", name, " ", reach_m, " m: expected more than 0, at most 100,000")};
+}
+
 }  // namespace
+
+Status PlacePrior::Validate() const {
+  if (!center.allFinite() || !std::isfinite(z_m)) {
+    return {StatusCode::kInvalidArgument, "prior: expected finite numbers"};
+  }
+  ATLAS_RETURN_IF_ERROR(CheckReach("radius", radius_m));
+  return CheckReach("height", height_m);
+}
 
 PlaceIndex::PlaceIndex(const MapProfile& profile, const PlaceIndexOptions& options)
     : profile_(profile),
@@ -89,7 +107,14 @@ std::size_t PlaceIndex::memory_bytes() const {
   return blocks_.memory_bytes() + places_.capacity() * sizeof(Place);
 }
 
+bool PlaceIndex::IsNear(const Place& place, double sensor_height_m, const PlacePrior& prior) const {
+  const double up_m = place.ground.z() + sensor_height_m - prior.z_m;
+  return (place.ground.head<2>() - prior.center).norm() <= prior.radius_m + options_.spacing_m &&
+         std::abs(up_m) <= prior.height_m + options_.deck_m;
+}
+
 std::vector<PlaceCandidate> PlaceIndex::Find(const RangeProfile& scan,
+                                             double sensor_height_m,
                                              const std::optional<PlacePrior>& prior,
                                              std::size_t count,
                                              double apart_m) const {
@@ -98,8 +123,7 @@ std::vector<PlaceCandidate> PlaceIndex::Find(const RangeProfile& scan,
   ranked.reserve(places_.size() * 2);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const Place& place = places_[i];
-    if (prior &&
-        (place.ground.head<2>() - prior->center).norm() > prior->radius_m + options_.spacing_m) {
+    if (prior && !IsNear(place, sensor_height_m, *prior)) {
       continue;
     }
     const auto differences = Differences(scan, place.profile);

@@ -4,12 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <unordered_map>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "core/base/status.h"
 #include "core/geometry/map_profile.h"
 #include "core/localization/places/block_map.h"
 #include "core/localization/places/range_profile.h"
@@ -24,10 +26,15 @@ struct PlaceIndexOptions {
   std::uint8_t occupied_nibble = 10;  // p >= 0.61
 };
 
-// Where the vehicle is for certain: within `radius_m` of `center`, in the plane.
+// Where the sensor is for certain; infinite: not known.
 struct PlacePrior {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
-  double radius_m = 0.0;
+  double radius_m = std::numeric_limits<double>::infinity();  // around `center`, in the plane
+  double z_m = 0.0;
+  double height_m = std::numeric_limits<double>::infinity();  // either way of `z_m`
+
+  // kInvalidArgument naming the first that is out of range.
+  Status Validate() const;
 };
 
 // A place that looks like the scan, with the heading in which it does.
@@ -50,8 +57,10 @@ class PlaceIndex {
   std::size_t memory_bytes() const;
 
   // The `count` places and headings that look most like `scan`, the best first, no two of them
-  // within `apart_m` and 20 degrees of each other. Requires Finish.
+  // within `apart_m` and 20 degrees of each other; of a sensor that is `sensor_height_m` above the
+  // ground. Requires Finish.
   std::vector<PlaceCandidate> Find(const RangeProfile& scan,
+                                   double sensor_height_m,
                                    const std::optional<PlacePrior>& prior,
                                    std::size_t count,
                                    double apart_m) const;
@@ -63,6 +72,8 @@ class PlaceIndex {
   };
 
   void AddPlace(const TileLayer& layer, std::int64_t cell_x, std::int64_t cell_y);
+  // Places stand for what is around them.
+  bool IsNear(const Place& place, double sensor_height_m, const PlacePrior& prior) const;
 
   MapProfile profile_;
   PlaceIndexOptions options_;

@@ -39,7 +39,10 @@ class RawIcp : public ScanLocalizer {
                                               const SelectionOptions& selection,
                                               const RawIcpOptions& options);
 
-  void Start(const Pose& T_world_sensor) override { T_world_sensor_ = T_world_sensor; }
+  void Start(const Pose& T_world_sensor,
+             const std::optional<PoseCovariance>& /*covariance*/) override {
+    T_world_sensor_ = T_world_sensor;
+  }
   // Roll and pitch of the start are the IMU's; all six are refined.
   Result<LocatedScan> Locate(const PointCloud& cloud,
                              const Eigen::Quaterniond& R_level_sensor,

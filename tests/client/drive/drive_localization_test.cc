@@ -21,7 +21,10 @@ class ScriptedLocalizer : public ScanLocalizer {
   };
   explicit ScriptedLocalizer(std::vector<Answer> script) : script_(std::move(script)) {}
 
-  void Start(const Pose& T_world_sensor) override { starts.push_back(T_world_sensor); }
+  void Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance) override {
+    starts.push_back(T_world_sensor);
+    covariances.push_back(covariance);
+  }
   Result<LocatedScan> Locate(const PointCloud&, const Eigen::Quaterniond&, double) override {
     if (next_ == script_.size()) return Error(StatusCode::kUnavailable, "gone");
     const Answer& answer = script_[next_++];
@@ -34,6 +37,7 @@ class ScriptedLocalizer : public ScanLocalizer {
   }
 
   std::vector<Pose> starts;
+  std::vector<std::optional<PoseCovariance>> covariances;
 
  private:
   std::vector<Answer> script_;
@@ -83,6 +87,48 @@ TEST_F(DriveLocalizationTest, JumpsBeginAnew) {
   std::vector<bool> restarted;
   for (const LocalizedScan& scan : scans_) restarted.push_back(scan.is_after_jump);
   EXPECT_EQ(restarted, (std::vector<bool>{false, false, false, true, false}));
+}
+
+TEST_F(DriveLocalizationTest, AStartIsToldAsFarOffAsItMayBeAndBelieved) {
+  options_.start = DriveLocalizationOptions::ToldStart{2.0, 0.6};
+  double furthest_m = 0.0;
+  double highest_m = 0.0;
+  for (options_.seed = 0; options_.seed < 30; ++options_.seed) {
+    ScriptedLocalizer localizer(std::vector<ScriptedLocalizer::Answer>(5));
+    ASSERT_TRUE(Run(localizer).has_value());
+    ASSERT_EQ(localizer.starts.size(), 2U);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Eigen::Vector3d off_m =
+          localizer.starts[i].translation() - Eigen::Vector3d(i == 0 ? 0.0 : 103.0, 0.0, 0.0);
+      furthest_m = std::max(furthest_m, off_m.head<2>().norm());
+      highest_m = std::max(highest_m, std::abs(off_m.z()));
+      ASSERT_TRUE(localizer.covariances[i]);
+      EXPECT_NEAR(std::sqrt((*localizer.covariances[i])(2, 2)), 0.2, 1e-9) << "three of them";
+    }
+  }
+  EXPECT_LE(furthest_m, 2.0);
+  EXPECT_GT(furthest_m, 1.0);
+  EXPECT_LE(highest_m, 0.6);
+  EXPECT_GT(highest_m, 0.4);
+}
+
+TEST_F(DriveLocalizationTest, WithoutAnErrorTheStartIsAHint) {
+  ScriptedLocalizer localizer(std::vector<ScriptedLocalizer::Answer>(5));
+  ASSERT_TRUE(Run(localizer).has_value());
+  ASSERT_EQ(localizer.covariances.size(), 2U);
+  EXPECT_FALSE(localizer.covariances[0] || localizer.covariances[1]);
+}
+
+TEST_F(DriveLocalizationTest, AToldStartIsOfTrackingAlone) {
+  ScriptedLocalizer localizer({});
+  options_.start.emplace().height_m = 0.0;
+  EXPECT_EQ(Run(localizer).error().code(), StatusCode::kInvalidArgument);
+  options_.start.emplace();
+  options_.shots.emplace();
+  EXPECT_EQ(Run(localizer).error().code(), StatusCode::kInvalidArgument);
+  options_.shots.reset();
+  options_.mode = LocalizationMode::kPaper;
+  EXPECT_EQ(Run(localizer).error().code(), StatusCode::kInvalidArgument);
 }
 
 TEST_F(DriveLocalizationTest, ErrorsAreSplitAndMeasuredInSigmas) {

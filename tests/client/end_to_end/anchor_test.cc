@@ -207,8 +207,15 @@ TEST_F(AnchorTest, APriorIsBelieved) {
       Anchor(daemon, shared_root / "moved",
              {"--prior", near(900.0), "--prior-radius", "20", "--session", "wrong"});
   EXPECT_EQ(wrong.exit_code, static_cast<int>(ExitCode::kNotFound)) << wrong.out;
+  const auto within = [&](double off_m) {
+    return std::to_string(begin.z() + off_m) + ",1.5";
+  };
+  const CommandRun too_high = Anchor(daemon, shared_root / "moved",
+                                     {"--prior-height", within(6.4), "--session", "too_high"});
+  EXPECT_EQ(too_high.exit_code, static_cast<int>(ExitCode::kNotFound)) << too_high.out;
   const CommandRun right =
-      Anchor(daemon, shared_root / "moved", {"--prior", near(15.0), "--prior-radius", "20"});
+      Anchor(daemon, shared_root / "moved",
+             {"--prior", near(15.0), "--prior-radius", "20", "--prior-height", within(-0.8)});
   ASSERT_EQ(right.exit_code, 0) << right.err;
   ExpectAt(daemon, "continued", shared_root / "other_lane", 0.05, 0.1);
 }

@@ -81,6 +81,43 @@ TEST(RelocalizerTest, ADeckIsNeverTakenForTheOther) {
   }
 }
 
+TEST(RelocalizerTest, NoPlaceCountsThatIsNotAtTheHeightThatIsKnown) {
+  const Relocalizer relocalizer = RelocalizerIn(GarageMap());
+  const Pose truth = UprightPose({0.5, 2.0, 1.8}, 0.7);
+  PlacePrior prior;
+  prior.height_m = 1.4;
+  int found = 0;
+  for (const double z_m : {0.6, 1.8, 3.0}) {
+    prior.z_m = z_m;
+    const Relocalization told = Find(relocalizer, testing::GarageCorner(), truth, prior);
+    ASSERT_FALSE(told.places.empty());
+    for (const RelocalizedPlace& place : told.places) {
+      EXPECT_NEAR(place.registration.T_world_level.translation().z(), z_m, prior.height_m);
+    }
+    if (!told.T_world_sensor) continue;
+    ++found;
+    EXPECT_LT(ErrorOf(*told.T_world_sensor, truth).horizontal_m, 0.1);
+  }
+  EXPECT_EQ(found, 3);
+  prior.z_m = 8.0;  // the deck above those that were mapped
+  EXPECT_TRUE(Find(relocalizer, testing::GarageCorner(), truth, prior).places.empty());
+}
+
+TEST(RelocalizerTest, APriorThatSaysNothingIsRefused) {
+  EXPECT_TRUE(PlacePrior().Validate().ok()) << "all unknown";
+  for (const double wrong : {0.0, -1.0, 2e5, std::nan("")}) {
+    PlacePrior prior;
+    prior.radius_m = wrong;
+    EXPECT_EQ(prior.Validate().code(), StatusCode::kInvalidArgument) << wrong;
+    prior = {};
+    prior.height_m = wrong;
+    EXPECT_EQ(prior.Validate().code(), StatusCode::kInvalidArgument) << wrong;
+  }
+  PlacePrior prior;
+  prior.z_m = std::nan("");
+  EXPECT_EQ(prior.Validate().code(), StatusCode::kInvalidArgument);
+}
+
 TEST(RelocalizerTest, WhereTwoPlacesLookTheSameItDoesNotKnowUnlessItIsToldWhereAbout) {
   const ShapeWorld world = testing::TwoYards();
   PaintedMap map;
@@ -94,7 +131,9 @@ TEST(RelocalizerTest, WhereTwoPlacesLookTheSameItDoesNotKnowUnlessItIsToldWhereA
   for (const double yaw_rad : {0.3, -2.0}) {
     const Pose truth = UprightPose({-19.0, 0.5, 1.8}, yaw_rad);
     EXPECT_FALSE(Find(relocalizer, yard, truth).T_world_sensor) << "as good as 40 m away";
-    const PlacePrior prior{truth.translation().head<2>() + Eigen::Vector2d(3.0, -2.0), 10.0};
+    PlacePrior prior;
+    prior.center = truth.translation().head<2>() + Eigen::Vector2d(3.0, -2.0);
+    prior.radius_m = 10.0;
     const Relocalization told = Find(relocalizer, yard, truth, prior);
     ASSERT_TRUE(told.T_world_sensor);
     EXPECT_LT(ErrorOf(*told.T_world_sensor, truth).horizontal_m, 0.1);
@@ -152,7 +191,7 @@ TEST(PlaceIndexTest, PlacesStandOnEachDeckAndLookLikeWhatIsSeenThere) {
     const std::optional<double> ground_m = GroundBelow(scan);
     ASSERT_TRUE(ground_m);
     EXPECT_NEAR(*ground_m, -1.8, 0.15);
-    const auto found = street->Find(ProfileOf(scan, *ground_m), std::nullopt, 20, 1.5);
+    const auto found = street->Find(ProfileOf(scan, *ground_m), -*ground_m, std::nullopt, 20, 1.5);
     ASSERT_EQ(found.size(), 20U);
     EXPECT_TRUE(std::is_sorted(found.begin(), found.end(), [](const auto& a, const auto& b) {
       return a.difference < b.difference;

@@ -114,6 +114,58 @@ TEST_F(UnmappedTest, BackOnTheMapItIsFoundWhereItCameTo) {
   EXPECT_LT(off_m_, 0.06);
 }
 
+// As a car park's lift or a driver knows it.
+PoseCovariance WithinAMetre() {
+  return Eigen::Vector4d(0.3, 0.3, 0.3, 0.05).cwiseAbs2().asDiagonal();
+}
+
+TEST_F(UnmappedTest, WhoIsToldWhereHeStartsIsCarriedOnFromThere) {
+  Pose told = InYards(24.0);
+  told.translation() += Eigen::Vector3d(0.2, -0.1, 0.1);
+  localizer_.Start(told, WithinAMetre());
+  Drive(24.0, 4.0, -1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kLost);
+  EXPECT_LT(off_m_, 0.5);
+  const Eigen::Vector4d off = PoseDifference(InYards(4.0), last_.T_world_sensor);
+  EXPECT_LT(off.dot(last_.covariance.inverse() * off), 16.0) << "of four expected";
+  Drive(3.0, -26.0, -1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kGood);
+  EXPECT_LT(off_m_, 0.06);
+}
+
+TEST_F(UnmappedTest, WhoIsToldWhereHeStartsOnTheMapIsKnownAtOnce) {
+  Pose told = InYards(-22.0);
+  told.translation() += Eigen::Vector3d(0.3, 0.3, -0.2);
+  localizer_.Start(told, WithinAMetre());
+  Drive(-22.0, -22.0, 1.0);
+  EXPECT_EQ(last_.health, LocalizationHealth::kGood);
+  EXPECT_LT(off_m_, 0.1);
+}
+
+// The deck below was mapped, and looks just like the one that it is on.
+TEST(ToldHeightTest, ADeckThatWasNotMappedIsNotTakenForTheOneBelow) {
+  const PaintedMap& map = testing::GarageMap();
+  Localizer localizer = LocalizerIn(map);
+  const Pose below = UprightPose({0.5, 2.0, 1.8}, 0.7);
+  const LeveledScan scan = CastLeveledScan(testing::QuickSensor(), testing::GarageCorner(), below);
+  Pose told = below;
+  told.translation().z() += 6.0;
+  localizer.Start(told,
+                  PoseCovariance(Eigen::Vector4d(0.5, 0.5, 0.7, 0.05).cwiseAbs2().asDiagonal()));
+  for (int i = 0; i < 5; ++i) {
+    const LocalizationResult result =
+        localizer.Localize(scan, Eigen::Quaterniond::Identity()).value();
+    EXPECT_EQ(result.health, LocalizationHealth::kLost) << i;
+    EXPECT_NEAR(result.T_world_sensor.translation().z(), told.translation().z(), 0.1) << i;
+  }
+  told.translation().z() = below.translation().z() - 1.2;
+  localizer.Start(told,
+                  PoseCovariance(Eigen::Vector4d(0.5, 0.5, 0.7, 0.05).cwiseAbs2().asDiagonal()));
+  const LocalizationResult found = localizer.Localize(scan, Eigen::Quaterniond::Identity()).value();
+  EXPECT_EQ(found.health, LocalizationHealth::kWeak) << "it was told something else";
+  EXPECT_LT(ErrorOf(found.T_world_sensor, below).vertical_m, 0.05);
+}
+
 class DriftTest : public UnmappedTest,
                   public ::testing::WithParamInterface<std::pair<double, double>> {};
 

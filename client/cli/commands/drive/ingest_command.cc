@@ -104,6 +104,8 @@ class IngestCommand : public Command {
         "The drive has a frame of its own: find it in the map first; staged if it is not");
     arguments.Optional("--prior", "X,Y", prior_m_, "With --anchor: where it begins, in the atlas");
     arguments.Optional("--prior-radius", "M", prior_radius_m_, "How far off that is at most");
+    arguments.Optional("--prior-height", "Z,M", prior_height_m_,
+                       "With --anchor: the sensor's height there, and how far off that is at most");
     arguments.Optional("--positions", "FILE", positions_,
                        "Where the sensor was at scans, by GNSS, in the atlas's frame: lines SCAN X "
                        "Y Z RADIUS, metres");
@@ -186,13 +188,18 @@ class IngestCommand : public Command {
       return {StatusCode::kInvalidArgument, "--prior and --prior-radius need each other"};
     }
     if (!is_anchored_) {
-      return prior_m_ ? Status(StatusCode::kInvalidArgument, "--prior needs --anchor") : Status();
+      return prior_m_ || prior_height_m_
+                 ? Status(StatusCode::kInvalidArgument, "--prior and --prior-height need --anchor")
+                 : Status();
     }
-    options_.anchor.emplace();
+    PlacePrior& prior = options_.anchor.emplace().prior;
     if (prior_m_) {
-      auto& prior = options_.anchor->prior.emplace();
       prior.center = *prior_m_;
       prior.radius_m = *prior_radius_m_;
+    }
+    if (prior_height_m_) {
+      prior.z_m = prior_height_m_->x();
+      prior.height_m = prior_height_m_->y();
     }
     return {};
   }
@@ -220,6 +227,7 @@ class IngestCommand : public Command {
   bool is_anchored_ = false;
   std::optional<Eigen::Vector2d> prior_m_;
   std::optional<double> prior_radius_m_;
+  std::optional<Eigen::Vector2d> prior_height_m_;
   std::optional<std::string> positions_;
   NumberRange range_;
   std::uint32_t batch_ = 64;

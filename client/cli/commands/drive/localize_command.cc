@@ -38,7 +38,10 @@ class LocalizeCommand : public Command {
     arguments.Flag("--no-restart", no_restart_, "After a jump it has to find itself");
     arguments.Flag("--relocalize", relocalize_, "Find each scan alone, with no start");
     arguments.Optional("--prior-radius", "M", prior_radius_m_,
-                       "With --relocalize: within so far of a position that is given");
+                       "The position of each scan with --relocalize, else that of the start, is "
+                       "given and right to so much");
+    arguments.Optional("--prior-height", "M", prior_height_m_,
+                       "The same of the height: no other deck counts");
     arguments.Choice("--deskew", {"on", "off", "auto"}, deskew_,
                      "Undo the predicted motion during a scan; auto: where drives are skewed");
     arguments.Choice("--mode", {"atlas", "paper"}, mode_,
@@ -83,9 +86,7 @@ class LocalizeCommand : public Command {
       return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
     }
     options_.is_restarted = !no_restart_;
-    if (prior_radius_m_ && !relocalize_) {
-      return {StatusCode::kInvalidArgument, "--prior-radius needs --relocalize"};
-    }
+    CompleteStart();
     if (contradictions_.is_wanted() && (relocalize_ || perturbation_ || mode_ != "atlas")) {
       return {StatusCode::kInvalidArgument,
               "--contradictions needs a drive that is tracked: without --relocalize, --perturb and "
@@ -104,6 +105,13 @@ class LocalizeCommand : public Command {
     }
     ATLAS_RETURN_IF_ERROR(track_.Check(Kind()));
     return relocalize_ ? RelocalizationOptions().Validate() : options_.Validate();
+  }
+
+  void CompleteStart() {
+    if (relocalize_ || (!prior_radius_m_ && !prior_height_m_)) return;
+    auto& start = options_.start.emplace();
+    start.radius_m = prior_radius_m_.value_or(start.radius_m);
+    start.height_m = prior_height_m_.value_or(start.height_m);
   }
 
   LocalizationKind Kind() const {
@@ -156,6 +164,7 @@ class LocalizeCommand : public Command {
     options.rings = options_.rings;
     options.max_range_m = options_.max_range_m.value_or(options.max_range_m);
     options.prior_radius_m = prior_radius_m_;
+    options.prior_height_m = prior_height_m_;
     options.seed = options_.seed;
     return options;
   }
@@ -183,6 +192,7 @@ class LocalizeCommand : public Command {
   bool relocalize_ = false;
   bool no_restart_ = false;
   std::optional<double> prior_radius_m_;
+  std::optional<double> prior_height_m_;
   TrackOutput track_;
   ContradictionOutput contradictions_;
   std::string mode_ = "atlas";

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/localization/motion_model.h"
 #include "tests/core/localization/painted_map.h"
 
 namespace atlas {
@@ -36,6 +37,11 @@ Pose Moved(const Pose& from, double x_m, double y_m, double z_m, double yaw_rad)
   return moved;
 }
 
+// Of a step that is known to be about this.
+PosePrior Sure(const Pose& expected) {
+  return {expected, PoseCovariance::Zero()};
+}
+
 TEST(ScanOdometryTest, OneStepIsFoundFromAroundIt) {
   const ScanOdometryOptions options;
   RecentScans recent(options.scans);
@@ -45,7 +51,7 @@ TEST(ScanOdometryTest, OneStepIsFoundFromAroundIt) {
   const ScanFeatures scan = Seen(testing::Street(), truth);
   for (const double off : {-1.0, 0.0, 1.0}) {
     const Pose start = Moved(truth, 0.6 * off, 0.3 * off, 0.05, -3.0 * kDegree * off);
-    const ScanMotion motion = MotionSince(recent, scan, start, options);
+    const ScanMotion motion = MotionSince(recent, scan, Sure(start), options);
     EXPECT_GT(motion.fit, options.min_fit) << off;
     EXPECT_LT(ErrorOf(motion.T_world_level, truth).horizontal_m, 0.06) << off;
     EXPECT_LT(ErrorOf(motion.T_world_level, truth).vertical_m, 0.03) << off;
@@ -62,7 +68,7 @@ TEST(ScanOdometryTest, AlongAStreetItDriftsLittle) {
   Pose start = OnStreet(-14.0);
   for (int i = 1; i <= 30; ++i) {
     const ScanFeatures scan = Seen(testing::Street(), OnStreet(-15.0 + i));
-    const ScanMotion motion = MotionSince(recent, scan, start, options);
+    const ScanMotion motion = MotionSince(recent, scan, Sure(start), options);
     ASSERT_GT(motion.fit, options.min_fit) << i;
     before = pose;
     pose = motion.T_world_level;
@@ -75,6 +81,24 @@ TEST(ScanOdometryTest, AlongAStreetItDriftsLittle) {
   EXPECT_LT(ErrorOf(pose, OnStreet(15.0)).angle_rad, 1.0 * kDegree);
 }
 
+// Between the first scan and the second nothing is known of the motion but how vehicles drive.
+TEST(ScanOdometryTest, AFirstStepIsFoundHoweverFastItIs) {
+  const ScanOdometryOptions options;
+  const Pose first = OnStreet(-8.0);
+  RecentScans recent(options.scans);
+  recent.Add(Seen(testing::Street(), first), first);
+  MotionModel motion{MotionOptions()};
+  motion.Start(first);
+  motion.Predict();
+  for (const double step_m : {-0.5, 0.0, 0.7, 1.3, 2.0, 2.6}) {
+    const Pose truth = OnStreet(-8.0 + step_m);
+    const ScanMotion moved = MotionSince(recent, Seen(testing::Street(), truth),
+                                         {first, motion.StepCovariance()}, options);
+    EXPECT_GT(moved.fit, options.min_fit) << step_m;
+    EXPECT_LT(ErrorOf(moved.T_world_level, truth).horizontal_m, 0.1) << step_m;
+  }
+}
+
 TEST(ScanOdometryTest, WhoWasMovedElsewhereFitsNothing) {
   const ScanOdometryOptions options;
   RecentScans recent(options.scans);
@@ -82,10 +106,10 @@ TEST(ScanOdometryTest, WhoWasMovedElsewhereFitsNothing) {
     recent.Add(Seen(testing::Street(), OnStreet(x)), OnStreet(x));
   const ScanFeatures elsewhere =
       Seen(testing::Street(), Moved(OnStreet(9.0), 0.0, 1.0, 0.0, 0.5 * std::numbers::pi));
-  EXPECT_LT(MotionSince(recent, elsewhere, OnStreet(-9.0), options).fit, options.min_fit);
+  EXPECT_LT(MotionSince(recent, elsewhere, Sure(OnStreet(-9.0)), options).fit, options.min_fit);
   const ScanFeatures in_a_garage =
       Seen(testing::GarageCorner(), UprightPose({-4.0, -1.0, 1.8}, 0.2));
-  EXPECT_LT(MotionSince(recent, in_a_garage, OnStreet(-9.0), options).fit, options.min_fit);
+  EXPECT_LT(MotionSince(recent, in_a_garage, Sure(OnStreet(-9.0)), options).fit, options.min_fit);
 }
 
 // Along two endless walls nothing tells how far it went.
@@ -97,7 +121,7 @@ TEST(ScanOdometryTest, BetweenWallsAStepIsUncertainAlongThem) {
   };
   for (const double x : {0.0, 1.0, 2.0}) recent.Add(Seen(testing::Corridor(), at(x)), at(x));
   const ScanMotion motion =
-      MotionSince(recent, Seen(testing::Corridor(), at(3.0)), at(3.0), options);
+      MotionSince(recent, Seen(testing::Corridor(), at(3.0)), Sure(at(3.0)), options);
   EXPECT_GT(std::sqrt(motion.covariance(0, 0)), 0.1);
   EXPECT_LT(std::sqrt(motion.covariance(1, 1)), 0.04);
 }
