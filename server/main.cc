@@ -246,7 +246,8 @@ void LogProtobuf(google::protobuf::LogLevel /*level*/,
 int Main(int argc, const char* const* argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("atlasd"));
   google::protobuf::SetLogHandler(&LogProtobuf);
-  std::signal(SIGHUP, SIG_IGN);  // until there is something that takes new settings
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of a file fails as on a full disk
+  std::signal(SIGHUP, SIG_IGN);   // until there is something that takes new settings
   const LiveConfig::Read read = [argc, argv] {
     return ParseDaemonCommand(argc, argv);
   };

@@ -95,26 +95,40 @@ Result<DataDirectory> DataDirectory::Lock(const fs::path& directory) {
       return Error(std::move(status));
     }
   }
+  if (fs::is_symlink(directory / "atlas.db", error)) {
+    return Error(StatusCode::kInvalidArgument,
+                 StrCat("data directory: ", (directory / "atlas.db").string(),
+                        " is a symbolic link, and its log would stand beside what it leads to: "
+                        "link the directory instead, or start the daemon on the other one"));
+  }
   const fs::path lock = directory / "lock";
   const int fd = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (fd < 0) {
     return Error(DiskError("data directory: cannot open", lock, errno));
   }
-  if (!TryLock(fd)) {
+  const int directory_fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory_fd < 0) {
+    Status status = DiskError("data directory: cannot open", directory, errno);
+    ::close(fd);
+    return Error(std::move(status));
+  }
+  if (!TryLock(fd) || !TryLock(directory_fd)) {
     Status status(StatusCode::kConflict, StrCat("data directory ", directory.string(),
                                                 " is in use by process ", ReadHolder(fd)));
+    ::close(directory_fd);
     ::close(fd);
     return Error(std::move(status));
   }
   WriteHolder(fd);
-  return DataDirectory(directory, fd);
+  return DataDirectory(directory, directory_fd, fd);
 }
 
-DataDirectory::DataDirectory(fs::path directory, int lock_fd)
-    : directory_(std::move(directory)), lock_fd_(lock_fd) {}
+DataDirectory::DataDirectory(fs::path directory, int directory_fd, int lock_fd)
+    : directory_(std::move(directory)), directory_fd_(directory_fd), lock_fd_(lock_fd) {}
 
 DataDirectory::DataDirectory(DataDirectory&& other) noexcept
     : directory_(std::move(other.directory_)),
+      directory_fd_(std::exchange(other.directory_fd_, -1)),
       lock_fd_(std::exchange(other.lock_fd_, -1)),
       keeps_room_(other.keeps_room_) {}
 
@@ -126,6 +140,7 @@ DataDirectory::~DataDirectory() {
     KeepRoom();
   }
   ::close(lock_fd_);
+  ::close(directory_fd_);
 }
 
 void DataDirectory::FreeRoom() {

@@ -1,5 +1,6 @@
 // The daemon's data directory: who holds it, and whether there is an atlas in it. One process at a
-// time, by a lock on DIR/lock that the kernel releases however the process ends.
+// time, by locks on the directory and on DIR/lock, which says who, that the kernel releases however
+// the process ends.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +13,7 @@ class DataDirectory {
  public:
   // Makes the directory if it is missing. kConflict names the process that holds it, or the file
   // that has its name; kPermissionDenied and kUnavailable say what the disk refused,
-  // kInvalidArgument when the directory holds other files but no atlas.
+  // kInvalidArgument when the directory holds other files but no atlas, or a link to one.
   static Result<DataDirectory> Lock(const std::filesystem::path& directory);
 
   DataDirectory(DataDirectory&& other) noexcept;
@@ -39,11 +40,12 @@ class DataDirectory {
   void FreeRoom();
 
  private:
-  DataDirectory(std::filesystem::path directory, int lock_fd);
+  DataDirectory(std::filesystem::path directory, int directory_fd, int lock_fd);
   std::filesystem::path room_file() const { return directory_ / "atlas.db.room"; }
   void KeepRoom() const;
 
   std::filesystem::path directory_;
+  int directory_fd_ = -1;  // a file that holds a lock can be removed
   int lock_fd_ = -1;
   bool keeps_room_ = false;
 };

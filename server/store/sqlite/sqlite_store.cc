@@ -13,6 +13,7 @@
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
+#include "server/store/sqlite/database_files.h"
 #include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/index_check.h"
@@ -59,13 +60,28 @@ std::uint64_t ReadRevision(Connection& connection) {
   return ReadCounter(connection, Counter::kRevision);
 }
 
+// What is written to a file that has another place by now is lost with it.
+DiskRoom::Read FreeBytesBeside(const std::filesystem::path& database) {
+  const auto opened = DatabaseFiles::Look(database);
+  return [database, inode = opened ? opened->inode : 0]() -> Result<std::uint64_t> {
+    const auto files = DatabaseFiles::Look(database);
+    if (!files || files->inode != inode) {
+      return Error(StatusCode::kUnavailable,
+                   StrCat(database.string(),
+                          " is not the file that is open any more, it was moved, removed or "
+                          "replaced: put it back, or stop the daemon and see to it"));
+    }
+    return ReadFreeBytes(database.parent_path());
+  };
+}
+
 class SqliteStore final : public AtlasStore {
  public:
   SqliteStore(const SqliteStoreOptions& options, DataDirectory directory, OpenedAtlas atlas)
       : directory_(std::move(directory)),
         identity_(std::move(atlas.identity)),
         tiles_(options.tile_directory_bytes),
-        room_([directory = options.directory] { return ReadFreeBytes(directory); }),
+        room_(FreeBytesBeside(directory_.database_file())),
         note_(directory_.database_file(), identity_, atlas.log, atlas.revision_alone),
         guard_(options.on_failed_sync),
         log_(CopierOptions(directory_.database_file()), {}, *atlas.writer, guard_),

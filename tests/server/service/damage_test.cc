@@ -104,7 +104,10 @@ TEST_F(DamageTest, WhatIsToldElsewhereIsRestored) {
 }
 
 // Of some rows of a keyframe the others are no keyframe; of none nobody knows.
-TEST_F(DamageTest, AKeyframeWhoseRowsAreGoneWasNeverThere) {
+class VanishedRowsTest : public DamageTest, public ::testing::WithParamInterface<bool> {};
+
+TEST_P(VanishedRowsTest, AKeyframeWhoseRowsAreGoneWasNeverThere) {
+  const bool is_rebuilt = GetParam();
   for (const char* damage :
        {"DELETE FROM keyframes WHERE id = 4",
         "DELETE FROM keyframes WHERE id = 4; DELETE FROM poses WHERE keyframe_id = 4",
@@ -119,8 +122,9 @@ TEST_F(DamageTest, AKeyframeWhoseRowsAreGoneWasNeverThere) {
     Open(1);
     Tamper(damage);
     EXPECT_GT(service_->Verify({}, Long())->damaged, 0U);
-    ASSERT_TRUE(service_->Verify({.rebuild = true, .repair = true, .author = "who"}, Long()));
+    ASSERT_TRUE(service_->Verify({.rebuild = is_rebuilt, .repair = true, .author = "who"}, Long()));
     EXPECT_EQ(Digest().sha256, without.sha256);
+    EXPECT_FALSE(service_->DigestAt(2, Long())) << "nobody knows what it was";
     const auto report = service_->Verify({.rebuild = true}, Long());
     EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
     ASSERT_TRUE(Upload(DriveUpload(3)));
@@ -128,6 +132,31 @@ TEST_F(DamageTest, AKeyframeWhoseRowsAreGoneWasNeverThere) {
     Close();
     std::filesystem::remove_all(directory_ / "data");
     std::filesystem::remove_all(directory_ / "reference");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Rebuilt, VanishedRowsTest, ::testing::Bool());
+
+// It may have been retracted.
+TEST_F(DamageTest, ASessionOfWhichNothingTellsIsInQuarantine) {
+  for (const char* damage :
+       {"DELETE FROM sessions; DELETE FROM session_states",
+        "DELETE FROM session_states; UPDATE sessions SET vehicle = 'tram', state = 3"}) {
+    SCOPED_TRACE(damage);
+    Fill();
+    Tamper(damage);
+    ASSERT_TRUE(Repair());
+    const auto sessions = store_->ListSessions({}, 10).value();
+    ASSERT_EQ(sessions.size(), 1U);
+    EXPECT_EQ(sessions[0].state, SessionState::kQuarantined);
+    EXPECT_EQ(Digest().tiles, 0U);
+    const auto report = service_->Verify({.rebuild = true}, Long());
+    EXPECT_EQ(report->damaged + report->mismatched, 0U) << report->findings.at(0);
+    const auto released = Change(sessions[0].key, SessionAction::kRelease);
+    ASSERT_TRUE(released) << released.error().message();
+    EXPECT_EQ(Digest().tiles, intact_.tiles);
+    Close();
+    std::filesystem::remove_all(directory_ / "data");
   }
 }
 

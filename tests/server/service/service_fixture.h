@@ -129,8 +129,11 @@ class ServiceTest : public ::testing::Test {
     });
   }
   Result<SessionChangeResult> Change(const std::string& session, SessionAction action) {
+    return Change(SessionKey{"bus", session}, action);
+  }
+  Result<SessionChangeResult> Change(const SessionKey& session, SessionAction action) {
     return Await<SessionChangeResult>([&](auto done) {
-      service_->ChangeSession({{"bus", session}, action, "tester", "why not"}, std::move(done));
+      service_->ChangeSession({session, action, "tester", "why not"}, std::move(done));
     });
   }
   static Patience Long() { return {std::chrono::seconds(60), {}}; }

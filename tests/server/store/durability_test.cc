@@ -4,10 +4,12 @@
 #include <csignal>
 #include <fstream>
 #include <future>
+#include <thread>
 
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "server/store/disk_room.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace atlas {
@@ -74,6 +76,48 @@ TEST_F(DurabilityTest, ASecondOpenIsRefusedAndNamesTheProcess) {
   ASSERT_FALSE(second.has_value());
   EXPECT_EQ(second.error().code(), StatusCode::kConflict);
   EXPECT_NE(second.error().message().find(std::to_string(::getpid())), std::string::npos);
+}
+
+TEST_F(DurabilityTest, ALockFileThatIsRemovedLetsNobodyElseIn) {
+  Open();
+  ASSERT_TRUE(std::filesystem::remove(options_.directory / "lock"));
+  EXPECT_EQ(OpenSqliteStore(options_).error().code(), StatusCode::kConflict);
+}
+
+// SQLite's log would stand beside the other file, where nobody looks.
+TEST_F(DurabilityTest, ALinkToAnAtlasIsRefused) {
+  Open();
+  store_.reset();
+  const std::filesystem::path database = options_.directory / "atlas.db";
+  const std::filesystem::path elsewhere = options_.directory.string() + ".elsewhere";
+  std::filesystem::rename(database, elsewhere);
+  std::filesystem::create_symlink(elsewhere, database);
+  EXPECT_EQ(OpenSqliteStore(options_).error().code(), StatusCode::kInvalidArgument);
+  std::filesystem::remove(database);
+  std::filesystem::rename(elsewhere, database);
+  const std::filesystem::path folder = options_.directory.string() + ".link";
+  std::filesystem::create_directory_symlink(options_.directory, folder);
+  options_.directory = folder;
+  Open();
+  store_.reset();
+  std::filesystem::remove(folder);
+}
+
+// What is written would go with it.
+TEST_F(DurabilityTest, AnAtlasThatIsTakenAwayTakesNoMoreUploads) {
+  Open();
+  UploadLimits limits;
+  limits.disk_floor_bytes = 1;
+  store_->SetUploadLimits(limits);
+  ASSERT_TRUE(Put(MakeKeyframe(1, {kA})));
+  const std::filesystem::path database = options_.directory / "atlas.db";
+  const std::filesystem::path elsewhere = options_.directory.string() + ".elsewhere";
+  std::filesystem::rename(database, elsewhere);
+  std::this_thread::sleep_for(DiskRoom::kFresh);
+  EXPECT_EQ(Put(MakeKeyframe(2, {kA})).error().code(), StatusCode::kUnavailable);
+  std::filesystem::rename(elsewhere, database);
+  std::this_thread::sleep_for(DiskRoom::kFresh);
+  EXPECT_TRUE(Put(MakeKeyframe(2, {kA})));
 }
 
 TEST_F(DurabilityTest, IdentityIsKept) {

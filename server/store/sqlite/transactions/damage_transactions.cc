@@ -1,5 +1,7 @@
 #include "server/store/sqlite/transactions/damage_transactions.h"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <exception>
 #include <set>
@@ -177,13 +179,29 @@ Result<std::uint32_t> RepairRows(Connection& connection,
   return repaired;
 }
 
-Result<std::uint32_t> RepairSums(Connection& connection, const std::string& author) {
+// Tables of which tiles are made, now and at earlier revisions. A row that vanished left nothing
+// that tells which tiles.
+bool HasLostWhatTilesAreMadeOf(Connection& connection) {
+  constexpr std::array kMadeOf{RowKind::kKeyframe,    RowKind::kFootprint, RowKind::kPose,
+                               RowKind::kPoseHistory, RowKind::kSession,   RowKind::kSessionState};
+  return std::any_of(kMadeOf.begin(), kMadeOf.end(),
+                     [&](RowKind table) { return !CheckTableSum(connection, table).ok(); });
+}
+
+Result<std::uint32_t> RepairSums(Connection& connection,
+                                 std::uint8_t levels,
+                                 const std::string& author) {
   auto repaired = static_cast<std::uint32_t>(RecountSessions(connection));
   repaired += static_cast<std::uint32_t>(RecountCounters(connection));
   if (const Status sums = CheckTableSums(connection); !sums.ok()) {
+    const bool are_tiles_others = HasLostWhatTilesAreMadeOf(connection);
     WriteTableSums(connection);
     ++repaired;
     AddEvent(connection, {EventKind::kTablesRepaired, author, "", sums.message()});
+    if (are_tiles_others) {
+      MoveHorizon(connection, author);
+      MarkAllInStore(connection, "rows vanished", levels);
+    }
   }
   return repaired;
 }
@@ -296,7 +314,7 @@ Result<std::uint32_t> RepairTablesInStore(Connection& connection,
     case TableRepair::kSums:
       break;
   }
-  return RepairSums(connection, author);
+  return RepairSums(connection, levels, author);
 }
 
 }  // namespace atlas

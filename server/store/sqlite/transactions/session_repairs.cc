@@ -23,6 +23,8 @@ namespace atlas {
 namespace {
 
 constexpr const char* kLostVehicle = "lost";
+// What nothing tells of may have been retracted: somebody has to look before it is in the map.
+constexpr SessionState kUnknownState = SessionState::kQuarantined;
 
 // A damaged row may name a session that never was.
 bool HasWholeKeyframe(Connection& connection, std::int64_t session_id) {
@@ -148,7 +150,8 @@ class SessionRepair {
 
   // Vouched for where the row's checksum is that of what is told by the name.
   Status RepairRow(std::int64_t id) {
-    if (!HasState(connection_, id)) {
+    const bool has_state = HasState(connection_, id);
+    if (!has_state) {
       BeginHistoryOf(id, SessionState::kLive);
     }
     std::vector<SessionKey> names;
@@ -168,6 +171,9 @@ class SessionRepair {
       }
     }
     names.push_back(LostName(id));
+    if (!has_state) {
+      BeginHistoryOf(id, kUnknownState);
+    }
     const auto row = TellNamedSession(connection_, id, names.front(), Vouching::kByNobody);
     if (!row) {
       return row.error();
@@ -221,7 +227,7 @@ class SessionRepair {
     const SessionKey key = LostName(id);
     const auto state =
         ReadSessionStateAt(connection_, id, std::numeric_limits<std::int64_t>::max());
-    AddLostSession(connection_, id, key, state ? *state : SessionState::kLive);
+    AddLostSession(connection_, id, key, state ? *state : kUnknownState);
     MarkTilesOf(id);
     has_new_history_ = true;
     AddEvent(connection_, {EventKind::kTablesRepaired, author_, StrCat(key),
