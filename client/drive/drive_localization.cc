@@ -1,6 +1,5 @@
 #include "client/drive/drive_localization.h"
 
-#include <numbers>
 #include <utility>
 
 #include "client/drive/drive_survey.h"
@@ -78,12 +77,9 @@ class DriveLocalization {
     }
     const double radius_m = options_.start->radius_m;
     const double height_m = options_.start->height_m;
-    const double reach_m = radius_m / std::numbers::sqrt2;  // the square in the circle
-    const TrialSeed seed{options_.seed, scan.number, 0};
-    const Eigen::Quaterniond R_level_sensor =
-        DisturbedLevel(scan.T_world_sensor, options_.tilt_error_rad, seed);
-    Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
-    start.translation().z() = PerturbedHeight(scan.T_world_sensor, height_m, seed);
+    Pose start = scan.T_world_sensor;
+    start.translation() =
+        PerturbedPosition(scan.T_world_sensor, radius_m, height_m, {options_.seed, scan.number, 0});
     const PlaceTrackerOptions believed;
     const double sigma_m = radius_m / believed.reachable_sigmas;
     const Eigen::Vector4d sigmas(sigma_m, sigma_m, height_m / believed.reachable_up_sigmas,

@@ -48,18 +48,14 @@ PlacePrior ReachOf(const DriveRelocalizationOptions& options) {
 }
 
 PlacePrior PriorOf(const DriveScan& scan,
-                   const Eigen::Quaterniond& R_level_sensor,
                    const DriveRelocalizationOptions& options,
                    const TrialSeed& seed) {
   PlacePrior prior = ReachOf(options);
-  if (options.prior_radius_m) {
-    const double reach_m = prior.radius_m / std::numbers::sqrt2;  // the square in the circle
-    const Pose start = PerturbedStart(scan.T_world_sensor, R_level_sensor, reach_m, 0.0, seed);
-    prior.center = start.translation().head<2>();
-  }
-  if (options.prior_height_m) {
-    prior.z_m = PerturbedHeight(scan.T_world_sensor, prior.height_m, seed);
-  }
+  const Eigen::Vector3d position =
+      PerturbedPosition(scan.T_world_sensor, options.prior_radius_m.value_or(0.0),
+                        options.prior_height_m.value_or(0.0), seed);
+  prior.center = position.head<2>();
+  prior.z_m = position.z();
   return prior;
 }
 
@@ -103,7 +99,7 @@ Result<DriveRelocalizationReport> RelocalizeDrive(
     const TrialSeed seed{options.seed, scan.number, 0};
     const Eigen::Quaterniond R_level_sensor =
         DisturbedLevel(scan.T_world_sensor, options.tilt_error_rad, seed);
-    const PlacePrior prior = PriorOf(scan, R_level_sensor, options, seed);
+    const PlacePrior prior = PriorOf(scan, options, seed);
     const CpuTimer timer;
     const LeveledScan leveled =
         SegmentScan(*cloud, survey->layout, survey->ring_step, R_level_sensor, {});

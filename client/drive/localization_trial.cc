@@ -48,8 +48,16 @@ Pose PerturbedStart(const Pose& T_world_sensor,
   return start;
 }
 
-double PerturbedHeight(const Pose& T_world_sensor, double error_m, const TrialSeed& seed) {
-  return T_world_sensor.translation().z() + Stream(seed, 3).Uniform(-error_m, error_m);
+Eigen::Vector3d PerturbedPosition(const Pose& T_world_sensor,
+                                  double radius_m,
+                                  double height_m,
+                                  const TrialSeed& seed) {
+  const double reach_m = radius_m / std::numbers::sqrt2;  // the square in the circle
+  HashRandom in_plane = Stream(seed, 2);
+  const double dx_m = in_plane.Uniform(-reach_m, reach_m);
+  const double dy_m = in_plane.Uniform(-reach_m, reach_m);
+  const double dz_m = Stream(seed, 3).Uniform(-height_m, height_m);
+  return T_world_sensor.translation() + Eigen::Vector3d(dx_m, dy_m, dz_m);
 }
 
 }  // namespace atlas

@@ -29,7 +29,10 @@ Pose PerturbedStart(const Pose& T_world_sensor,
                     double yaw_rad,
                     const TrialSeed& seed);
 
-// z uniform in +- error_m.
-double PerturbedHeight(const Pose& T_world_sensor, double error_m, const TrialSeed& seed);
+// Where the sensor is, off by up to `radius_m` in the plane and uniform in +- height_m.
+Eigen::Vector3d PerturbedPosition(const Pose& T_world_sensor,
+                                  double radius_m,
+                                  double height_m,
+                                  const TrialSeed& seed);
 
 }  // namespace atlas

@@ -265,41 +265,46 @@ def second(bin_dir):
         print(f"{world}: {held} of {len(scans)} scans on their deck; {summary}")
         assert held == len(scans) == summary["scans"] and summary["failures"] == 0
         assert summary["translation_rmse_m"] <= goal_m
-        good = [scan for scan in carried if scan["health"] == "good"]
-        wrong = sum(scan["error_m"] > 1.0 for scan in good)
-        print(f"carried to another deck: {len(good)} of {len(carried)} scans good, {wrong} of them on another")
-        assert wrong <= 1 and len(good) >= 35 and carried[-1]["error_m"] < 0.2
+        good, wrong = good_and_wrong(carried)
+        print(f"carried to another deck: {good} of {len(carried)} scans good, {wrong} of them on another")
+        assert wrong <= 1 and good >= 35 and carried[-1]["error_m"] < 0.2
+
+
+def one_deck_mapped(bin_dir, work, seed):
+    """An atlas of the lowest deck of a garage alone; the drive of another seed is in WORK/SEED."""
+    atlas = Atlas(bin_dir, work)
+    for each in (0, seed):
+        subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{each}", "--seed", str(each)],
+                       check=True, stdout=subprocess.DEVNULL)
+    atlas.run("ingest", f"{work}/0", "--range", "0:60")
+    atlas.run("wait")
+    return atlas
+
+
+def good_and_wrong(scans):
+    """How many are called good, and how many of these are more than a metre off."""
+    good = [scan for scan in scans if scan["health"] == "good"]
+    return len(good), sum(scan["error_m"] > 1.0 for scan in good)
 
 
 def unmapped(bin_dir):
     """A garage of which one deck is mapped: who drives off it goes on by his own motion, and is taken to no other deck."""
     with tempfile.TemporaryDirectory() as work:
-        atlas = Atlas(bin_dir, work)
-        for seed in (0, 2):
-            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed)],
-                           check=True, stdout=subprocess.DEVNULL)
-        atlas.run("ingest", f"{work}/0", "--range", "0:60")
-        atlas.run("wait")
+        atlas = one_deck_mapped(bin_dir, work, 2)
         done = atlas.call("localize", f"{work}/2", "--no-restart").stdout.splitlines()
         assert atlas.stop() == 0
     scans = [json.loads(line) for line in done[:-1]]
-    good = [scan for scan in scans if scan["health"] == "good"]
-    wrong = sum(scan["error_m"] > 1.0 for scan in good)
-    print(f"one deck mapped: {len(good)} of {len(scans)} scans good, {wrong} of them elsewhere; "
+    good, wrong = good_and_wrong(scans)
+    print(f"one deck mapped: {good} of {len(scans)} scans good, {wrong} of them elsewhere; "
           f"the last one {scans[-1]['health']}, {scans[-1]['error_m']} m off")
-    assert len(good) >= 40 and wrong == 0
+    assert good >= 40 and wrong == 0
     assert scans[-1]["health"] == "lost" and scans[-1]["error_m"] < 1.0
 
 
 def told(bin_dir):
     """The same garage, whoever starts off the map: told how high he is he is taken to no other deck, in none of three ways."""
     with tempfile.TemporaryDirectory() as work:
-        atlas = Atlas(bin_dir, work)
-        for seed in (0, 1):
-            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed)],
-                           check=True, stdout=subprocess.DEVNULL)
-        atlas.run("ingest", f"{work}/0", "--range", "0:60")
-        atlas.run("wait")
+        atlas = one_deck_mapped(bin_dir, work, 1)
         near = ("--prior-height", 1, "--prior-radius", 1)
         tracked = atlas.call("localize", f"{work}/1", "--no-restart", *near).stdout.splitlines()
         alone = [json.loads(atlas.call("localize", f"{work}/1", "--scans", "odd", "--relocalize", *height).stdout
@@ -310,12 +315,11 @@ def told(bin_dir):
         states = [session["state"] for session in json.loads(anchored.stdout)["session_states"]]
         assert atlas.stop() == 0
     scans = [json.loads(line) for line in tracked[:-1]]
-    good = [scan for scan in scans if scan["health"] == "good"]
-    wrong = sum(scan["error_m"] > 1.0 for scan in good)
-    print(f"started off the map: {len(good)} of {len(scans)} scans good, {wrong} of them elsewhere; the last one "
+    good, wrong = good_and_wrong(scans)
+    print(f"started off the map: {good} of {len(scans)} scans good, {wrong} of them elsewhere; the last one "
           f"{scans[-1]['health']}, {scans[-1]['error_m']} m off; alone {alone[0]['wrong']} wrong, with a height "
           f"{alone[1]['wrong']}, {alone[1]['right']} right; anchored: {anchored.returncode}, {states}")
-    assert len(good) >= 40 and wrong == 0 and scans[-1]["health"] == "good"
+    assert good >= 40 and wrong == 0 and scans[-1]["health"] == "good"
     assert alone[0]["wrong"] > 20, "else there is nothing to tell"
     assert alone[1]["wrong"] <= 1 and alone[1]["right"] >= alone[0]["right"]
     assert anchored.returncode == 3 and states == ["staged"]

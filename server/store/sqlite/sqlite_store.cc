@@ -13,7 +13,7 @@
 #include "server/store/sqlite/connection/sync_guard.h"
 #include "server/store/sqlite/connection/write_queue.h"
 #include "server/store/sqlite/data_directory.h"
-#include "server/store/sqlite/database_files.h"
+#include "server/store/sqlite/database_room.h"
 #include "server/store/sqlite/revision_note.h"
 #include "server/store/sqlite/schema/counters.h"
 #include "server/store/sqlite/schema/index_check.h"
@@ -58,21 +58,6 @@ constexpr std::size_t kFewPoses = 64;  // of a batch, that shares a transaction 
 
 std::uint64_t ReadRevision(Connection& connection) {
   return ReadCounter(connection, Counter::kRevision);
-}
-
-// What is written to a file that has another place by now is lost with it.
-DiskRoom::Read FreeBytesBeside(const std::filesystem::path& database) {
-  const auto opened = DatabaseFiles::Look(database);
-  return [database, inode = opened ? opened->inode : 0]() -> Result<std::uint64_t> {
-    const auto files = DatabaseFiles::Look(database);
-    if (!files || files->inode != inode) {
-      return Error(StatusCode::kUnavailable,
-                   StrCat(database.string(),
-                          " is not the file that is open any more, it was moved, removed or "
-                          "replaced: put it back, or stop the daemon and see to it"));
-    }
-    return ReadFreeBytes(database.parent_path());
-  };
 }
 
 class SqliteStore final : public AtlasStore {
