@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs, builds once and runs every test. Usage: deploy/test.sh [--sanitize [--without-fuzzers] [--minutes N]] [--long]
-#   --sanitize  also ASan+UBSan over unit and integration tests at a tenth of the scale, but those that
-#               compute for minutes (label compute), TSan over the tests labelled threads, and 10 s of
-#               each fuzzer
+#   --sanitize  also TSan over the tests labelled threads, ASan+UBSan over unit and integration tests at a
+#               tenth of the scale, but (without --long) those that compute for minutes (label compute),
+#               and 10 s of each fuzzer
 #   --without-fuzzers
 #               these not: what they found before and mutations of it are tried under ASan all the same
 #   --minutes N what a sanitizer has to build or to run is left out, and said so, where so many minutes are over
@@ -45,32 +45,60 @@ report_property() {
     }' "build/$1/Testing/Temporary/LastTest.log"
 }
 
-# run PRESET TARGET CTEST_ARGUMENT...: configures, builds, tests.
-run() {
+# build_and_test PRESET TARGET CTEST_ARGUMENT...: configures, builds, tests.
+build_and_test() {
   local preset=$1 target=$2
   shift 2
   echo "== $preset"
   cmake --preset "$preset" >/dev/null
   cmake --build "build/$preset" --target "$target"
-  ctest --test-dir "build/$preset" --output-on-failure --no-tests=error --timeout 900 -j 2 "$@"
+  run_tests "$preset" "$@"
   report_property "$preset"
 }
 
-# run_in_time SECONDS PRESET TARGET CTEST_ARGUMENT...: the same, if it is built so long before the time is up.
-run_in_time() {
-  local tests_s=$1 preset=$2 target=$3
+run_tests() {
+  local preset=$1
   shift
-  if [[ -n $minutes ]]; then
-    local left_s=$((60 * minutes - SECONDS - tests_s)) status=0
-    cmake --preset "$preset" >/dev/null
-    ((left_s > 0)) && timeout "$left_s" cmake --build "build/$preset" --target "$target" || status=$?
-    if ((left_s <= 0 || status == 124)); then
-      echo "== $preset: LEFT OUT, $((SECONDS / 60)) of $minutes minutes are over; deploy/test.sh --sanitize has all of it"
-      return
-    fi
-    ((status == 0)) || return "$status"
+  ctest --test-dir "build/$preset" --output-on-failure --no-tests=error --timeout 900 -j 2 "$@"
+}
+
+# left_out PRESET WHAT: says what the minutes were too few for.
+left_out() {
+  echo "== $1: LEFT OUT $2, $((SECONDS / 60)) of $minutes minutes are over; deploy/test.sh --sanitize has all of it"
+}
+
+# build_and_test_in_time RESERVE_S PRESET TARGET CTEST_ARGUMENT...: the same where there are no minutes. Where there are,
+# what is not built or tested RESERVE_S seconds before they are over is left out.
+build_and_test_in_time() {
+  local reserve_s=$1 preset=$2 target=$3
+  shift
+  if [[ -z $minutes ]]; then
+    build_and_test "$@"
+    return
   fi
-  run "$@"
+  local left_s=$((60 * minutes - reserve_s - SECONDS)) status=0
+  echo "== $preset"
+  cmake --preset "$preset" >/dev/null
+  ((left_s > 0)) && timeout "$left_s" cmake --build "build/$preset" --target "$target" || status=$?
+  if ((left_s <= 0 || status == 124)); then
+    left_out "$preset" "all of it"
+    return
+  fi
+  ((status == 0)) || return "$status"
+  shift 2
+  # What runs when the time is up is ended and counts as failed: it, and nothing else, is run again.
+  local log=build/$preset/until_the_time_is_up.log
+  left_s=$((60 * minutes - reserve_s - SECONDS))
+  run_tests "$preset" "$@" --stop-time "$(date -d "+$((left_s > 1 ? left_s : 1)) seconds" +%T)" 2>&1 | tee "$log" || status=$?
+  if grep -q '^The stop time has been passed' "$log"; then
+    left_out "$preset" "the last of $(sed -n 's|^ *[0-9]*/\([0-9]*\) Test .*|\1|p' "$log" | head -1) tests"
+    if ((status != 0)) && ! grep -q '\*\*\*\(Failed\|Exception\|Not Run\)' "$log"; then
+      status=0
+      run_tests "$preset" --rerun-failed || status=$?
+    fi
+  fi
+  ((status != 0)) || report_property "$preset"
+  return "$status"
 }
 
 scale=1
@@ -79,12 +107,15 @@ scale=1
 unset ATLAS_PROPERTY_CASES
 ((long)) && export ATLAS_PROPERTY_CASES=10000
 export ATLAS_TEST_SCALE=$scale
-run dev all
+build_and_test dev all
 if ((sanitize)); then
   unset ATLAS_PROPERTY_CASES
   export ATLAS_TEST_SCALE=0.1
-  run_in_time 900 asan all -L 'unit|integration' -LE 'data|compute'
-  run_in_time 420 tsan threads_tests -L threads
+  too_long_for_asan='data|compute'
+  ((!long)) || too_long_for_asan='data'
+  # The quicker one first: where there are minutes the other has what is left of them.
+  build_and_test_in_time 300 tsan threads_tests -L threads
+  build_and_test_in_time 300 asan all -L 'unit|integration' -LE "$too_long_for_asan"
   ((fuzzers == 0)) || deploy/fuzz.sh 10
 fi
 if ((long)); then

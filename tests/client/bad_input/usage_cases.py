@@ -114,8 +114,10 @@ def usage_cases(cases, drives):
         return word.replace("DRIVE", str(drives.good)).replace("WORK", str(drives.folder))
 
     for command, lines in USAGE.items():
+        before = cases.state()
         for line in lines:
-            cases.refused(" ".join([command, *line]), [command, *map(filled, line)], "invalid_argument")
+            cases.refused_line(" ".join([command, *line]), [command, *map(filled, line)], "invalid_argument")
+        cases.report.equal(f"{command}: the atlas", cases.state(), before)
     cases.refused("no command", [], "invalid_argument")
     cases.refused("unknown command", ["teleport"], "invalid_argument", "teleport")
     cases.typed("unknown command after a flag", cases.call("--json", "teleport").stderr, "invalid_argument",

@@ -6,14 +6,15 @@
 
 #include <boost/json/parse.hpp>
 
-#include "tests/client/end_to_end/end_to_end_fixture.h"
+#include "client/drive/drive_ingest.h"
+#include "tests/client/end_to_end/vehicle_fixture.h"
 #include "tests/server/http/http_peer.h"
 #include "tests/server/net/blocking_peer.h"
 
 namespace atlas {
 namespace {
 
-class OperationsEndToEndTest : public EndToEndTest {
+class OperationsEndToEndTest : public VehicleTest {
  protected:
   static void Write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
   static fs::path NewFile() {
@@ -102,7 +103,13 @@ TEST_F(OperationsEndToEndTest, AFailedSyncEndsTheDaemonAndNothingAcknowledgedIsL
   ASSERT_EQ(Ingest(daemon, {"--session", "first"}).exit_code, 0);
   ASSERT_EQ(RunAtlas(daemon.address(), {"wait"}).exit_code, 0);
   Write(switched_on, "");
-  EXPECT_NE(Ingest(daemon, {"--session", "second"}).exit_code, 0);
+  IngestOptions second;
+  second.session = {"vehicle", "second"};
+  second.max_range_m = 12.0;
+  second.upload.patience = std::chrono::milliseconds(300);  // the command's is a minute
+  AtlasLink link = LinkTo(*Endpoint::Parse(daemon.address()));
+  const auto drive = OpenDriveFolder(shared_drive.string());
+  EXPECT_FALSE(IngestDrive(*drive, second, link, {}));
   const std::string line = daemon.ReadLogUntil("[critical]");
   EXPECT_NE(line.find("the disk failed to sync"), std::string::npos) << line;
   EXPECT_NE(daemon.ReadLogUntil("stopped"), "");

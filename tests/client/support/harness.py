@@ -106,11 +106,17 @@ class Cases:
         return self.run("digest"), self.run("sessions")
 
     def refused(self, name, args, code, says="", is_stream=False, reason=None, **run):
-        """`args` fail with `code` and a message that holds `says`, with and without --json; the stdout.
+        """`args` are refused as `refused_line` says, and leave the atlas as it was."""
+        before = self.state()
+        done = self.refused_line(name, args, code, says, is_stream, reason, **run)
+        self.report.equal(f"{name}: the atlas", self.state(), before)
+        return done
+
+    def refused_line(self, name, args, code, says="", is_stream=False, reason=None, **run):
+        """`args` fail with `code` and a message that holds `says`, with and without --json; what they print.
 
         A stream may have begun; it has no summary then. `reason`: what the JSON says beside the code.
         """
-        before = self.state()
         plain = self.call(*args, **run)
         self.report.equal(f"{name}: exit code", plain.returncode, EXIT[code])
         self.report.check(f"{name}: message", plain.stderr.startswith("atlas: ") and says in plain.stderr,
@@ -120,7 +126,6 @@ class Cases:
         self.report.check(f"{name}: stdout", "summary" not in done.stdout if is_stream else not done.stdout,
                           done.stdout)
         self.typed(name, done.stderr, code, says, reason)
-        self.report.equal(f"{name}: the atlas", self.state(), before)
         return done
 
     def forbidden(self, name, args, says, is_stream=False):
