@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -114,6 +115,15 @@ void DaemonProcess::Signal(int signal) const {
   // kill(-1, ...) is everybody.
   if (pid_ <= 0) throw std::logic_error("a signal to a daemon that was stopped");
   kill(pid_, signal);
+}
+
+void DaemonProcess::LimitFiles(std::uint64_t bytes) const {
+  if (pid_ <= 0) throw std::logic_error("a limit for a daemon that was stopped");
+  rlimit limit{};
+  bool is_set = prlimit(pid_, RLIMIT_FSIZE, nullptr, &limit) == 0;
+  limit.rlim_cur = bytes;
+  is_set = is_set && prlimit(pid_, RLIMIT_FSIZE, &limit, nullptr) == 0;
+  if (!is_set) throw std::runtime_error("the limit of files is refused");
 }
 
 std::string DaemonProcess::ReadLogUntil(const std::string& words) {

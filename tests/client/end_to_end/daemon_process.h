@@ -36,6 +36,9 @@ class DaemonProcess {
   // Of the operations port; for a daemon with `--http`.
   std::uint16_t http_port() const { return PortOf(http_address_); }
   void Signal(int signal) const;
+  // No file of it grows beyond so many bytes from now on (RLIMIT_FSIZE). Throws when the system
+  // refuses that.
+  void LimitFiles(std::uint64_t bytes) const;
   // Reads what a daemon with a kept log says, up to a line that has this in it: that line. Empty
   // when it says no such thing for half a minute.
   std::string ReadLogUntil(const std::string& words);

@@ -5,6 +5,7 @@
 #include <future>
 
 #include <boost/json/parse.hpp>
+#include <sys/resource.h>
 
 #include "client/drive/drive_ingest.h"
 #include "tests/client/end_to_end/vehicle_fixture.h"
@@ -158,6 +159,24 @@ TEST_F(OperationsEndToEndTest, ADiskThatBecomesReadOnlyStopsUploadsUntilItIsNot)
   EXPECT_EQ(daemon.Stop(SIGTERM), 0);
 }
 #endif
+
+TEST_F(OperationsEndToEndTest, AFileThatMayNotGrowStopsChangesUntilItMay) {
+  DaemonProcess daemon(NewData(), kSmall);
+  ASSERT_EQ(Ingest(daemon).exit_code, 0);
+  const std::string before = Digest(daemon);
+  daemon.LimitFiles(4'096);
+  const CommandRun refused = RunAtlas(daemon.address(), {"vehicle", "retract", "vehicle"});
+  EXPECT_EQ(refused.exit_code, 5) << refused.out << refused.err;
+  EXPECT_NE(refused.err.find("no file may be larger than 4096 bytes here (ulimit -f)"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_EQ(Digest(daemon), before) << "reads go on";
+
+  daemon.LimitFiles(RLIM_INFINITY);
+  EXPECT_EQ(RunAtlas(daemon.address(), {"vehicle", "retract", "vehicle"}).exit_code, 0);
+  EXPECT_NE(Digest(daemon), before);
+  EXPECT_EQ(daemon.Stop(SIGTERM), 0);
+}
 
 TEST_F(OperationsEndToEndTest, ADaemonThatDrainsTells) {
   DaemonProcess daemon(NewData(), {"--cell-size", "0.2", "--http", "127.0.0.1:0"});

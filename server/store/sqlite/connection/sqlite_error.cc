@@ -1,10 +1,12 @@
 #include "server/store/sqlite/connection/sqlite_error.h"
 
 #include <new>
+#include <string>
 #include <string_view>
 
 #include <SQLiteCpp/Exception.h>
 #include <sqlite3.h>
+#include <sys/resource.h>
 
 #include "core/base/str_cat.h"
 
@@ -71,6 +73,16 @@ const char* AdviceOf(const SQLite::Exception& error) {
                                                               : "; restore a backup";
 }
 
+// A write beyond RLIMIT_FSIZE is an error of the disk to SQLite.
+std::string LimitOfFiles(const SQLite::Exception& error) {
+  rlimit limit{};
+  if (error.getExtendedErrorCode() != SQLITE_IOERR_WRITE ||
+      ::getrlimit(RLIMIT_FSIZE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) {
+    return "";
+  }
+  return StrCat("; no file may be larger than ", limit.rlim_cur, " bytes here (ulimit -f)");
+}
+
 }  // namespace
 
 Status StatusFromSqlite(const SQLite::Exception& error) {
@@ -94,8 +106,9 @@ Status StatusFromSqlite(const SQLite::Exception& error) {
                SQLITE_IOERR_SHMSIZE, ")"));
   }
   const int primary = error.getErrorCode() & 0xFF;
-  return Status(CodeOf(primary), StrCat("store: ", error.what(), " (SQLite ",
-                                        error.getExtendedErrorCode(), ")", AdviceOf(error)));
+  return Status(CodeOf(primary),
+                StrCat("store: ", error.what(), " (SQLite ", error.getExtendedErrorCode(), ")",
+                       AdviceOf(error), LimitOfFiles(error)));
 }
 
 Status StatusFromSqliteCode(int code, const char* what) {
