@@ -6,6 +6,7 @@
 #include "core/keyframe/keyframe_codec.h"
 #include "tests/client/end_to_end/vehicle_fixture.h"
 #include "tests/core/support/keyframe_worlds.h"
+#include "tests/core/support/test_scale.h"
 
 namespace atlas {
 namespace {
@@ -15,7 +16,6 @@ using std::chrono::milliseconds;
 
 constexpr std::uint32_t kKeyframes = 24;
 constexpr milliseconds kDeadline{400};
-constexpr milliseconds kSlack{600};  // what a busy machine adds
 
 TEST_F(VehicleTest, ASpoolGoesOnOverAsManyCallsAsASlowLinkTakesAndSendsNothingTwice) {
   DaemonProcess daemon(NewData(), kSmall);
@@ -46,7 +46,7 @@ TEST_F(VehicleTest, ASpoolGoesOnOverAsManyCallsAsASlowLinkTakesAndSendsNothingTw
     all.acknowledged += report->acknowledged;
   }
   RecordProperty("longest_ms", static_cast<int>(longest.count()));
-  EXPECT_LT(longest, kDeadline + kSlack);
+  EXPECT_LT(longest, kDeadline + testing::Slack(600));
   EXPECT_GT(calls, 3);
   EXPECT_EQ(all.sent, kKeyframes);
   EXPECT_EQ(all.acknowledged, kKeyframes);

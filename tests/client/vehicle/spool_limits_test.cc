@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/client/vehicle/spool_peer.h"
+#include "tests/core/support/test_scale.h"
 
 namespace atlas {
 namespace {
@@ -14,7 +15,6 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kDeadline{300};
-constexpr milliseconds kSlack{700};  // what a busy machine adds
 
 // Takes keyframes, answers only while it is open, and does not even read while it is asleep.
 class GatedPeer {
@@ -85,7 +85,7 @@ class GatedPeer {
   TestPeer peer_;
 };
 
-class SpoolLimitsTest : public testing::Test {
+class SpoolLimitsTest : public ::testing::Test {
  protected:
   void Put(std::uint32_t count, std::size_t bytes = 100) {
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -95,7 +95,7 @@ class SpoolLimitsTest : public testing::Test {
   SpoolReport Send(AtlasClient& client, const SendLimits& limits = {.deadline = kDeadline}) {
     const Clock::time_point start = Clock::now();
     const auto report = spool_.Send(client, limits);
-    EXPECT_LT(Clock::now() - start, limits.deadline + kSlack);
+    EXPECT_LT(Clock::now() - start, limits.deadline + testing::Slack(700));
     EXPECT_TRUE(report) << report.error().message();
     return report.value_or(SpoolReport());
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -23,6 +24,11 @@ inline std::uint32_t Scaled(std::uint32_t usual) {
 // smaller one.
 inline std::uint32_t Stride(std::uint32_t usual = 1) {
   return static_cast<std::uint32_t>(std::max(1.0, std::round(usual / std::max(Scale(), 0.01))));
+}
+
+// What a busy machine adds to a deadline, in milliseconds; ten times as much under sanitizers.
+inline std::chrono::milliseconds Slack(int usual_ms) {
+  return std::chrono::milliseconds(Scale() < 1.0 ? 10 * usual_ms : usual_ms);
 }
 
 }  // namespace atlas::testing
