@@ -53,7 +53,11 @@ std::optional<RouteFile> ParseGeoJson(const std::string& text) {
   const boost::json::value root = boost::json::parse(text, error);
   if (error) return std::nullopt;
   const boost::json::value* line = root.find_pointer("/geometry/coordinates", error);
-  auto points = line == nullptr ? std::nullopt : ParsePositions(*line);
+  if (line == nullptr) return std::nullopt;
+  // A route that ends where it begins is a Point (RFC 7946, 3.1.2), all others are a LineString.
+  const boost::json::value* type = root.find_pointer("/geometry/type", error);
+  const bool is_point = type != nullptr && *type == "Point";
+  auto points = ParsePositions(is_point ? boost::json::value(boost::json::array{*line}) : *line);
   if (!points) return std::nullopt;
   return RouteFile{*std::move(points), ParseAtlas(root)};
 }

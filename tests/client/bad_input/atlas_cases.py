@@ -158,7 +158,9 @@ def target_cases(cases, drives, work):
     file = drives.good / "poses.txt"
     cases.refused("render into a missing folder", ["render", "-o", closed / "nowhere/map.png"], "not_found",
                   "nowhere")
-    cases.refused("render over a folder", ["render", "-o", drives.good], "conflict", "good")
+    picture = drives.folder / "folder.png"
+    picture.mkdir()
+    cases.refused("render over a folder", ["render", "-o", picture], "conflict", "folder.png")
     cases.refused("render into a file", ["render", "-o", file / "map.png"], "conflict", "map.png")
     cases.forbidden("render into a closed folder", ["render", "-o", closed / "map.png"], "map.png")
     for line in (["localize", drives.good, "--output"], ["localize", drives.good, "--plot"],

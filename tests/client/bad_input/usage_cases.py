@@ -97,7 +97,7 @@ USAGE = {
                ["--points", "WORK/x.pcd", "--center", "0,0"], ["--points", "WORK/x.pcd", "--radius", "5"],
                ["--points", "WORK/x.ply", "--center", "0,0", "--radius", "-5"],
                ["--points", "WORK/x.ply", "--center", "0,nan", "--radius", "5"]],
-    "render": [[], ["-o"], ["-o", "WORK/x.png", "--layer", "middle"], ["-o", "WORK/x.png", "--layer", "-1"],
+    "render": [[], ["-o"], ["-o", "WORK/x.jpg"], ["-o", "WORK/x"], ["-o", "WORK/x.png", "--layer", "middle"], ["-o", "WORK/x.png", "--layer", "-1"],
                ["-o", "WORK/x.png", "--color", "pink"], ["-o", "WORK/x.png", "--contradictions", "WORK/x.txt"]],
     "simulate": [[], ["street"], ["moon", "-o", "WORK/moon"], ["street", "-o", "WORK/s", "--sensor", "sonar"],
                  ["street", "-o", "WORK/s", "--seed", "-1"], ["WORK/x.obj", "-o", "WORK/s"],

@@ -67,6 +67,9 @@ class RenderCommand : public Command {
   }
 
   Status Run(CommandContext& context) override {
+    if (!file_.ends_with(".png")) {
+      return {StatusCode::kInvalidArgument, StrCat(file_, ": expected a name that ends in .png")};
+    }
     RenderOptions options;
     const auto layer = LayerChoice::Parse(layer_);
     if (!layer) return layer.error();

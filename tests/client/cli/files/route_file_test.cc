@@ -55,6 +55,17 @@ TEST_F(RouteFileTest, BothFormatsAreReadAsTheyWereWritten) {
   }
 }
 
+TEST_F(RouteFileTest, ARouteThatEndsWhereItBeginsIsReadAsWell) {
+  route_.waypoints.resize(1);
+  route_.clearance_m.resize(1);
+  route_.slope_deg.resize(1);
+  for (const std::string name : {"a.geojson", "a.csv"}) {
+    const auto read = ReadRoute(Write(name, Text(*RouteFormatOf(name))));
+    ASSERT_TRUE(read.has_value()) << read.error().message();
+    EXPECT_EQ(read->waypoints, route_.waypoints) << name;
+  }
+}
+
 TEST_F(RouteFileTest, EndsThatWereMovedSaySoAndOthersDoNot) {
   const auto properties =
       boost::json::parse(Text(RouteFormat::kGeoJson)).at("properties").as_object();
@@ -100,7 +111,9 @@ TEST_F(RouteFileTest, WhatIsNoRouteIsInvalidData) {
   int i = 0;
   for (const std::string text :
        {"", "{}", "[1,2", R"({"geometry":null})", R"({"geometry":{"coordinates":[[1,2]]}})",
-        R"({"geometry":{"coordinates":[]}})", R"({"geometry":{"coordinates":[[1,2,"x"]]}})",
+        R"({"geometry":{"coordinates":[]}})", R"({"geometry":{"type":"Point","coordinates":[]}})",
+        R"({"geometry":{"type":"Point","coordinates":[[1,2,3]]}})",
+        R"({"geometry":{"coordinates":[[1,2,"x"]]}})",
         R"({"geometry":{"coordinates":[[1,2,1e999]]}})"}) {
     const auto read = ReadRoute(Write(std::to_string(i++) + ".geojson", text));
     ASSERT_FALSE(read.has_value()) << text;
