@@ -82,7 +82,9 @@ Status ParseValue(const std::string& text, std::chrono::milliseconds& value) {
 }
 
 Status ParseValue(const std::string& text, Eigen::Vector2d& value) {
-  return ReadList(text, std::span(value.data(), 2)) ? Status() : Expected("two numbers with a comma between them", text);
+  return ReadList(text, std::span(value.data(), 2))
+             ? Status()
+             : Expected("two numbers with a comma between them", text);
 }
 
 Status ParseValue(const std::string& text, Eigen::Vector3d& value) {
