@@ -115,8 +115,8 @@ if ((sanitize)); then
   too_long_for_asan='data|compute'
   ((!long)) || too_long_for_asan='data'
   # The quicker one first: where there are minutes the other has what is left of them.
-  build_and_test_in_time 300 tsan threads_tests -L threads
-  build_and_test_in_time 300 asan all -L 'unit|integration' -LE "$too_long_for_asan"
+  build_and_test_in_time 600 tsan threads_tests -L threads
+  build_and_test_in_time 600 asan all -L 'unit|integration' -LE "$too_long_for_asan"
   ((fuzzers == 0)) || deploy/fuzz.sh 10
 fi
 if ((long)); then
