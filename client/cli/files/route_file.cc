@@ -57,7 +57,7 @@ std::optional<RouteFile> ParseGeoJson(const std::string& text) {
   // A route that ends where it begins is a Point (RFC 7946, 3.1.2), all others are a LineString.
   const boost::json::value* type = root.find_pointer("/geometry/type", error);
   const bool is_point = type != nullptr && *type == "Point";
-  auto points = ParsePositions(is_point ? boost::json::value(boost::json::array{*line}) : *line);
+  auto points = is_point ? ParsePositions(boost::json::array{*line}) : ParsePositions(*line);
   if (!points) return std::nullopt;
   return RouteFile{*std::move(points), ParseAtlas(root)};
 }
