@@ -49,7 +49,7 @@ class DriveLocalization {
           DisturbedLevel(scan.T_world_sensor, options_.tilt_error_rad, seed);
       localizer_.Start(PerturbedStart(scan.T_world_sensor, R_level_sensor,
                                       options_.shots->translation_m, options_.shots->yaw_rad, seed),
-                       std::nullopt);
+                       StartHint{options_.shots->translation_m, options_.shots->yaw_rad});
       LocalizedScan localized;
       localized.trial = trial;
       ATLAS_RETURN_IF_ERROR(Localize(scan, cloud, R_level_sensor, localized));
@@ -72,7 +72,7 @@ class DriveLocalization {
 
   void Start(const DriveScan& scan) {
     if (!options_.start) {
-      localizer_.Start(scan.T_world_sensor, std::nullopt);
+      localizer_.Start(scan.T_world_sensor, StartHint());
       return;
     }
     const double radius_m = options_.start->radius_m;

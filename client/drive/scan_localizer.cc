@@ -37,8 +37,8 @@ class AtlasScanLocalizer : public ScanLocalizer {
         localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})),
         on_localization_(std::move(on_localization)) {}
 
-  void Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance) override {
-    localizer_.Start(T_world_sensor, covariance);
+  void Start(const Pose& T_world_sensor, const StartKnowledge& known) override {
+    localizer_.Start(T_world_sensor, known);
   }
 
   Result<LocatedScan> Locate(const PointCloud& cloud,
@@ -79,8 +79,7 @@ class PaperScanLocalizer : public ScanLocalizer {
   PaperScanLocalizer(KeyframeBuilder builder, const PaperLocalizerOptions& options, MapView& view)
       : builder_(std::move(builder)), localizer_(view.profile(), TilesOf(view), options) {}
 
-  void Start(const Pose& T_world_sensor,
-             const std::optional<PoseCovariance>& /*covariance*/) override {
+  void Start(const Pose& T_world_sensor, const StartKnowledge& /*known*/) override {
     localizer_.Start(T_world_sensor);
   }
 

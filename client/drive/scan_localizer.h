@@ -28,10 +28,9 @@ class ScanLocalizer {
   ScanLocalizer& operator=(const ScanLocalizer&) = delete;
   virtual ~ScanLocalizer() = default;
 
-  // Forgets the motion; the next scan is near `T_world_sensor`. A `covariance` is believed
-  // (core/localization/localizer.h) by methods that know how sure they are.
-  virtual void Start(const Pose& T_world_sensor,
-                     const std::optional<PoseCovariance>& covariance) = 0;
+  // Forgets the motion; the next scan is near `T_world_sensor`. Methods that know how sure they are
+  // go by how well that is known (core/localization/localizer.h).
+  virtual void Start(const Pose& T_world_sensor, const StartKnowledge& known) = 0;
   // Requires Start(). `R_level_sensor` is what the IMU says; the scan comes `scans` times the usual
   // time after the last one. Errors are those of the map's source.
   virtual Result<LocatedScan> Locate(const PointCloud& cloud,

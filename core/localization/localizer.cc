@@ -25,9 +25,9 @@ PlaceTracker Localizer::NewTracker() const {
   return {profile_, tiles_, options_.tracker, static_cast<double>(options_.features.max_range_m)};
 }
 
-void Localizer::Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance) {
+void Localizer::Start(const Pose& T_world_sensor, const StartKnowledge& known) {
   places_.erase(places_.begin() + 1, places_.end());
-  places_.front().tracker.Start(T_world_sensor, covariance);
+  places_.front().tracker.Start(T_world_sensor, known);
   astray_ = 0;
 }
 

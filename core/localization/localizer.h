@@ -61,13 +61,12 @@ class Localizer {
             const LocalizerOptions& options,
             RelocalizerSource relocalizer = {});
 
-  // Forgets the motion; the next scan is near `T_world_sensor`. With a `covariance`, positive
-  // definite, that is believed: no place counts that is further than 3.5 standard deviations from
-  // it in the plane, or three in height, and where the map has none so near, the vehicle goes on
-  // from there by its own motion, lost, until it has. Without one the start is a hint: the scan is
-  // believed where they differ.
-  void Start(const Pose& T_world_sensor,
-             const std::optional<PoseCovariance>& covariance = std::nullopt);
+  // Forgets the motion; the next scan is near `T_world_sensor`. A covariance is believed: no place
+  // counts that is further than 3.5 standard deviations from it in the plane, or three in height,
+  // and where the map has none so near, the vehicle goes on from there by its own motion, lost,
+  // until it has. A hint is not. Either way, places that fit as well so near make the first scans
+  // weak: bays and posts repeat.
+  void Start(const Pose& T_world_sensor, const StartKnowledge& known = StartHint());
 
   // How the sensor is taken to move from one scan to the next, in its own frame: what scans are to
   // be deskewed by. Identity as long as nothing is known of it.

@@ -39,16 +39,17 @@ PlaceTracker::PlaceTracker(const MapProfile& profile,
       confirmation_(options.confirmation, options.registration),
       recent_(options.odometry.scans) {}
 
-void PlaceTracker::Start(const Pose& T_world_sensor,
-                         const std::optional<PoseCovariance>& covariance) {
-  if (covariance) {
+void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known) {
+  const auto* covariance = std::get_if<PoseCovariance>(&known);
+  is_told_ = covariance != nullptr;
+  if (is_told_) {
     motion_.Start(T_world_sensor, *covariance);
   } else {
     motion_.Start(T_world_sensor);
+    hint_ = std::get<StartHint>(known);
   }
   confirmation_.Trust();
   is_first_ = true;
-  is_told_ = covariance.has_value();
   usual_fit_ = 0.0;
   lost_ = 0;
   unheld_ = 0;
@@ -58,7 +59,7 @@ void PlaceTracker::Start(const Pose& T_world_sensor,
 }
 
 void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
-  Start(T_world_sensor, std::nullopt);
+  Start(T_world_sensor, StartHint());
   confirmation_.Doubt();
   usual_fit_ = usual_fit;
 }
@@ -94,11 +95,14 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   }
   result.registration = std::move(tracked.place.registration);
   bool is_found = false;
-  if (IsDoubtful(result.registration) || IsAdrift()) {
-    if (auto found = Search(features, result.registration)) {
-      result.registration = *std::move(found);
+  if (IsDoubtful(result.registration) || IsAdrift() || IsVagueStart()) {
+    Searched searched = Search(features, result.registration);
+    is_found = searched.found.has_value();
+    if (is_found) {
+      result.registration = *std::move(searched.found);
       tracked.rival.reset();
-      is_found = true;
+    } else if (IsVagueStart() && searched.rival) {
+      tracked.rival = searched.rival;
     }
   }
   const Surprise surprise = SurpriseOf(result.registration, features, is_found);
@@ -303,42 +307,51 @@ double PlaceTracker::AdriftReach(const PoseCovariance& covariance) const {
   return std::min(std::ceil(reach_m / kStep_m) * kStep_m, options_.max_adrift_m);
 }
 
-SearchReach PlaceTracker::Reach() const {
+SearchReach PlaceTracker::Reach(bool is_doubtful) const {
   if (IsAdrift()) {
     const HorizontalSpread spread = SpreadOf(motion_.covariance());
     return {std::min(2.0 * spread.along_m, options_.max_adrift_m),
             std::min(2.0 * spread.beside_m, options_.max_adrift_beside_m), options_.adrift_yaw_rad,
             std::atan2(spread.direction.y(), spread.direction.x())};
   }
+  const SearchReach start = IsVagueStart() ? StartReach() : SearchReach{0.0, 0.0, 0.0};
+  if (IsVagueStart() && !is_doubtful) return start;
   const auto widened = [&](double least, double most) {
     return std::min((1 + lost_) * least, most);
   };
   const SearchReach& least = options_.search_reach;
   const SearchReach& most = options_.max_search_reach;
-  return {widened(least.along_m, most.along_m), widened(least.beside_m, most.beside_m),
-          widened(least.yaw_rad, most.yaw_rad)};
+  return {std::max(start.along_m, widened(least.along_m, most.along_m)),
+          std::max(start.beside_m, widened(least.beside_m, most.beside_m)),
+          std::max(start.yaw_rad, widened(least.yaw_rad, most.yaw_rad)), start.direction_rad};
 }
 
-std::optional<RegistrationResult> PlaceTracker::Search(const ScanFeatures& features,
-                                                       const RegistrationResult& tracked) {
+PlaceTracker::Searched PlaceTracker::Search(const ScanFeatures& features,
+                                            const RegistrationResult& tracked) {
   PoseSearchOptions search = options_.search;
-  if (IsAdrift()) {
+  if (IsAdrift() || IsVagueStart()) {
     search.max_columns = options_.adrift_columns;
     search.candidates = options_.adrift_candidates;
   }
-  const bool is_as_expected = !IsDoubtful(tracked);  // else the prior may be wrong, too
+  // Else the prior may be wrong, too, or there is none.
+  const bool is_doubtful = IsDoubtful(tracked);
+  const bool is_as_expected = !is_doubtful && (!is_first_ || is_told_);
+  const bool is_within_start = IsVagueStart() && !is_doubtful;
   std::vector<Place> places{At(tracked, is_as_expected)};
   for (const Pose& start : SearchPoses(map_.coarse(), map_.window().origin(), features,
-                                       Prior().T_world_level, Reach(), search)) {
+                                       Prior().T_world_level, Reach(is_doubtful), search)) {
     Place place =
         At(Register(map_.window(), features, start, options_.registration), is_as_expected);
-    if (IsReachable(place.registration.T_world_level)) places.push_back(std::move(place));
+    const Pose& there = place.registration.T_world_level;
+    if (IsReachable(there) && (!is_within_start || IsWithinStart(there))) {
+      places.push_back(std::move(place));
+    }
   }
   const auto best = std::max_element(places.begin() + 1, places.end(), IsLessLikely);
   if (best == places.end() || !StandsOut(places, *best)) {
-    return std::nullopt;
+    return {std::nullopt, RivalOf(places, places.front())};
   }
-  return best->registration;
+  return {best->registration, std::nullopt};
 }
 
 // The first of `places` is where the vehicle was tracked to.

@@ -122,9 +122,11 @@ struct PlaceTrackerOptions {
   // to be confirmed.
   double expected_m = 3.0;
   double expected_rad = 1.2;
-  // A first scan that is found further than this from the start that was told has to be, too.
-  double told_m = 1.0;
-  double told_rad = 0.1;
+  // A first scan has to be confirmed where it is found further than this beyond what is told of the
+  // start.
+  double beyond_start_m = 0.5;
+  double beyond_start_rad = 0.05;
+  double start_up_m = 1.0;  // in height, whatever is told
   // One whose height is not sure is tried on surfaces so far from each other.
   double told_step_m = 0.4;
 };
@@ -137,10 +139,10 @@ class PlaceTracker {
                const PlaceTrackerOptions& options,
                double max_range_m);
 
-  // Forgets the motion; the next scan is near `T_world_sensor`: known to be there, so well or
-  // more or less, or supposed, until scans confirm it by fitting as those before did (`usual_fit`;
-  // 0 where none did).
-  void Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance);
+  // Forgets the motion; the next scan is near `T_world_sensor`: known to be there, so well, or
+  // supposed, until scans confirm it by fitting as those before did (`usual_fit`; 0 where none
+  // did).
+  void Start(const Pose& T_world_sensor, const StartKnowledge& known);
   void Suppose(const Pose& T_world_sensor, double usual_fit);
 
   // How the sensor is taken to move from one scan to the next, in its own frame. Identity as long
@@ -223,11 +225,17 @@ class PlaceTracker {
   bool IsBack(const RegistrationResult& result, const ScanFeatures& features) const;
   bool IsAdrift() const;
   double AdriftReach(const PoseCovariance& covariance) const;
-  SearchReach Reach() const;
-  // The likeliest place around where the scan was expected, if it stands out from `tracked` and all
-  // others.
-  std::optional<RegistrationResult> Search(const ScanFeatures& features,
-                                           const RegistrationResult& tracked);
+  SearchReach Reach(bool is_doubtful) const;
+  // Places around where the scan was expected.
+  struct Searched {
+    std::optional<RegistrationResult> found;  // likelier than `tracked`, and than all others
+    std::optional<Eigen::Vector2d> rival;     // as likely as `tracked`, from there
+  };
+  Searched Search(const ScanFeatures& features, const RegistrationResult& tracked);
+  // Whether a start is so vague that other places in it count.
+  bool IsVagueStart() const;
+  SearchReach StartReach() const;
+  bool IsWithinStart(const Pose& T_world_level) const;
   bool StandsOut(const std::vector<Place>& places, const Place& best) const;
   // Whether a place is where a vehicle that was known to be somewhere can be now.
   enum class Surprise : std::uint8_t {
@@ -266,6 +274,7 @@ class PlaceTracker {
   Confirmation confirmation_;
   bool is_first_ = true;
   bool is_told_ = false;               // where it is at the first scan, and how surely
+  StartHint hint_;                     // where it is not
   double scans_ = 1.0;                 // from the last scan to the next
   double usual_fit_ = 0.0;             // of good results, exponentially forgotten
   int lost_ = 0;                       // scans in a row

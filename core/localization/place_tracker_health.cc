@@ -15,7 +15,7 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
   const Eigen::Vector4d off = PoseDifference(prior.T_world_level, result.T_world_level);
   if (is_first_ && carried_ == 0) {
     const bool is_told =
-        off.head<3>().norm() <= options_.told_m && std::abs(off(3)) <= options_.told_rad;
+        IsWithinStart(result.T_world_level) && std::abs(off(2)) <= options_.start_up_m;
     return is_told ? Surprise::kNone : Surprise::kNew;
   }
   if (carried_ > 0) {

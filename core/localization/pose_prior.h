@@ -1,6 +1,8 @@
 // Where a vehicle is expected, and how surely.
 #pragma once
 
+#include <variant>
+
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
@@ -14,6 +16,16 @@ struct PosePrior {
   Pose T_world_level = Pose::Identity();
   PoseCovariance covariance = PoseCovariance::Zero();
 };
+
+// Where about a vehicle starts, right to so much: along the world's x and y, and in heading; on the
+// right deck. The scan is believed where they differ.
+struct StartHint {
+  double within_m = 3.0;
+  double within_rad = 0.35;
+};
+
+// How well a start is known: a hint, or believed as far as its covariance, positive definite, says.
+using StartKnowledge = std::variant<StartHint, PoseCovariance>;
 
 // (x, y, z, yaw) that take `from` to `to`.
 Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to);

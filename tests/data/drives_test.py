@@ -129,13 +129,13 @@ def localization(bin_dir):
             assert atlas.stop() == 0
     for perturb, pooled in starts.items():
         print(f"starts {perturb} off: {pooled}")
-    near, far = starts.values()
-    assert near.failures == 0 and near.shots == 400
-    assert near.translation() <= 0.025 and near.rotation() <= 0.06
-    assert far.failures <= 0.02 * far.shots
+    for shots in starts.values():
+        assert shots.failures == 0 and shots.shots == 400
+        assert shots.translation() <= 0.025 and shots.rotation() <= 0.06
     print(f"the paper's method: {paper}")
     assert paper.failures == 0 and paper.shots == 400
     assert abs(paper.translation() / 0.108 - 1.0) <= 0.15 and abs(paper.rotation() / 0.36 - 1.0) <= 0.15
+    near = starts["0.4,1.5"]
     assert near.translation() < 0.6 * paper.translation() and near.rotation() < 0.6 * paper.rotation()
 
 

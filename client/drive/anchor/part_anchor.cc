@@ -237,7 +237,7 @@ Result<std::optional<FoundScan>> PartAnchoring::FindNear(const DriveScan& scan,
                                                          double& fit) {
   const Result<PointCloud> cloud = ReadScan(scan.scan);
   if (!cloud) return Error(cloud.error());
-  localizer_->Start(T_map_sensor, std::nullopt);
+  localizer_->Start(T_map_sensor, StartHint());
   const Result<LocatedScan> located = localizer_->Locate(*cloud, LevelOf(scan), 1.0);
   if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
   fit = located->fit;

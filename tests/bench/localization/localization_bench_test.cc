@@ -62,7 +62,7 @@ TEST_F(LocalizationBenchTest, RawReturnsOfElsewhereAreNoPlace) {
   ASSERT_TRUE(icp.has_value());
   Pose elsewhere = piece_->drive().scans[1].T_world_sensor;
   elsewhere.translation().x() += 500.0;
-  (*icp)->Start(elsewhere, std::nullopt);
+  (*icp)->Start(elsewhere, StartHint());
   PointCloud cloud;
   cloud.points = {{5.0F, 0.0F, 0.0F}, {6.0F, 0.0F, 0.0F}};
   EXPECT_EQ((*icp)->Locate(cloud, Eigen::Quaterniond::Identity(), 1.0)->health,

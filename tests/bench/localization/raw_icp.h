@@ -39,8 +39,7 @@ class RawIcp : public ScanLocalizer {
                                               const SelectionOptions& selection,
                                               const RawIcpOptions& options);
 
-  void Start(const Pose& T_world_sensor,
-             const std::optional<PoseCovariance>& /*covariance*/) override {
+  void Start(const Pose& T_world_sensor, const StartKnowledge& /*known*/) override {
     T_world_sensor_ = T_world_sensor;
   }
   // Roll and pitch of the start are the IMU's; all six are refined.

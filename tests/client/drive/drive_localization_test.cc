@@ -21,9 +21,9 @@ class ScriptedLocalizer : public ScanLocalizer {
   };
   explicit ScriptedLocalizer(std::vector<Answer> script) : script_(std::move(script)) {}
 
-  void Start(const Pose& T_world_sensor, const std::optional<PoseCovariance>& covariance) override {
+  void Start(const Pose& T_world_sensor, const StartKnowledge& known) override {
     starts.push_back(T_world_sensor);
-    covariances.push_back(covariance);
+    known_starts.push_back(known);
   }
   Result<LocatedScan> Locate(const PointCloud&, const Eigen::Quaterniond&, double) override {
     if (next_ == script_.size()) return Error(StatusCode::kUnavailable, "gone");
@@ -37,7 +37,7 @@ class ScriptedLocalizer : public ScanLocalizer {
   }
 
   std::vector<Pose> starts;
-  std::vector<std::optional<PoseCovariance>> covariances;
+  std::vector<StartKnowledge> known_starts;
 
  private:
   std::vector<Answer> script_;
@@ -102,8 +102,9 @@ TEST_F(DriveLocalizationTest, AStartIsToldAsFarOffAsItMayBeAndBelieved) {
           localizer.starts[i].translation() - Eigen::Vector3d(i == 0 ? 0.0 : 103.0, 0.0, 0.0);
       furthest_m = std::max(furthest_m, off_m.head<2>().norm());
       highest_m = std::max(highest_m, std::abs(off_m.z()));
-      ASSERT_TRUE(localizer.covariances[i]);
-      EXPECT_NEAR(std::sqrt((*localizer.covariances[i])(2, 2)), 0.2, 1e-9) << "three of them";
+      const auto* covariance = std::get_if<PoseCovariance>(&localizer.known_starts[i]);
+      ASSERT_NE(covariance, nullptr);
+      EXPECT_NEAR(std::sqrt((*covariance)(2, 2)), 0.2, 1e-9) << "three of them";
     }
   }
   EXPECT_LE(furthest_m, 2.0);
@@ -115,8 +116,23 @@ TEST_F(DriveLocalizationTest, AStartIsToldAsFarOffAsItMayBeAndBelieved) {
 TEST_F(DriveLocalizationTest, WithoutAnErrorTheStartIsAHint) {
   ScriptedLocalizer localizer(std::vector<ScriptedLocalizer::Answer>(5));
   ASSERT_TRUE(Run(localizer).has_value());
-  ASSERT_EQ(localizer.covariances.size(), 2U);
-  EXPECT_FALSE(localizer.covariances[0] || localizer.covariances[1]);
+  ASSERT_EQ(localizer.known_starts.size(), 2U);
+  for (const StartKnowledge& known : localizer.known_starts) {
+    EXPECT_TRUE(std::holds_alternative<StartHint>(known));
+  }
+}
+
+TEST_F(DriveLocalizationTest, OfAShotItIsToldHowFarOffItMayBe) {
+  options_.shots = DriveLocalizationOptions::Shots{0.4, 0.02, 3};
+  ScriptedLocalizer localizer(std::vector<ScriptedLocalizer::Answer>(15));
+  ASSERT_TRUE(Run(localizer).has_value());
+  ASSERT_EQ(localizer.known_starts.size(), 15U);
+  for (const StartKnowledge& known : localizer.known_starts) {
+    const auto* hint = std::get_if<StartHint>(&known);
+    ASSERT_NE(hint, nullptr);
+    EXPECT_DOUBLE_EQ(hint->within_m, 0.4);
+    EXPECT_DOUBLE_EQ(hint->within_rad, 0.02);
+  }
 }
 
 TEST_F(DriveLocalizationTest, AToldStartIsOfTrackingAlone) {

@@ -81,12 +81,22 @@ TEST(LocalizerTest, GoesOnBehindScansThatAreMissing) {
 // Where it was told to be is not where it seems to be: it may be a place that looks like it.
 TEST(LocalizerTest, AFirstPlaceFarFromTheToldOneIsConfirmedFirst) {
   Localizer localizer = StreetLocalizer();
-  localizer.Start(OnStreet(-6.0 - 2.5));
+  localizer.Start(OnStreet(-6.0 - 2.5), StartHint{1.0, 0.1});
   for (int i = 0; i < 6; ++i) {
     const Pose truth = OnStreet(-6.0 + i);
     const LocalizationResult result = At(localizer, testing::Street(), truth);
     EXPECT_EQ(result.health, i < 2 ? LocalizationHealth::kWeak : LocalizationHealth::kGood) << i;
     EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06) << i;
+  }
+}
+
+TEST(LocalizerTest, AVagueStartIsFoundAtOnceWhereNothingLooksLikeIt) {
+  for (const double off_m : {-2.8, -1.5, 2.0}) {
+    Localizer localizer = StreetLocalizer();
+    localizer.Start(OnStreet(-6.0 + off_m, 1.0, 15.0 * kDegree));
+    const LocalizationResult result = At(localizer, testing::Street(), OnStreet(-6.0));
+    EXPECT_EQ(result.health, LocalizationHealth::kGood) << off_m;
+    EXPECT_LT(ErrorOf(result.T_world_sensor, OnStreet(-6.0)).horizontal_m, 0.06) << off_m;
   }
 }
 
@@ -151,28 +161,59 @@ TEST(LocalizerTest, ACorridorIsWeakAndCarriesTheVehicleOnAtItsSpeed) {
   }
 }
 
-// Posts 2.5 m apart on either side of a road without end: a vehicle whose speed nobody knows may
-// have moved on by one of them.
-TEST(LocalizerTest, AmongPostsThatRepeatItDoesNotSayWhichAreBesideIt) {
-  ShapeWorld world;
-  world.patches = {testing::Patch{}};
-  for (int i = -16; i <= 16; ++i) {
-    for (const double y_m : {-4.05, 4.05}) {
-      world.boxes.push_back(
-          testing::Box{{2.5 * i + 0.05, y_m, -1.0}, {2.5 * i + 0.25, y_m + 0.2, 4.0}});
+// Posts 2.5 m apart on either side of a road without end.
+class AmongPostsTest : public ::testing::Test {
+ protected:
+  AmongPostsTest() {
+    world_.patches = {testing::Patch{}};
+    for (int i = -16; i <= 16; ++i) {
+      for (const double y_m : {-4.05, 4.05}) {
+        world_.boxes.push_back(
+            testing::Box{{2.5 * i + 0.05, y_m, -1.0}, {2.5 * i + 0.25, y_m + 0.2, 4.0}});
+      }
     }
+    map_.Paint(world_, 42.0);
   }
-  PaintedMap map;
-  map.Paint(world, 42.0);
-  LocalizerOptions options = QuickOptions();
-  options.features.max_range_m = 15.0F;
-  Localizer localizer(map.profile(), map.Source(), options);
-  const auto at = [](int i) {
-    return UprightPose({-5.0 + 2.5 * i, 0.3, 1.8}, 0.0);
-  };
-  localizer.Start(at(0));
-  EXPECT_EQ(At(localizer, world, at(0)).health, LocalizationHealth::kGood) << "it was told";
-  const LocalizationResult result = At(localizer, world, at(1));
+
+  Localizer NewLocalizer() const {
+    LocalizerOptions options = QuickOptions();
+    options.features.max_range_m = 15.0F;
+    return {map_.profile(), map_.Source(), options};
+  }
+  static Pose Beside(double posts) { return UprightPose({-5.0 + 2.5 * posts, 0.3, 1.8}, 0.0); }
+
+  ShapeWorld world_;
+  PaintedMap map_;
+};
+
+// Wherever in three metres it starts, it is beside some post, and does not say which.
+TEST_F(AmongPostsTest, AVagueStartMayBeBesideAnyOfThem) {
+  for (const double off : {-0.9, -0.4, 0.0, 0.3, 1.0}) {
+    Localizer localizer = NewLocalizer();
+    localizer.Start(Beside(off));
+    const LocalizationResult result = At(localizer, world_, Beside(0));
+    EXPECT_EQ(result.health, LocalizationHealth::kWeak) << off;
+    EXPECT_GT(std::sqrt(result.covariance(0, 0)), 0.3) << off;
+  }
+}
+
+TEST_F(AmongPostsTest, ABelievedStartIsBesideTheOneWithinReach) {
+  for (const double off : {-0.15, 0.0, 0.15}) {
+    Localizer localizer = NewLocalizer();
+    const Eigen::Vector4d sigmas(0.2, 0.2, 0.2, 0.02);
+    localizer.Start(Beside(off), PoseCovariance(sigmas.cwiseAbs2().asDiagonal()));
+    const LocalizationResult result = At(localizer, world_, Beside(0));
+    EXPECT_EQ(result.health, LocalizationHealth::kGood) << off;
+    EXPECT_LT(ErrorOf(result.T_world_sensor, Beside(0)).horizontal_m, 0.06) << off;
+  }
+}
+
+// A vehicle whose speed nobody knows may have moved on by one of them.
+TEST_F(AmongPostsTest, ItDoesNotSayWhichAreBesideIt) {
+  Localizer localizer = NewLocalizer();
+  localizer.Start(Beside(0), StartHint{0.5, 0.1});
+  EXPECT_EQ(At(localizer, world_, Beside(0)).health, LocalizationHealth::kGood) << "it was told";
+  const LocalizationResult result = At(localizer, world_, Beside(1));
   EXPECT_EQ(result.health, LocalizationHealth::kWeak);
   EXPECT_GT(std::sqrt(result.covariance(0, 0)), 1.0) << "ahead: one post or another";
   EXPECT_LT(std::sqrt(result.covariance(1, 1)), 0.3);

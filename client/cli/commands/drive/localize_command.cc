@@ -31,8 +31,9 @@ class LocalizeCommand : public Command {
     drive_.DeclareScans(arguments);
     arguments.Optional("--max-range", "M", options_.max_range_m,
                        "Reach of what is matched [100; paper: 40]");
-    arguments.Optional("--perturb", "T_M,R_DEG", perturbation_,
-                       "Single shots from starts so far off; else the drive is tracked");
+    arguments.Optional(
+        "--perturb", "T_M,R_DEG", perturbation_,
+        "Single shots from starts so far off, as they are told to be; else the drive is tracked");
     arguments.Optional("--trials", "N", trials_, "Single shots a scan [10]");
     arguments.Optional("--seed", "K", options_.seed, "Of the disturbances [0]");
     arguments.Flag("--no-restart", no_restart_, "After a jump it has to find itself");
