@@ -33,7 +33,7 @@ const std::vector<double>& DeckFinder::Find(const MapWindow& map,
   const int steps = static_cast<int>(options_.reach_m / kStep_m);
   for (int step = -steps; step <= steps; ++step) {
     const double up_m = step * kStep_m;
-    if (std::abs(up_m) < options_.apart_m) continue;
+    if (std::abs(up_m) < options_.least_m) continue;
     const Deck deck = DeckAt(map, up_m);
     if (deck.carried >= options_.min_share * static_cast<double>(ground_.size())) {
       decks_.push_back(deck);

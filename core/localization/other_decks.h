@@ -15,6 +15,7 @@ namespace atlas {
 struct DeckOptions {
   double reach_m = 12.0;        // looked for so far above and below
   double apart_m = 1.5;         // surfaces closer than this are one
+  double least_m = 1.5;         // closer than this is the place's own
   float near_m = 12.0F;         // of the scan's ground: what lies so near the sensor
   std::size_t min_ground = 10;  // features of it; fewer say nothing
   double min_share = 0.3;       // of these that a deck has to carry

@@ -241,7 +241,8 @@ void PlaceTracker::SpreadStarts(const PosePrior& prior) {
 
 void PlaceTracker::RaiseStarts(const PosePrior& prior, const ScanFeatures& features) {
   DeckFinder surfaces({.reach_m = options_.reachable_up_sigmas * std::sqrt(prior.covariance(2, 2)),
-                       .apart_m = options_.told_step_m});
+                       .apart_m = options_.told_step_m,
+                       .least_m = options_.told_step_m});
   const std::size_t level = starts_.size();
   for (const double up_m : surfaces.Find(map_.window(), features, prior.T_world_level)) {
     for (std::size_t i = 0; i < level; ++i) {

@@ -220,7 +220,16 @@ bool Relocalizer::IsBelieved(const Relocalization& found) const {
   return best.registration.fit >= options_.min_fit &&
          WorstSigma(best.registration) <= options_.max_sigma_m &&
          best.registration.column_inliers >= options_.min_columns &&
-         best.explained >= options_.min_explained && found.margin >= options_.min_margin;
+         best.explained >= options_.min_explained &&
+         std::all_of(found.places.begin() + 1, found.places.end(),
+                     [&](const RelocalizedPlace& other) { return IsBehind(other, best); });
+}
+
+bool Relocalizer::IsBehind(const RelocalizedPlace& other, const RelocalizedPlace& best) const {
+  const Eigen::Vector3d off = other.registration.T_world_level.translation() -
+                              best.registration.T_world_level.translation();
+  const bool is_deck = off.head<2>().norm() < options_.decks.apart_m;
+  return best.score - other.score >= (is_deck ? options_.min_deck_margin : options_.min_margin);
 }
 
 }  // namespace atlas

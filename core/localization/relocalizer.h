@@ -23,7 +23,8 @@ struct RelocalizerOptions {
   FeatureOptions features;
   PlaceOptions window;
   RegistrationOptions registration;
-  DeckOptions decks{.reach_m = 30.0, .most = 8};
+  // What was found on a ramp may be a metre above or below the surface that it is on.
+  DeckOptions decks{.reach_m = 30.0, .least_m = 0.5, .most = 8};
 
   std::size_t candidates = 300;  // places that are checked ...
   double candidates_apart_m = 1.5;
@@ -41,6 +42,7 @@ struct RelocalizerOptions {
   double min_explained = 0.15;
   double max_sigma_m = 0.015;  // of the worst horizontal direction
   double min_margin = 0.08;
+  double min_deck_margin = 0.12;  // where that is a deck above or below: they look alike
 };
 
 // A place that was registered.
@@ -89,6 +91,8 @@ class Relocalizer {
                           const Pose& start) const;
   void Add(RelocalizedPlace place, std::vector<RelocalizedPlace>& places) const;
   bool IsBelieved(const Relocalization& found) const;
+  // Whether that much more speaks for `best`.
+  bool IsBehind(const RelocalizedPlace& other, const RelocalizedPlace& best) const;
 
   MapProfile profile_;
   std::shared_ptr<const PlaceIndex> places_;

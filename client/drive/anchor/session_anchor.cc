@@ -72,8 +72,9 @@ class Map {
 
   Result<SessionAnchor> Anchor(const SessionScans& session) {
     if (!anchoring_) {
-      // Damaged tiles, and what does not get done in time, are left out.
-      static_cast<void>(client_.WaitUntilFused(kPatience));
+      // What is not fused in time, damaged tiles among it, is left out.
+      const auto fused = client_.WaitUntilFused(kPatience);
+      if (!fused && fused.error().code() != StatusCode::kTimeout) return Error(fused.error());
       auto anchoring = PartAnchoring::Create(survey_, view_, options_);
       if (!anchoring) return Error(anchoring.error());
       anchoring_.emplace(*std::move(anchoring));
