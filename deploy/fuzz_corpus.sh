@@ -20,8 +20,8 @@ for target in "${targets[@]}"; do
   find "build/fuzz/corpus/$target" -type f -size -5 -exec cp -t "$small" {} +  # of 512 bytes: 4 at most
   "build/fuzz/bin/fuzz_$target" -merge=1 -set_cover_merge=1 -use_counters=0 -rss_limit_mb=2048 \
     "$reached" "$small" >"$work/$target.log" 2>&1 || { tail "$work/$target.log" >&2; exit 1; }
-  find "$kept" -type f -name '[0-9a-f]*' -regextype posix-extended -regex '.*/[0-9a-f]{40}' -delete
-  # The largest reach most by themselves.
+  find "$kept" -regextype posix-extended -type f -regex '.*/[0-9a-f]{40}' -delete
+  # Where there are more, the largest: they reach most by themselves.
   find "$reached" -type f -printf '%s %p\n' | sort -rn | head -"$most" | cut -d' ' -f2 | xargs -r cp -t "$kept"
   printf '%-16s %3d inputs, %6d bytes\n' "$target" "$(ls "$kept" | wc -l)" "$(cat "$kept"/* | wc -c)"
 done

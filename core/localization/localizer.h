@@ -64,7 +64,7 @@ class Localizer {
   // Forgets the motion; the next scan is near `T_world_sensor`. A covariance is believed: no place
   // counts that is further than 3.5 standard deviations from it in the plane, or three in height,
   // and where the map has none so near, the vehicle goes on from there by its own motion, lost,
-  // until it has. A hint is not. Either way, places that fit as well so near make the first scans
+  // until it has. A hint is not. Either way, a place that fits as well so near makes the first scan
   // weak: bays and posts repeat.
   void Start(const Pose& T_world_sensor, const StartKnowledge& known = StartHint());
 

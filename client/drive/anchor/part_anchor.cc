@@ -235,9 +235,10 @@ Status PartAnchoring::Track(Scans scans, const std::vector<double>& way_m, Candi
 Result<std::optional<FoundScan>> PartAnchoring::FindNear(const DriveScan& scan,
                                                          const Pose& T_map_sensor,
                                                          double& fit) {
+  constexpr StartHint kFollowed{0.5, 0.05};  // the scans before it tell where it is
   const Result<PointCloud> cloud = ReadScan(scan.scan);
   if (!cloud) return Error(cloud.error());
-  localizer_->Start(T_map_sensor, StartHint());
+  localizer_->Start(T_map_sensor, kFollowed);
   const Result<LocatedScan> located = localizer_->Locate(*cloud, LevelOf(scan), 1.0);
   if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
   fit = located->fit;
