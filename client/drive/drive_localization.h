@@ -25,17 +25,17 @@ namespace atlas {
 
 enum class LocalizationMode { kAtlas, kPaper };  // ours; the paper's encode, decode and ICP
 
+// Where tracking starts is told, off by up to this, and believed (core/localization/localizer.h).
+struct ToldStart {
+  double radius_m = 1.5;
+  double height_m = 1.5;
+};
+
 struct DriveLocalizationOptions {
   struct Shots {
     double translation_m = 0.0;  // x and y of the start, uniform +-
     double yaw_rad = 0.0;
     std::uint32_t trials = 10;  // a scan
-  };
-
-  // Where tracking starts is told, off by up to this, and believed (core/localization/localizer.h).
-  struct ToldStart {
-    double radius_m = 1.5;
-    double height_m = 1.5;
   };
 
   LocalizationMode mode = LocalizationMode::kAtlas;

@@ -90,7 +90,7 @@ TEST_F(DriveLocalizationTest, JumpsBeginAnew) {
 }
 
 TEST_F(DriveLocalizationTest, AStartIsToldAsFarOffAsItMayBeAndBelieved) {
-  options_.start = DriveLocalizationOptions::ToldStart{2.0, 0.6};
+  options_.start = ToldStart{2.0, 0.6};
   double furthest_m = 0.0;
   double highest_m = 0.0;
   for (options_.seed = 0; options_.seed < 30; ++options_.seed) {
