@@ -4,6 +4,8 @@
 #include <bit>
 #include <cctype>
 #include <cerrno>
+#include <cmath>
+#include <limits>
 #include <system_error>
 
 #include "core/base/disk_error.h"
@@ -60,10 +62,11 @@ Result<PointFormat> PointFormatOf(const std::filesystem::path& path) {
                StrCat(path.string(), ": expected a name that ends in .pcd or .ply"));
 }
 
-Result<PointFile> PointFile::Create(const std::filesystem::path& path) {
+Result<PointFile> PointFile::Create(const std::filesystem::path& path,
+                                    const Eigen::Vector3d& origin_m) {
   const Result<PointFormat> format = PointFormatOf(path);
   if (!format) return Error(format.error());
-  PointFile file(path, *format);
+  PointFile file(path, *format, origin_m);
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return Error(file.Failure(EISDIR));
   file.file_.reset(std::fopen(file.partial_.c_str(), "wb"));
@@ -72,8 +75,10 @@ Result<PointFile> PointFile::Create(const std::filesystem::path& path) {
   return file;
 }
 
-PointFile::PointFile(const std::filesystem::path& path, PointFormat format)
-    : path_(path), partial_(path.string() + ".partial"), format_(format) {}
+PointFile::PointFile(const std::filesystem::path& path,
+                     PointFormat format,
+                     const Eigen::Vector3d& origin_m)
+    : path_(path), partial_(path.string() + ".partial"), format_(format), origin_m_(origin_m) {}
 
 PointFile::~PointFile() {
   if (file_ == nullptr) return;  // finished, moved from, or never opened
@@ -99,7 +104,9 @@ Status PointFile::Write(const std::string& bytes) {
 Status PointFile::Add(std::span<const ColumnPoint> points) {
   std::string bytes;
   for (const ColumnPoint& point : points) {
-    for (const double coordinate : point.p_world) {
+    const Eigen::Vector3d p = point.p_world - origin_m_;
+    farthest_m_ = std::max(farthest_m_, p.lpNorm<Eigen::Infinity>());
+    for (const double coordinate : p) {
       format_ == PointFormat::kPcd ? AppendFloat(coordinate, bytes)
                                    : AppendDouble(coordinate, bytes);
     }
@@ -107,6 +114,13 @@ Status PointFile::Add(std::span<const ColumnPoint> points) {
   }
   points_ += points.size();
   return Write(bytes);
+}
+
+double PointFile::rounding_m() const {
+  if (format_ == PointFormat::kPly) return 0.0;
+  const auto farthest = static_cast<float>(farthest_m_);
+  const float next = std::nextafter(farthest, std::numeric_limits<float>::infinity());
+  return 0.5 * (static_cast<double>(next) - static_cast<double>(farthest));
 }
 
 Status PointFile::Finish() {

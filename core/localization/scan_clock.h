@@ -9,7 +9,8 @@ namespace atlas {
 class ScanClock {
  public:
   // `time_s` of the scan at hand; none: nobody knows. Times the first interval after Restart(); 1
-  // where that is not known, or time does not go on.
+  // where that is not known, and where time does not go on, of the scan behind it, too: its time
+  // may have been the wrong one.
   double Tick(std::optional<double> time_s);
   // The next scan has nothing to do with those before.
   void Restart();

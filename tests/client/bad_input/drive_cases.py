@@ -151,6 +151,22 @@ def permission_cases(cases, drives):
         closed.chmod(0)
         cases.forbidden(f"unreadable {name}", ["ingest", folder, *NEAR], name)
         closed.chmod(mode)
+    broken_localization(cases, drives)
+
+
+def broken_localization(cases, drives):
+    """What was found before a failure is kept."""
+    folder, out = drives.copy("closed_scan"), drives.folder / "broken"
+    out.mkdir(mode=0o777)
+    out.chmod(0o777)
+    (folder / "velodyne/000003.bin").chmod(0)
+    for name, flags in (("tracked", []), ("relocalized", ["--relocalize"])):
+        file = out / f"{name}.csv"
+        cases.forbidden(f"localize, a scan that cannot be read, {name}", ["localize", folder, *flags, "--output", file],
+                        f"{file} has what came before, 3 lines: ", is_stream=True)
+        if cases.unprivileged is not None:
+            scans = [line.split(",")[0] for line in file.read_text(encoding="ascii").splitlines()]
+            cases.report.equal(f"localize, {name}: what came before", scans, ["scan", "0", "1", "2"])
 
 
 def label_cases(cases, drives):

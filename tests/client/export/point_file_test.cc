@@ -162,6 +162,27 @@ TEST_F(PointFileTest, PlyKeepsMillimetresFarFromTheOrigin) {
   EXPECT_EQ(read[0].y, 5'123'456.789);
 }
 
+TEST_F(PointFileTest, PcdKeepsMillimetresAroundTheOriginThatItIsGiven) {
+  const std::vector<ColumnPoint> points{{{4'429'876.543, 5'123'456.789, 12.5}, 9}};
+  struct Written {
+    double x;
+    double rounding_m;
+  };
+  const auto written = [&](const Eigen::Vector3d& origin_m) -> Written {
+    Result<PointFile> file = PointFile::Create(folder_ / "far.pcd", origin_m);
+    EXPECT_TRUE(file && file->Add(points).ok() && file->Finish().ok());
+    std::ifstream stream(folder_ / "far.pcd", std::ios::binary);
+    return {ReadPcd({std::istreambuf_iterator<char>(stream), {}}).at(0).x, file->rounding_m()};
+  };
+  const Written near = written({4'429'000.0, 5'123'000.0, 0.0});
+  EXPECT_NEAR(near.x, 876.543, near.rounding_m);
+  EXPECT_LT(near.rounding_m, 1e-4);
+  const Written far = written(Eigen::Vector3d::Zero());
+  EXPECT_EQ(far.rounding_m, 0.25) << "half of what float32 can tell apart at 5,000 km";
+  EXPECT_NEAR(far.x, 4'429'876.543, far.rounding_m);
+  EXPECT_NE(far.x, 4'429'876.543);
+}
+
 TEST_F(PointFileTest, WhatIsNotFinishedIsNotThere) {
   {
     Result<PointFile> file = PointFile::Create(folder_ / "map.pcd");

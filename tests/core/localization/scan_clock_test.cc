@@ -26,6 +26,24 @@ TEST(ScanClockTest, WithoutATimeThatGoesOnAScanIsAScan) {
   EXPECT_DOUBLE_EQ(clock.Tick(5.5), 2.0) << "since the last time that was told";
 }
 
+TEST(ScanClockTest, OneTimeThatIsWrongIsNoGapBehindIt) {
+  ScanClock clock;
+  clock.Tick(10.0);
+  clock.Tick(10.5);
+  EXPECT_EQ(clock.Tick(0.0), 1.0);
+  EXPECT_EQ(clock.Tick(11.5), 1.0);
+  EXPECT_DOUBLE_EQ(clock.Tick(12.5), 2.0) << "what is usual is still known";
+}
+
+TEST(ScanClockTest, AClockThatWasSetBackGoesOn) {
+  ScanClock clock;
+  clock.Tick(10.0);
+  clock.Tick(10.5);
+  EXPECT_EQ(clock.Tick(2.0), 1.0);
+  EXPECT_EQ(clock.Tick(2.5), 1.0);
+  EXPECT_DOUBLE_EQ(clock.Tick(3.5), 2.0);
+}
+
 TEST(ScanClockTest, AGapOfHoursIsALongOneAndNotMore) {
   ScanClock clock;
   clock.Tick(0.0);

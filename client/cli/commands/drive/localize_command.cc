@@ -1,5 +1,6 @@
 // `atlas localize DIR`: where a drive's scans lie in the map, scored against the drive's poses.
 #include <filesystem>
+#include <functional>
 #include <numbers>
 
 #include "client/cli/commands/drive/contradiction_output.h"
@@ -63,10 +64,13 @@ class LocalizeCommand : public Command {
     DriveMonitor monitor(view, {}, [this](const Contradiction& c) { contradictions_.Add(c); });
     if (contradictions_.is_wanted()) options_.monitor = &monitor;
     const auto report = Localize(*drive, view, context);
-    if (!report) return report.error();
     monitor.Finish();
-    ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
-    ATLAS_RETURN_IF_ERROR(contradictions_.Write(map->profile().cell_size_m()));
+    const auto write = [&]() -> Status {
+      ATLAS_RETURN_IF_ERROR(track_.Write(Title(*drive)));
+      return contradictions_.Write(map->profile().cell_size_m());
+    };
+    if (!report) return Broken(report.error(), write);
+    ATLAS_RETURN_IF_ERROR(write());
     ATLAS_RETURN_IF_ERROR(CheckReadable(*report));
     PrintReport(*report, monitor, map->bytes_received(), context);
     NoteLost(*report, !perturbation_, context.err);
@@ -120,6 +124,14 @@ class LocalizeCommand : public Command {
     return perturbation_ ? LocalizationKind::kSingleShots : LocalizationKind::kTracked;
   }
 
+  // A daemon may go away hours later: what was found until then is kept.
+  Status Broken(const Status& why, const std::function<Status()>& write) const {
+    if (track_.lines() == 0) return why;
+    const Status written = write();
+    if (!written.ok()) return why.WithContext(written.message());
+    return track_.is_wanted() ? why.WithContext(track_.Told()) : why;
+  }
+
   void PrintReport(const DriveLocalizationReport& report,
                    const DriveMonitor& monitor,
                    std::uint64_t bytes_received,
@@ -144,17 +156,23 @@ class LocalizeCommand : public Command {
     return StrCat((folder / ".").parent_path().filename().string(), ", mode ", mode_);
   }
 
+  static ProgressBar MakeBar(const DriveFolder& drive,
+                             const std::string& label,
+                             const CommandContext& context) {
+    // Lines of a stream would run into the bar on the same terminal.
+    const bool is_stream_seen = context.is_json && context.is_out_terminal;
+    return {context.err, context.is_err_terminal && !is_stream_seen, label,
+            drive.scans.back().number - drive.scans.front().number + 1};
+  }
+
   Result<DriveLocalizationReport> Localize(const DriveFolder& drive,
                                            MapView& view,
                                            const CommandContext& context) {
-    // Lines of a stream would run into the bar on the same terminal.
-    const bool is_stream_seen = context.is_json && context.is_out_terminal;
+    ProgressBar bar = MakeBar(drive, "localize", context);
     const std::uint32_t first = drive.scans.front().number;
-    ProgressBar bar(context.err, context.is_err_terminal && !is_stream_seen, "localize",
-                    drive.scans.back().number - first + 1);
     return LocalizeDrive(drive, options_, view, [&](const LocalizedScan& scan) {
       if (context.is_json) context.PrintJson(LocalizedScanJson(scan));
-      if (track_.is_wanted()) track_.Add(scan);
+      track_.Add(scan);
       bar.Update(scan.scan - first + 1);
     });
   }
@@ -170,15 +188,28 @@ class LocalizeCommand : public Command {
     return options;
   }
 
+  Result<DriveRelocalizationReport> FindScans(const DriveFolder& drive,
+                                              const DriveRelocalizationOptions& options,
+                                              MapView& view,
+                                              const CommandContext& context) {
+    ProgressBar bar = MakeBar(drive, "relocalize", context);
+    const std::uint32_t first = drive.scans.front().number;
+    return RelocalizeDrive(drive, options, view, [&](const RelocalizedScan& scan) {
+      if (context.is_json) context.PrintJson(RelocalizedScanJson(scan));
+      track_.Add(scan);
+      bar.Update(scan.scan - first + 1);
+    });
+  }
+
   Status Relocalize(const DriveFolder& drive, MapSource& source, const CommandContext& context) {
     const DriveRelocalizationOptions options = RelocalizationOptions();
     MapView view(source);
-    const auto report = RelocalizeDrive(drive, options, view, [&](const RelocalizedScan& scan) {
-      if (context.is_json) context.PrintJson(RelocalizedScanJson(scan));
-      if (track_.is_wanted()) track_.Add(scan);
-    });
-    if (!report) return report.error();
-    ATLAS_RETURN_IF_ERROR(track_.Write(Title(drive)));
+    const auto report = FindScans(drive, options, view, context);
+    const auto write = [&] {
+      return track_.Write(Title(drive));
+    };
+    if (!report) return Broken(report.error(), write);
+    ATLAS_RETURN_IF_ERROR(write());
     ATLAS_RETURN_IF_ERROR(CheckReadable(*report));
     if (context.is_json) {
       context.PrintJson(RelocalizationJson(*report));

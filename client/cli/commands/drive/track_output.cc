@@ -107,6 +107,11 @@ Status TrackOutput::Write(const std::string& title) const {
   return plot_file_.empty() ? Status() : WritePlot(title);
 }
 
+std::string TrackOutput::Told() const {
+  return StrCat(text_file_.empty() ? plot_file_ : text_file_, " has what came before, ", lines(),
+                lines() == 1 ? " line" : " lines");
+}
+
 Status TrackOutput::WritePlot(const std::string& title) const {
   const LinePlot plot = PlotOf(scans_, title);
   return is_svg_ ? WriteTextFile(plot_file_, PlotSvg(plot)) : WritePng(DrawPlot(plot), plot_file_);

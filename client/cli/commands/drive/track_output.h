@@ -1,6 +1,7 @@
 // What `atlas localize` leaves on disk: every scan as a line of text, and a picture of the errors.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,8 +28,11 @@ class TrackOutput {
   bool is_wanted() const { return !text_file_.empty() || !plot_file_.empty(); }
   void Add(const LocalizedScan& scan) { scans_.push_back(scan); }
   void Add(const RelocalizedScan& scan) { relocalized_.push_back(scan); }
+  std::size_t lines() const { return scans_.size() + relocalized_.size(); }
   // Each file whole or not at all. Errors are those of the disk.
   Status Write(const std::string& title) const;
+  // "track.csv has what came before, 12 lines".
+  std::string Told() const;
 
  private:
   Status CheckText();

@@ -2,6 +2,7 @@
 #include "client/cli/command_line/interruption.h"
 #include "client/cli/commands/map/map_commands.h"
 #include "client/cli/map_input/opened_map.h"
+#include "client/cli/output/text_table.h"
 #include "client/export/point_file.h"
 #include "core/base/str_cat.h"
 #include "core/tile/column_points.h"
@@ -21,6 +22,8 @@ class ExportCommand : public Command {
                        "Where the points go: the middle of every occupied segment");
     arguments.Optional("--center", "X,Y", center_m_, "Middle of the area, metres [all of it]");
     arguments.Optional("--radius", "R", radius_m_, "Radius of the area, metres");
+    arguments.Optional("--origin", "X,Y,Z", origin_m_,
+                       "Written as 0,0,0: keeps the float32 of .pcd exact far out [0,0,0]");
   }
 
   Status Run(CommandContext& context) override {
@@ -29,9 +32,10 @@ class ExportCommand : public Command {
     if (const auto format = PointFormatOf(file_); !format) return format.error();
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
-    Result<PointFile> points = PointFile::Create(file_);
+    Result<PointFile> points = PointFile::Create(file_, origin_m_);
     if (!points) return points.error();
     ATLAS_RETURN_IF_ERROR(WritePoints(map->source(), *area, *points));
+    NoteRounding(*points, context.err);
     Print(points->points(), context);
     return {};
   }
@@ -70,6 +74,13 @@ class ExportCommand : public Command {
     return file.Finish();
   }
 
+  static void NoteRounding(const PointFile& points, std::ostream& err) {
+    constexpr double kExact_m = 0.001;
+    if (points.rounding_m() <= kExact_m) return;
+    err << "note: float32 is right to " << FixedText(points.rounding_m(), 3)
+        << " m so far out; --origin X,Y,Z near the points, or .ply, is exact\n";
+  }
+
   void Print(std::uint64_t points, const CommandContext& context) const {
     if (context.is_json) {
       context.PrintJson({{"points", points}});
@@ -81,6 +92,7 @@ class ExportCommand : public Command {
   std::string file_;
   std::optional<Eigen::Vector2d> center_m_;
   std::optional<double> radius_m_;
+  Eigen::Vector3d origin_m_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace
