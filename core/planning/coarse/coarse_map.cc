@@ -87,7 +87,7 @@ bool CoarseMap::IsObstacle(const SurfaceTile& home,
 }
 
 Status CoarseMap::Analyse(const NodeRef& ref) {
-  ATLAS_RETURN_IF_ERROR(tiles_.Join(ref.slot));
+  ATLAS_RETURN_IF_ERROR(tiles_.Join(ref));
   SurfaceNode& node = tiles_.node(ref);
   if (node.Has(SurfaceNode::kAnalysed)) {
     return {};
@@ -184,15 +184,15 @@ Result<NodeRef> CoarseMap::Above(const SurfaceTiles& finer, const NodeRef& ref) 
     return best;
   }
   const auto home = static_cast<std::uint32_t>(*slot);
-  if (Status status = tiles_.Join(home); !status.ok()) {
+  const auto cell_x = static_cast<std::int32_t>(x - id.x * side);
+  const auto cell_y = static_cast<std::int32_t>(y - id.y * side);
+  if (Status status = tiles_.Join(home, cell_x, cell_y); !status.ok()) {
     return Error(std::move(status));
   }
   std::int32_t best_squared = std::numeric_limits<std::int32_t>::max();
   for (std::int32_t dy = -1; dy <= 1; ++dy) {
     for (std::int32_t dx = -1; dx <= 1; ++dx) {
-      const CellNodes cell =
-          tiles_.Cell(tiles_.tile(home), static_cast<std::int32_t>(x - id.x * side) + dx,
-                      static_cast<std::int32_t>(y - id.y * side) + dy);
+      const CellNodes cell = tiles_.Cell(tiles_.tile(home), cell_x + dx, cell_y + dy);
       const NodeRef node = tiles_.Nearest(cell, finer.node(ref).altitude_mm, kSameSurface_mm);
       if (node.is_none() || dx * dx + dy * dy >= best_squared) {
         continue;

@@ -58,7 +58,6 @@ Status Snapper::SearchTile(const TileId& id,
     return {};
   }
   const auto used = static_cast<std::uint32_t>(*slot);
-  ATLAS_RETURN_IF_ERROR(map_.tiles().Join(used));
   const SurfaceTile& tile = map_.tiles().tile(used);
   const auto cells = static_cast<std::uint32_t>(tile.cell_begin.size() - 1);
   for (std::uint32_t cell = 0; cell < cells; ++cell) {

@@ -51,7 +51,7 @@ class CellWalk {
   double next_y_;
 };
 
-// A cell up to one tile beyond the node's own. Requires that the node's tile is joined.
+// A cell within reach of a node that is joined.
 CellNodes CellAt(const SurfaceTiles& tiles, const NodeRef& from, std::int64_t x, std::int64_t y) {
   const SurfaceTile& home = tiles.tile(from.slot);
   return tiles.Cell(home, static_cast<std::int32_t>(x - home.origin_x),

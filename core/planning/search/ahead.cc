@@ -12,8 +12,7 @@ const SurfaceTile* GuidedAhead::GuideTile(std::uint32_t slot) const {
   if (!above_[slot]) {
     const TileId& id = tiles_.tile(slot).id;
     const std::int32_t guide = guide_.Find({guide_.level(), id.x >> shift_, id.y >> shift_});
-    const bool is_there =
-        guide != SurfaceTile::kNotThere && guide_.tile(static_cast<std::uint32_t>(guide)).is_joined;
+    const bool is_there = guide != SurfaceTile::kNotThere;
     above_[slot] = is_there ? &guide_.tile(static_cast<std::uint32_t>(guide)) : nullptr;
   }
   return *above_[slot];

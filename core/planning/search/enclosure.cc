@@ -46,7 +46,7 @@ class BackwardFlood {
  private:
   Status LookAt(const NodeRef& ref, std::int32_t dx, std::int32_t dy) {
     SurfaceTiles& tiles = map_.tiles();
-    ATLAS_RETURN_IF_ERROR(tiles.Join(ref.slot));
+    ATLAS_RETURN_IF_ERROR(tiles.Join(ref));
     const std::int32_t altitude_mm = tiles.node(ref).altitude_mm;
     const std::int32_t cell = tiles.node(ref).cell;
     const CellNodes beside =

@@ -97,7 +97,7 @@ class GridSearch {
   };
 
   Status Begin(const NodeRef& start) {
-    ATLAS_RETURN_IF_ERROR(tiles_.Join(start.slot));
+    ATLAS_RETURN_IF_ERROR(tiles_.Join(start));
     ATLAS_RETURN_IF_ERROR(tiles_.PrepareSearch(start.slot));
     Reach(NodeRef(), start, 0.0F);
     return {};
@@ -124,7 +124,7 @@ class GridSearch {
 
   Status Expand(const NodeRef& ref) {
     ATLAS_RETURN_IF_ERROR(budget_.CountExpansion());
-    ATLAS_RETURN_IF_ERROR(tiles_.Join(ref.slot));
+    ATLAS_RETURN_IF_ERROR(tiles_.Join(ref));
     for (std::int32_t dy = -1; dy <= 1; ++dy) {
       for (std::int32_t dx = -1; dx <= 1; ++dx) {
         if (dx != 0 || dy != 0) {

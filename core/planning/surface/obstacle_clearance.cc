@@ -83,19 +83,20 @@ const std::vector<std::uint64_t>& ObstacleClearance::RowsOf(std::uint32_t slot) 
   if (rows_.size() <= slot) {
     rows_.resize(tiles_.size());
   }
-  std::vector<std::uint64_t>& rows = rows_[slot];
-  if (rows.empty()) {
-    rows.resize(static_cast<std::size_t>((side_ + 2 * reach_cells_) * row_words_));
-    const SurfaceTile& home = tiles_.tile(slot);
+  Rows& rows = rows_[slot];
+  const SurfaceTile& home = tiles_.tile(slot);
+  if (rows.added != home.linked) {
+    rows.words.resize(static_cast<std::size_t>((side_ + 2 * reach_cells_) * row_words_));
     for (std::size_t i = 0; i < home.around.size(); ++i) {
-      if (home.around[i] != SurfaceTile::kNotThere) {
+      if (((home.linked & ~rows.added) >> i & 1) != 0) {
         AddRows(tiles_.tile(static_cast<std::uint32_t>(home.around[i])),
                 (static_cast<std::int32_t>(i % 3) - 1) * side_ + reach_cells_,
-                (static_cast<std::int32_t>(i / 3) - 1) * side_ + reach_cells_, rows);
+                (static_cast<std::int32_t>(i / 3) - 1) * side_ + reach_cells_, rows.words);
       }
     }
+    rows.added = home.linked;
   }
-  return rows;
+  return rows.words;
 }
 
 // Cell (x, y) of the tile is bit x + shift_x of row y + shift_y, where there is one.

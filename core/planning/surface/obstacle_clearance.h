@@ -15,8 +15,8 @@ class ObstacleClearance {
   // The tiles outlive it.
   ObstacleClearance(const SurfaceTiles& tiles, const PlanOptions& options);
 
-  // In steps of Metres; kFar where there is no obstacle within reach. Requires that the node's tile
-  // is joined.
+  // In steps of Metres; kFar where there is no obstacle within reach. Requires that the node is
+  // joined.
   std::uint8_t Of(const NodeRef& ref);
 
   // Metres to the nearest obstacle, at most the reach.
@@ -34,7 +34,11 @@ class ObstacleClearance {
   };
 
   void SearchRow(Search& search, std::int32_t dy) const;
-  // Obstacles of a tile and of what lies within reach of it, a bit a cell, row by row.
+  // Obstacles of a tile and of what is loaded within reach of it, a bit a cell, row by row.
+  struct Rows {
+    std::vector<std::uint64_t> words;
+    std::uint16_t added = 0;  // of the tiles around, as SurfaceTile::linked
+  };
   const std::vector<std::uint64_t>& RowsOf(std::uint32_t slot);
   void AddRows(const SurfaceTile& tile,
                std::int32_t shift_x,
@@ -49,7 +53,7 @@ class ObstacleClearance {
   std::int32_t none_squared_;
   std::int32_t side_;
   std::int32_t row_words_;
-  std::vector<std::vector<std::uint64_t>> rows_;  // by slot; empty until asked for
+  std::vector<Rows> rows_;  // by slot; empty until asked for
   // By the squared distance in cells.
   std::vector<std::uint8_t> steps_;
   std::vector<std::int32_t> height_limit_mm_;

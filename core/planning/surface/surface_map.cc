@@ -88,7 +88,7 @@ std::optional<double> SurfaceMap::Slope(const NodeRef& ref) const {
 }
 
 Status SurfaceMap::Analyse(const NodeRef& ref) {
-  ATLAS_RETURN_IF_ERROR(tiles_.Join(ref.slot));
+  ATLAS_RETURN_IF_ERROR(tiles_.Join(ref));
   SurfaceNode& node = tiles_.node(ref);
   if (!node.Has(SurfaceNode::kAnalysed)) {
     node.flags |= SurfaceNode::kAnalysed;

@@ -43,7 +43,7 @@ class SurfaceMap {
     return clearance_.Metres(tiles_.node(ref).clearance);
   }
   // Of the plane fitted around the node, rise over run; none where the surface ends. Requires that
-  // the node's tile is joined.
+  // the node is analysed.
   std::optional<double> Slope(const NodeRef& ref) const;
 
  private:

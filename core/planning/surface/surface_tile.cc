@@ -122,9 +122,9 @@ Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
   surface.origin_x = std::int64_t{id.x} * side;
   surface.origin_y = std::int64_t{id.y} * side;
   surface.cell_begin = tile.cell_begin;
-  surface.nodes.resize(tile.layers.size());
+  surface.around.fill(SurfaceTile::kNotThere);
+  surface.nodes.reserve(tile.layers.size());
   surface.obstacle_bits.resize(side * row_words);
-  auto next = surface.nodes.begin();
   for (std::uint32_t cell = 0; cell < side * side; ++cell) {
     const auto layers = tile.Layers(cell);
     for (std::size_t i = 0; i < layers.size(); ++i) {
@@ -132,7 +132,7 @@ Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
       SurfaceNode node =
           id.level == 0 ? MakeNode(layers[i], above, limits) : MakeCoarseNode(layers[i], limits);
       node.cell = static_cast<std::uint16_t>(cell);
-      *next++ = node;
+      surface.nodes.push_back(node);
       if (node.Has(SurfaceNode::kObstacle)) {
         surface.obstacle_bits[cell / side * row_words + cell % side / 64] |= std::uint64_t{1}
                                                                              << (cell % side % 64);

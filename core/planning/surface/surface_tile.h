@@ -65,9 +65,12 @@ struct SurfaceTile {
   // A bit a cell, row by row: whether a node of the cell is an obstacle. 64 cells a word, each row
   // begins a new one.
   std::vector<std::uint64_t> obstacle_bits;
-  // Slots of the 3 x 3 tiles around, row-major, this one in the middle; only once `is_joined`.
+  // Slots of the 3 x 3 tiles around, row-major, this one in the middle; kNotThere where nobody has
+  // loaded it, or it is not there.
   std::array<std::int32_t, 9> around{};
-  bool is_joined = false;
+  // A bit each: those that are loaded, and those that were asked for.
+  std::uint16_t linked = 0;
+  std::uint16_t joined = 0;
 
   std::span<const SurfaceNode> Nodes(std::uint32_t cell) const {
     return std::span(nodes).subspan(cell_begin[cell], cell_begin[cell + 1] - cell_begin[cell]);

@@ -1,4 +1,4 @@
-// The tiles of one pyramid level that a plan has looked at: loaded as needed, joined to those
+// The tiles of one pyramid level that a plan has looked at: loaded as needed, linked to those
 // around them, with room for a search.
 #pragma once
 
@@ -42,8 +42,18 @@ class SurfaceTiles {
     const auto known = slots_.find(id.Key());
     return known == slots_.end() ? SurfaceTile::kNotThere : known->second;
   }
-  // Loads the eight tiles around; errors as of Load.
-  Status Join(std::uint32_t slot) { return tiles_[slot]->is_joined ? Status() : JoinAround(slot); }
+  // Loads what lies within reach() of the node's cell, or of cell (x, y) of a tile; errors as of
+  // Load.
+  Status Join(const NodeRef& ref) {
+    const std::int32_t cell = node(ref).cell;
+    return Join(ref.slot, cell % side_, cell / side_);
+  }
+  Status Join(std::uint32_t slot, std::int32_t x, std::int32_t y) {
+    const std::uint32_t wanted = Around(x, y) & ~std::uint32_t{tiles_[slot]->joined};
+    return wanted == 0 ? Status() : JoinAround(slot, wanted);
+  }
+  // In cells: how far whatever asks for a node looks around it.
+  std::int32_t reach() const { return reach_; }
   // Makes room for the search in a tile. kResourceExhausted beyond the memory limit.
   Status PrepareSearch(std::uint32_t slot) {
     return tiles_[slot]->search.empty() ? MakeRoom(slot) : Status();
@@ -63,8 +73,8 @@ class SurfaceTiles {
   std::uint8_t level() const { return level_; }
   double cell_m() const { return cell_m_; }
 
-  // Cell (x, y) counted from the corner of `home`, up to one tile beyond it. Requires that `home`
-  // is joined.
+  // Cell (x, y) counted from the corner of `home`, up to one tile beyond it. Requires that it is
+  // within reach of a cell that is joined, or else it may seem not to be there.
   CellNodes Cell(const SurfaceTile& home, std::int32_t x, std::int32_t y) const {
     std::size_t around = 4;
     if (x < 0) {
@@ -112,7 +122,14 @@ class SurfaceTiles {
   }
 
  private:
-  Status JoinAround(std::uint32_t slot);
+  // Of the tiles around, those within reach of a cell: a bit each, as SurfaceTile::joined.
+  std::uint32_t Around(std::int32_t x, std::int32_t y) const {
+    const std::uint32_t columns = 2U | (x < reach_ ? 1U : 0U) | (x >= side_ - reach_ ? 4U : 0U);
+    return (columns << 3) | (y < reach_ ? columns : 0U) | (y >= side_ - reach_ ? columns << 6 : 0U);
+  }
+  Status JoinAround(std::uint32_t slot, std::uint32_t wanted);
+  // With those around it that are loaded, both ways.
+  void Link(std::uint32_t slot);
   Status MakeRoom(std::uint32_t slot);
 
   TileSource& source_;
@@ -122,6 +139,7 @@ class SurfaceTiles {
   std::uint8_t level_;
   std::int32_t side_;
   double cell_m_;
+  std::int32_t reach_;
   // By TileId::Key; kNotThere where the source has none.
   std::unordered_map<std::uint64_t, std::int32_t> slots_;
   std::vector<std::unique_ptr<SurfaceTile>> tiles_;
