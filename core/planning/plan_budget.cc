@@ -14,8 +14,12 @@ constexpr std::uint64_t kExpansionsBetweenChecks = 256;
 
 }  // namespace
 
-PlanBudget::PlanBudget(const PlanOptions& options, std::function<double()> now_s)
-    : options_(options), now_s_(std::move(now_s)) {
+PlanBudget::PlanBudget(const PlanOptions& options,
+                       std::function<double()> now_s,
+                       std::pmr::memory_resource* memory)
+    : options_(options),
+      now_s_(std::move(now_s)),
+      memory_(memory != nullptr ? memory : std::pmr::new_delete_resource()) {
   if (now_s_) {
     end_s_ = now_s_() + options.max_time_s;
   }

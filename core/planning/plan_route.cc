@@ -94,7 +94,7 @@ Result<Route> PlanRoute(TileSource& tiles, const MapProfile& profile, const Plan
   if (Status status = CheckRequest(profile, request); !status.ok()) {
     return Error(std::move(status));
   }
-  PlanBudget budget(request.options, request.now_s);
+  PlanBudget budget(request.options, request.now_s, request.memory);
   SurfaceMap map(tiles, profile, request.options, budget);
   Snapper snapper(map, profile, request.options);
   const auto start = snapper.Snap("start", request.from);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory_resource>
 #include <optional>
 #include <vector>
 
@@ -22,6 +23,8 @@ struct PlanRequest {
   PlanOptions options;
   // A clock in seconds that does not go back, for options.max_time_s; empty: time has no limit.
   std::function<double()> now_s = {};
+  // Where tiles and searches are kept, null: the heap. Nothing is given back before the end.
+  std::pmr::memory_resource* memory = nullptr;
 };
 
 // Where an end of a route stands: on the surface, in the middle of a cell. World frame.

@@ -181,7 +181,7 @@ FENCED = {
 # nor anything of the operating system; files only where scans and meshes are read and written.
 PURE = set("""
     algorithm array bit cassert charconv climits cmath compare concepts cstddef cstdint cstdlib cstring deque
-    functional initializer_list iosfwd iterator limits list map memory numbers numeric optional ostream queue set span
+    functional initializer_list iosfwd iterator limits list map memory memory_resource numbers numeric optional ostream queue set span
     sstream string string_view system_error tuple type_traits unordered_map unordered_set utility variant vector
     Eigen/Cholesky Eigen/Core Eigen/Eigenvalues Eigen/Geometry Eigen/LU tl/expected.hpp
     """.split())

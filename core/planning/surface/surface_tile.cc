@@ -110,19 +110,19 @@ Status CheckTile(const Tile& tile, const TileId& id, const MapProfile& profile) 
 Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
                                     const TileId& id,
                                     const MapProfile& profile,
-                                    const PlanOptions& options) {
+                                    const PlanOptions& options,
+                                    std::pmr::memory_resource* memory) {
   if (Status status = CheckTile(tile, id, profile); !status.ok()) {
     return Error(std::move(status));
   }
   const Limits limits = LimitsOf(profile, options);
   const std::uint32_t side = profile.tile_cells;
   const std::size_t row_words = (side + 63) / 64;
-  SurfaceTile surface;
+  SurfaceTile surface(memory);
   surface.id = id;
   surface.origin_x = std::int64_t{id.x} * side;
   surface.origin_y = std::int64_t{id.y} * side;
-  surface.cell_begin = tile.cell_begin;
-  surface.around.fill(SurfaceTile::kNotThere);
+  surface.cell_begin.assign(tile.cell_begin.begin(), tile.cell_begin.end());
   surface.nodes.reserve(tile.layers.size());
   surface.obstacle_bits.resize(side * row_words);
   for (std::uint32_t cell = 0; cell < side * side; ++cell) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -59,18 +60,24 @@ struct SurfaceTile {
   TileId id;
   std::int64_t origin_x = 0;  // of the corner cell, in cells of the level
   std::int64_t origin_y = 0;
-  std::vector<std::uint32_t> cell_begin;  // as in Tile
-  std::vector<SurfaceNode> nodes;         // as Tile::layers
-  std::vector<SearchNode> search;         // one a node, once the search came here
+  std::pmr::vector<std::uint32_t> cell_begin;  // as in Tile
+  std::pmr::vector<SurfaceNode> nodes;         // as Tile::layers
+  std::pmr::vector<SearchNode> search;         // one a node, once the search came here
   // A bit a cell, row by row: whether a node of the cell is an obstacle. 64 cells a word, each row
   // begins a new one.
-  std::vector<std::uint64_t> obstacle_bits;
+  std::pmr::vector<std::uint64_t> obstacle_bits;
   // Slots of the 3 x 3 tiles around, row-major, this one in the middle; kNotThere where nobody has
   // loaded it, or it is not there.
   std::array<std::int32_t, 9> around{};
   // A bit each: those that are loaded, and those that were asked for.
   std::uint16_t linked = 0;
   std::uint16_t joined = 0;
+
+  // `memory` outlives the tile.
+  explicit SurfaceTile(std::pmr::memory_resource* memory)
+      : cell_begin(memory), nodes(memory), search(memory), obstacle_bits(memory) {
+    around.fill(kNotThere);
+  }
 
   std::span<const SurfaceNode> Nodes(std::uint32_t cell) const {
     return std::span(nodes).subspan(cell_begin[cell], cell_begin[cell + 1] - cell_begin[cell]);
@@ -85,10 +92,12 @@ struct SurfaceTile {
 };
 
 // Of a level-0 tile what is open and what is an obstacle, of a coarser one, optimistically, what
-// may hold anything open. kInvalidData when `tile` is not tile `id` of this profile.
+// may hold anything open. kInvalidData when `tile` is not tile `id` of this profile. `memory`
+// outlives the result.
 Result<SurfaceTile> MakeSurfaceTile(const Tile& tile,
                                     const TileId& id,
                                     const MapProfile& profile,
-                                    const PlanOptions& options);
+                                    const PlanOptions& options,
+                                    std::pmr::memory_resource* memory);
 
 }  // namespace atlas

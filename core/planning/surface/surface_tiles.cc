@@ -53,7 +53,7 @@ Result<std::int32_t> SurfaceTiles::Load(const TileId& id) {
   }
   std::int32_t slot = SurfaceTile::kNotThere;
   if (*tile != nullptr) {
-    auto surface = MakeSurfaceTile(**tile, id, profile_, options_);
+    auto surface = MakeSurfaceTile(**tile, id, profile_, options_, budget_.memory());
     if (!surface) {
       return Error(surface.error());
     }

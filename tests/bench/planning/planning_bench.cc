@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/atlas_file/atlas_file.h"
+#include "client/map/arena.h"
 #include "client/score/cpu_timer.h"
 #include "core/planning/plan_route.h"
 #include "core/tile/tile_codec.h"
@@ -104,9 +105,11 @@ struct Run {
   double ms = 0.0;
 };
 
-Run Plan(TileSource& tiles, const MapProfile& profile, const PlanRequest& request) {
+Run Plan(TileSource& tiles, const MapProfile& profile, PlanRequest request) {
   Run run;
   const CpuTimer timer;
+  Arena memory;
+  request.memory = &memory;
   auto route = PlanRoute(tiles, profile, request);
   run.ms = 1e3 * timer.elapsed_s();
   if (route) {

@@ -10,6 +10,7 @@
 #include "client/cli/map_input/opened_map.h"
 #include "client/cli/output/json_text.h"
 #include "client/cli/output/text_table.h"
+#include "client/map/arena.h"
 #include "client/map/map_view.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
@@ -124,6 +125,8 @@ class PlanCommand : public Command {
       return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
           .count();
     };
+    Arena memory;
+    request_.memory = &memory;
     const Result<OpenedMap> map = OpenedMap::Open(context);
     if (!map) return map.error();
     MapView view(map->source());
