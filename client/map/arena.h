@@ -1,5 +1,5 @@
 // Memory for what grows piece by piece and goes at once: pieces are cut from blocks in huge pages,
-// which cost a fault for 2 MiB instead of one for each 4 KiB. Faults were half of a plan's time
+// which cost a fault for 2 MiB instead of one for each 4 KiB. Faults were a third of a plan's time
 // (decision 0611).
 #pragma once
 

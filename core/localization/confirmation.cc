@@ -53,7 +53,7 @@ std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
                                                       const RegistrationResult& here,
                                                       double usual_fit,
                                                       bool is_doubtful) {
-  if (is_confirmed_ && !is_doubtful && ++uncompared_ < options_.compared_after) {
+  if (is_confirmed_ && !is_suspected() && !is_doubtful && ++uncompared_ < options_.compared_after) {
     return std::nullopt;
   }
   uncompared_ = 0;
@@ -63,9 +63,9 @@ std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
                        [](const Rival& a, const Rival& b) { return a.margin() < b.margin(); });
   const bool is_better = better != rivals_.end() && better->margin() <= -options_.taken_margin;
   if (is_confirmed_) {
-    is_confirmed_ = !is_better;
-    is_new_ = is_better;
-    if (is_confirmed_) rivals_.clear();
+    is_confirmed_ = !is_better || better->scans < options_.suspected_scans;
+    is_new_ = !is_confirmed_;
+    if (!is_better) rivals_.clear();
     return std::nullopt;
   }
   if (is_better && better->scans >= options_.usual_scans &&
@@ -97,6 +97,8 @@ void Confirmation::Compare(const MapWindow& map,
                            const ScanFeatures& features,
                            const RegistrationResult& here) {
   const double score = PlaceScore(here, features);
+  const double weight = std::min(
+      1.0, std::sqrt(static_cast<double>(features.columns.size()) / options_.many_columns));
   before_.swap(rivals_);
   rivals_.clear();
   for (const double up_m : decks_.Find(map, features, here.T_world_level)) {
@@ -116,7 +118,7 @@ void Confirmation::Compare(const MapWindow& map,
       rival.lead = before->lead;
       rival.scans = before->scans;
     }
-    rival.lead += score - PlaceScore(rival.registration, features);
+    rival.lead += weight * (score - PlaceScore(rival.registration, features));
     ++rival.scans;
     rivals_.push_back(rival);
   }

@@ -42,13 +42,18 @@ struct ConfirmationOptions {
   double good_fit = 0.45;
   int usual_scans = 3;
   int good_scans = 20;
-  // A deck that is ahead by so much puts a place in doubt, and takes the vehicle over when it is so
-  // over several scans. One that is ahead by this little does not count where the vehicle was
-  // tracked until now.
+  // A deck that is ahead by so much makes a place suspected, puts it in doubt when it is so over
+  // these many scans, and takes the vehicle over. One that is ahead by this little does not count
+  // where the vehicle was tracked until now.
   double taken_margin = 0.12;
+  int suspected_scans = 5;
   double tracked_margin = 0.04;
 
   int compared_after = 10;  // scans, where nothing is in doubt
+
+  // A scan of fewer columns tells decks apart as badly as the error of a mean over them says: four
+  // rings in a garage have 600, sixteen 2,300 and more.
+  double many_columns = 2'000.0;
 
   // How far off a place may be that is not confirmed, standard deviations.
   double sigma_m = 10.0;
@@ -65,6 +70,8 @@ class Confirmation {
   }
 
   bool is_confirmed() const { return is_confirmed_; }
+  // Known, but the last scans fit better on another deck.
+  bool is_suspected() const { return is_confirmed_ && !rivals_.empty(); }
   // The place is known: it was told.
   void Trust();
   // The place is a new one: nothing has spoken for it.
@@ -83,9 +90,9 @@ class Confirmation {
   bool IsEnough(const RegistrationResult& here, const ScanFeatures& features) const;
 
   // The scan was registered `here`. While that is confirmed it is compared with other decks now and
-  // then, and at once where it `is_doubtful`; one that is better puts it in doubt. In doubt, it
-  // counts for confirmation; or the registration on another deck comes back, where the vehicle is
-  // rather: in doubt there, too.
+  // then, and at once where it `is_doubtful`; one that is better over some scans puts it in doubt.
+  // In doubt, it counts for confirmation; or the registration on another deck comes back, where the
+  // vehicle is rather: in doubt there, too.
   std::optional<RegistrationResult> Weigh(const MapWindow& map,
                                           const ScanFeatures& features,
                                           const RegistrationResult& here,

@@ -58,7 +58,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
     result.registration = *std::move(there);
     motion_.Raise(result.registration.T_world_level.translation().z() - up_m);
   }
-  if (!confirmation_.is_confirmed()) {
+  if (!confirmation_.is_confirmed() || confirmation_.is_suspected()) {
     result.health = LocalizationHealth::kWeak;
   }
 }

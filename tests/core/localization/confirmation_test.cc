@@ -74,5 +74,66 @@ TEST(ConfirmationTest, AVehicleCarriedToAnotherDeckIsFoundOnItAndNotCalledGoodBe
   }
 }
 
+// A place that is known, as scans say it that fit so well there.
+class KnownPlace {
+ public:
+  explicit KnownPlace(const ConfirmationOptions& options = {})
+      : confirmation_(options, RegistrationOptions()) {
+    confirmation_.Trust();
+  }
+
+  void Weigh(double fit) {
+    RegistrationResult here;
+    here.T_world_level = pose_;
+    here.fit = fit;
+    here.evidence = fit * static_cast<double>(features_.columns.size());
+    here.column_inliers = 1.0;
+    EXPECT_FALSE(confirmation_.Weigh(window_, features_, here, 0.7, true));
+  }
+  const Confirmation& known() const { return confirmation_; }
+
+ private:
+  Pose pose_ = OnDeck(0.0, -2.0, -3.0, 0.4);
+  MapWindow window_ = GarageMap().Window({0.0, 0.0, 1.8}, 25.0);
+  ScanFeatures features_ = FeaturesAt(testing::GarageCorner(), pose_);
+  Confirmation confirmation_;
+};
+
+TEST(ConfirmationTest, SingleScansThatFitBetterOnAnotherDeckPutNoKnownPlaceInDoubt) {
+  const auto is_suspected = [](double fit) {
+    KnownPlace fresh;
+    fresh.Weigh(fit);
+    return fresh.known().is_suspected();
+  };
+  double worse = 1.0;  // hardly so much that it counts
+  while (worse > 0.0 && !is_suspected(worse)) worse -= 0.02;
+  ASSERT_GT(worse, 0.0);
+  KnownPlace place;
+  const int enough = ConfirmationOptions().suspected_scans;
+  for (int round = 0; round < 3; ++round) {
+    for (int i = 1; i < enough; ++i) {
+      place.Weigh(worse);
+      EXPECT_TRUE(place.known().is_suspected()) << i;
+    }
+    place.Weigh(1.0);
+    EXPECT_TRUE(place.known().is_confirmed());
+    EXPECT_FALSE(place.known().is_suspected());
+  }
+  for (int i = 0; i < enough; ++i) place.Weigh(worse);
+  EXPECT_FALSE(place.known().is_confirmed());
+}
+
+TEST(ConfirmationTest, AScanOfFewColumnsSaysLessOfADeck) {
+  ConfirmationOptions options;
+  options.many_columns = 1.0;
+  KnownPlace many(options);
+  many.Weigh(0.1);
+  EXPECT_TRUE(many.known().is_suspected());
+  options.many_columns = 1e6;
+  KnownPlace few(options);
+  few.Weigh(0.1);
+  EXPECT_FALSE(few.known().is_suspected());
+}
+
 }  // namespace
 }  // namespace atlas
