@@ -80,8 +80,9 @@ asio::awaitable<Status> SendWatch(AtlasService& service,
   const std::stop_callback on_cancelled(cancelled, ring);
   const std::stop_callback on_left(peer_left, ring);
   TileChanges changes;  // nothing at first: from here on everything is told
+  std::uint64_t revision = service.revision();
+  (*watch)->TellFrom(revision);
   while (!cancelled.stop_requested() && !peer_left.stop_requested()) {
-    const std::uint64_t revision = service.revision();
     wire::Envelope event;
     event.set_request_id(request_id);
     event.mutable_watch_event()->set_revision(revision);
@@ -96,6 +97,7 @@ asio::awaitable<Status> SendWatch(AtlasService& service,
       co_await wake_up->Wait();
       changes = (*watch)->Take();
     }
+    revision = service.revision();
   }
   co_return Status(StatusCode::kUnavailable, cancelled.stop_requested()
                                                  ? "the watch was cancelled"

@@ -17,10 +17,16 @@ TileWatch::TileWatch(Scope scope, std::function<void()> wake, std::size_t max_to
       max_told_(max_told),
       asked_(std::move(scope.area), scope.finest_level, scope.coarsest_level) {}
 
+void TileWatch::TellFrom(std::uint64_t revision) {
+  const std::lock_guard lock(mutex_);
+  since_ = revision;
+  std::erase_if(revisions_, [this](const auto& entry) { return IsOld(entry.second); });
+}
+
 void TileWatch::Add(const TileId& id, std::uint64_t revision) {
   {
     const std::lock_guard lock(mutex_);
-    if (!asked_.Has(id)) {
+    if (IsOld(revision) || !asked_.Has(id)) {
       return;
     }
     const bool is_first = revisions_.empty() && below_.empty() && !is_anything_;

@@ -42,12 +42,16 @@ class TileWatch {
   // `wake` is called, from whatever thread, when there is something again after Take().
   TileWatch(Scope scope, std::function<void()> wake, std::size_t max_told = 1'024);
 
+  // What has no later revision is not told: whoever looks finds it. It may still be on its way here
+  // from the thread that wrote it.
+  void TellFrom(std::uint64_t revision);
   // Revision 0: the tile is no more.
   void Add(const TileId& id, std::uint64_t revision);
   // Everything since the last time.
   TileChanges Take();
 
  private:
+  bool IsOld(std::uint64_t revision) const { return revision != 0 && revision <= since_; }
   bool IsBelow(const TileId& id) const;
   void LoseDetail();
   void CoarsenTiles();
@@ -58,6 +62,7 @@ class TileWatch {
   const std::size_t max_told_;
   std::mutex mutex_;
   TouchedTiles asked_;
+  std::uint64_t since_ = 0;
   std::map<std::uint64_t, std::uint64_t> revisions_;  // by tile; finer levels have smaller keys
   std::set<std::uint64_t> below_;
   bool is_anything_ = false;

@@ -37,6 +37,23 @@ TEST(TileWatchTest, TellsTheNewestOfEachTileOnce) {
   EXPECT_EQ(woken, 2);
 }
 
+TEST(TileWatchTest, WhatIsThereWhenItBeginsIsNotToldLate) {
+  int woken = 0;
+  TileWatch watch(Everywhere(), [&woken] { ++woken; });
+  watch.Add({0, 1, 2}, 5);
+  watch.Add({0, 2, 2}, 8);
+  watch.TellFrom(7);
+  EXPECT_EQ(watch.Take().tiles, (std::vector<TileChanges::Tile>{{{0, 2, 2}, 8}}));
+  watch.Add({0, 3, 2}, 6);
+  watch.Add({0, 4, 2}, 7);
+  EXPECT_EQ(woken, 1);
+  EXPECT_TRUE(watch.Take().empty());
+  watch.Add({0, 3, 2}, 9);
+  watch.Add({0, 4, 2}, 0);
+  EXPECT_EQ(watch.Take().tiles.size(), 2U)
+      << "one is later, of the other nobody knows when it went";
+}
+
 TEST(TileWatchTest, HearsOfItsAreaAndLevelsOnly) {
   TileWatch::Scope scope = Everywhere(20.0);
   scope.finest_level = 1;
