@@ -42,8 +42,8 @@ class SurfaceTiles {
     const auto known = slots_.find(id.Key());
     return known == slots_.end() ? SurfaceTile::kNotThere : known->second;
   }
-  // Loads what lies within reach() of the node's cell, or of cell (x, y) of a tile; errors as of
-  // Load.
+  // Loads what whatever asks for a node looks at around it: around its cell, or cell (x, y) of a
+  // tile. Errors as of Load.
   Status Join(const NodeRef& ref) {
     const std::int32_t cell = node(ref).cell;
     return Join(ref.slot, cell % side_, cell / side_);
@@ -52,8 +52,6 @@ class SurfaceTiles {
     const std::uint32_t wanted = Around(x, y) & ~std::uint32_t{tiles_[slot]->joined};
     return wanted == 0 ? Status() : JoinAround(slot, wanted);
   }
-  // In cells: how far whatever asks for a node looks around it.
-  std::int32_t reach() const { return reach_; }
   // Makes room for the search in a tile. kResourceExhausted beyond the memory limit.
   Status PrepareSearch(std::uint32_t slot) {
     return tiles_[slot]->search.empty() ? MakeRoom(slot) : Status();
@@ -139,7 +137,7 @@ class SurfaceTiles {
   std::uint8_t level_;
   std::int32_t side_;
   double cell_m_;
-  std::int32_t reach_;
+  std::int32_t reach_;  // cells: how far a search, clearance, slopes and gaps look around a node
   // By TileId::Key; kNotThere where the source has none.
   std::unordered_map<std::uint64_t, std::int32_t> slots_;
   std::vector<std::unique_ptr<SurfaceTile>> tiles_;
