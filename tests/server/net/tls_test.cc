@@ -226,6 +226,8 @@ TEST_F(TlsTest, WhoeverIsTakenBackBeforeItsGreetingStaysOutside) {
   ASSERT_TRUE(thief.is_encrypted());
   ca_->Revoke(stolen);
   server_->ChangeSecurity(SecurityOf("renewed", security_.access));
+  const BlockingPeer marker(port_, As("car.9"));
+  ASSERT_EQ(marker.PeerName(), "renewed") << "accepted after the change";
   EXPECT_EQ(CodeOf(thief.Greet()), StatusCode::kPermissionDenied);
   EXPECT_TRUE(thief.IsClosed());
   EXPECT_TRUE(car.Greet().has_hello_reply());
