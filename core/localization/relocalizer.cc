@@ -152,6 +152,7 @@ std::vector<Relocalizer::Start> Relocalizer::Check(const ScanFeatures& features,
   std::stable_sort(starts.begin(), starts.end(), HasMore);
   std::vector<Start> apart;
   for (const Start& start : starts) {
+    if (start.score < options_.refined_share * starts.front().score) break;
     const bool is_near = std::any_of(apart.begin(), apart.end(), [&](const Start& other) {
       return !AreApart(start.T_world_level, other.T_world_level, options_.refined_apart_m,
                        options_.refined_apart_rad);

@@ -30,7 +30,8 @@ struct RelocalizerOptions {
   double candidates_apart_m = 1.5;
   std::size_t checked_columns = 160;  // ... by half of so many of the scan's columns; by all ...
   std::size_t checked_closely = 100;  // ... of which the best so many are checked ...
-  std::size_t refined = 5;            // ... and of which the best so many are registered
+  std::size_t refined = 5;            // ... and of which the best so many are registered, ...
+  double refined_share = 0.5;         // ... as far as they have this share of the best one's columns
   double refined_apart_m = 1.0;
   double refined_apart_rad = 0.1;
 

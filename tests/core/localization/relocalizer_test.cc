@@ -169,6 +169,33 @@ TEST(RelocalizerTest, ElsewhereOrWithNothingToSeeItDoesNotKnow) {
                    .T_world_sensor);
 }
 
+// The map around a place is loaded for those only that may be it.
+TEST(RelocalizerTest, PlacesThatCarryFarLessThanTheBestAreNotRegistered) {
+  const PaintedMap& map = StreetMap();
+  const Pose truth = UprightPose({0.0, 0.0, 1.8}, 1.1);
+  std::size_t loaded = 0;
+  const auto counted = [&](const Eigen::Vector3d& center, double radius_m) {
+    ++loaded;
+    return map.Source()(center, radius_m);
+  };
+  std::vector<std::size_t> registered;
+  for (const double share : {0.0, 0.5, 0.9, 1.0}) {
+    RelocalizerOptions options;
+    options.features.max_range_m = 25.0F;
+    options.refined_share = share;
+    loaded = 0;
+    const auto found =
+        Find({map.profile(), PlacesOf(map), counted, options}, testing::Street(), truth);
+    registered.push_back(loaded);
+    ASSERT_FALSE(found.places.empty());
+    EXPECT_LT(ErrorOf(found.places[0].registration.T_world_level, truth).horizontal_m, 0.1)
+        << share;
+  }
+  EXPECT_EQ(registered.front(), RelocalizerOptions().refined);
+  EXPECT_TRUE(std::is_sorted(registered.rbegin(), registered.rend()));
+  EXPECT_LT(registered.back(), registered.front());
+}
+
 TEST(RelocalizerTest, ErrorsOfTheTilesAreItsOwn) {
   const Relocalizer relocalizer(
       StreetMap().profile(), PlacesOf(StreetMap()),
