@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/localization/place_score.h"
-
 namespace atlas {
 
 void Confirmation::Trust() {
@@ -97,8 +95,7 @@ void Confirmation::Compare(const MapWindow& map,
                            const ScanFeatures& features,
                            const RegistrationResult& here) {
   const double score = PlaceScore(here, features);
-  const double weight = std::min(
-      1.0, std::sqrt(static_cast<double>(features.columns.size()) / options_.many_columns));
+  const double weight = DeckWeight(features, options_.many_columns);
   before_.swap(rivals_);
   rivals_.clear();
   for (const double up_m : decks_.Find(map, features, here.T_world_level)) {

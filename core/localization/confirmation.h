@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/localization/other_decks.h"
+#include "core/localization/place_score.h"
 #include "core/localization/pose_prior.h"
 #include "core/localization/registration.h"
 
@@ -51,9 +52,7 @@ struct ConfirmationOptions {
 
   int compared_after = 10;  // scans, where nothing is in doubt
 
-  // A scan of fewer columns tells decks apart as badly as the error of a mean over them says: four
-  // rings in a garage have 600, sixteen 2,300 and more.
-  double many_columns = 2'000.0;
+  double many_columns = kManyColumns;  // DeckWeight
 
   // How far off a place may be that is not confirmed, standard deviations.
   double sigma_m = 10.0;

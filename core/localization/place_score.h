@@ -8,6 +8,11 @@ namespace atlas {
 
 // Share of the scan's columns that the map explains there, less contradictions.
 double ExplainedShare(const RegistrationResult& registration, const ScanFeatures& features);
+// A scan of fewer columns tells decks apart as badly as the error of a mean over them says: four
+// rings in a garage have 600, sixteen 2,300 and more (decision 0629).
+inline constexpr double kManyColumns = 2'000.0;
+// How much a scan counts then, 0..1.
+double DeckWeight(const ScanFeatures& features, double many_columns);
 // By which places are compared. A deck that was mapped better explains more; the right one is
 // contradicted less.
 double PlaceScore(const RegistrationResult& registration, const ScanFeatures& features);

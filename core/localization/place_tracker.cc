@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/localization/other_decks.h"
@@ -66,8 +67,52 @@ void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
 
 MotionModel PlaceTracker::Next() const {
   MotionModel next = motion_;
-  if (!is_first_) next.Predict(scans_);
+  if (!is_first_ && scans_ > options_.most_predicted) {
+    next.ForgetMotion();
+    next.Predict();
+  } else if (!is_first_) {
+    next.Predict(scans_);
+  }
   return next;
+}
+
+bool PlaceTracker::HasStood(const ScanFeatures& features) {
+  if (is_first_ || lost_ > 0 || scans_ <= options_.most_missing) {
+    return false;
+  }
+  MotionModel stood = motion_;
+  stood.ForgetMotion();
+  stood.Predict();
+  MotionModel stopped = motion_;  // and went on as before
+  stopped.Predict();
+  constexpr double kNone = -std::numeric_limits<double>::max();
+  bool has_stood = scans_ > options_.most_predicted;
+  double asked = LikelihoodNear(has_stood ? stood : Next(), features).value_or(kNone) +
+                 options_.believed_log_ratio;
+  if (has_stood) motion_ = stood;
+  for (const MotionModel& model : {stood, stopped}) {
+    const std::optional<double> likelihood = LikelihoodNear(model, features);
+    if (likelihood && *likelihood > asked) {
+      asked = *likelihood;
+      motion_ = model;
+      has_stood = true;
+    }
+  }
+  return has_stood;
+}
+
+std::optional<double> PlaceTracker::LikelihoodNear(const MotionModel& model,
+                                                   const ScanFeatures& features) const {
+  const PosePrior prior{LevelFrame(model.T_world_sensor()), model.covariance()};
+  if (carried_ > 0) {
+    const double fit = MotionSince(recent_, features, prior, options_.odometry).fit;
+    return fit >= options_.odometry.min_fit ? std::optional(fit) : std::nullopt;
+  }
+  const RegistrationResult here =
+      Register(map_.window(), features, prior.T_world_level, prior, options_.registration);
+  return confirmation_.IsAsUsual(here, features, usual_fit_)
+             ? std::optional(At(here, false).log_likelihood)
+             : std::nullopt;
 }
 
 Status PlaceTracker::Prepare() {
@@ -78,8 +123,9 @@ Status PlaceTracker::Prepare() {
 
 LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
                                        const Eigen::Quaterniond& R_level_sensor) {
-  if (!is_first_) {
-    motion_.Predict(scans_);
+  has_stood_ = HasStood(features);
+  if (!has_stood_) {
+    motion_ = Next();
   }
   if (carried_ > 0) {
     ++carried_;
@@ -95,7 +141,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   }
   result.registration = std::move(tracked.place.registration);
   bool is_found = false;
-  if (IsDoubtful(result.registration) || IsAdrift() || IsVagueStart()) {
+  if (IsDoubtful(result.registration) || IsAdrift() || IsVagueStart() || carried_ > 0) {
     Searched searched = Search(features, result.registration);
     is_found = searched.found.has_value();
     if (is_found) {

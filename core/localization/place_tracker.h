@@ -48,6 +48,11 @@ struct PlaceTrackerOptions {
   double max_weak_up_m = 0.3;      // as is a height that is known no better, standard deviation
   int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did
 
+  // Where more than so many scans are missing the vehicle may have stood meanwhile (a recorder that
+  // waits at a red light with it), where more than that nothing is known of its motion.
+  double most_missing = 5.0;
+  double most_predicted = 20.0;
+
   // Neighbouring features err together: a scan informs as this share of its features would, and a
   // feature counts as much in a log likelihood. However many there are, no place is known better
   // than the map is: standard deviations, of a place also as a share of a cell. Fitted to the
@@ -96,6 +101,8 @@ struct PlaceTrackerOptions {
   double edge_ground_mapped = 0.9;
   double same_step_m = 0.5;
   double same_step_rad = 0.05;
+  // So far around where a place that is not confirmed has come to its own motion is looked for.
+  double unsure_m = 1.0;
   float near_ground_m = 15.0F;
   float ground_reach_m = 0.6F;
   double reachable_sigmas = 3.5;     // of (x, y, yaw) in all, and of the height: 0.997 of what
@@ -195,6 +202,11 @@ class PlaceTracker {
   };
 
   MotionModel Next() const;  // at the next scan
+  // Whether the scan says that the vehicle stood since the last one; then that is its motion.
+  bool HasStood(const ScanFeatures& features);
+  // How well it fits near where that motion led; none where it does not fit as usual.
+  std::optional<double> LikelihoodNear(const MotionModel& model,
+                                       const ScanFeatures& features) const;
   PosePrior Prior() const;
   Place At(const RegistrationResult& registration, bool has_prior) const;
   // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
@@ -212,6 +224,11 @@ class PlaceTracker {
   PoseCovariance StepCovariance(const ScanMotion& moved);
   // Whether that is near enough to where it is expected.
   bool IsWithinReach(const Pose& T_world_level) const;
+  // Whether from the last scan that fitted to this one the place moved as the vehicle did, as both
+  // scans tell. Where there was no last one, it did.
+  bool MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result);
+  // Whether the last scans that were kept say that this one was taken where it is expected.
+  bool GoesWithRecent(const ScanFeatures& features, const PosePrior& expected) const;
   // Whether so much of the ground is mapped that the scan would fit if this were the place.
   bool IsOnMap(const RegistrationResult& result,
                const ScanFeatures& features,
@@ -273,16 +290,19 @@ class PlaceTracker {
   MotionModel motion_;
   Confirmation confirmation_;
   bool is_first_ = true;
-  bool is_told_ = false;               // where it is at the first scan, and how surely
-  StartHint hint_;                     // where it is not
-  double scans_ = 1.0;                 // from the last scan to the next
-  double usual_fit_ = 0.0;             // of good results, exponentially forgotten
-  int lost_ = 0;                       // scans in a row
-  int unheld_ = 0;                     // scans in a row
-  int without_map_ = 0;                // scans in a row on which the map was not all there
-  RecentScans recent_;                 // while it is known where each was taken
-  int carried_ = 0;                    // scans in a row, the one at hand as well
-  double carried_m_ = 0.0;             // the way that it made meanwhile
+  bool is_told_ = false;    // where it is at the first scan, and how surely
+  StartHint hint_;          // where it is not
+  double scans_ = 1.0;      // from the last scan to the next
+  bool has_stood_ = false;  // in a pause before the scan at hand
+  double usual_fit_ = 0.0;  // of good results, exponentially forgotten
+  int lost_ = 0;            // scans in a row
+  int unheld_ = 0;          // scans in a row
+  int without_map_ = 0;     // scans in a row on which the map was not all there
+  RecentScans recent_;      // while it is known where each was taken
+  int carried_ = 0;         // scans in a row, the one at hand as well
+  double carried_m_ = 0.0;  // the way that it made meanwhile
+  std::optional<Eigen::Vector4d>
+      off_carried_;                    // of the last scan that fitted, from where it came to
   Pose last_kept_ = Pose::Identity();  // where the last of recent_ was taken
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;

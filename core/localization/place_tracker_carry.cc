@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -17,7 +19,7 @@ bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatur
     return is_told_ && (IsDoubtful(tracked) || !IsWithinReach(tracked.T_world_level) ||
                         !IsOnMap(tracked, features, 1.0));
   }
-  if (!IsDoubtful(tracked)) {
+  if (!IsDoubtful(tracked) || !confirmation_.is_confirmed()) {
     return false;
   }
   RegistrationResult here = tracked;
@@ -66,6 +68,12 @@ void PlaceTracker::Keep(const ScanFeatures& features,
   }
   if (!is_carried) {
     carried_ = 0;
+    off_carried_.reset();
+    if (!is_lost && !is_known) {  // the next scan tells whether it moves
+      recent_.Clear();
+      recent_.Add(features, result.registration.T_world_level);
+      return;
+    }
     if (result.health != LocalizationHealth::kGood && !IsNearEdge(features, result)) {
       return;
     }
@@ -84,13 +92,31 @@ bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationRe
       GroundMapped(features, there).value_or(1.0) > options_.edge_ground_mapped) {
     return false;
   }
-  const PosePrior expected{there, PoseCovariance::Zero()};
-  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
   const bool agrees =
-      confirmation_.is_confirmed() && moved.fit >= options_.odometry.min_fit &&
-      !AreApart(moved.T_world_level, there, options_.same_step_m, options_.same_step_rad);
+      confirmation_.is_confirmed() && GoesWithRecent(features, {there, PoseCovariance::Zero()});
   if (!agrees) recent_.Clear();
   return agrees;
+}
+
+bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result) {
+  if (carried_ > 0) {
+    const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, result.T_world_level);
+    const auto before = std::exchange(off_carried_, off);
+    return !before || ((off - *before).head<3>().norm() <= options_.same_step_m &&
+                       std::abs(std::remainder(off(3) - (*before)(3), 2.0 * std::numbers::pi)) <=
+                           options_.same_step_rad);
+  }
+  const Eigen::Vector4d sigmas(options_.unsure_m, options_.unsure_m, options_.step_up_m,
+                               options_.same_step_rad);
+  return recent_.is_empty() ||
+         GoesWithRecent(features, {result.T_world_level, sigmas.cwiseAbs2().asDiagonal()});
+}
+
+bool PlaceTracker::GoesWithRecent(const ScanFeatures& features, const PosePrior& expected) const {
+  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
+  return moved.fit >= options_.odometry.min_fit &&
+         !AreApart(moved.T_world_level, expected.T_world_level, options_.same_step_m,
+                   options_.same_step_rad);
 }
 
 bool PlaceTracker::IsOnMap(const RegistrationResult& result,

@@ -24,7 +24,7 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
     return is_as_usual ? Surprise::kNone : Surprise::kOdd;
   }
   if (lost_ == 0 && !is_found) {
-    return Surprise::kNone;
+    return has_stood_ ? Surprise::kOdd : Surprise::kNone;
   }
   const bool is_near =
       off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;
@@ -47,6 +47,9 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
     confirmation_.Doubt();
   } else if (surprise == Surprise::kOdd) {
     confirmation_.Question();
+  }
+  if (!confirmation_.is_confirmed() && !MovesAsSeen(features, result.registration)) {
+    confirmation_.Miss();
   }
   const double up_m = result.registration.T_world_level.translation().z();
   if (auto there = confirmation_.Weigh(map_.window(), features, result.registration, usual_fit_,

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/localization/place_score.h"
 #include "core/localization/pose_prior.h"
 
 namespace atlas {
@@ -119,7 +118,7 @@ Result<Relocalization> Relocalizer::Find(const LeveledScan& scan,
   }
   const double next = result.places.size() > 1 ? result.places[1].score : 0.0;
   result.margin = result.places[0].score - next;
-  if (IsBelieved(result)) {
+  if (IsBelieved(result, DeckWeight(features, options_.many_columns))) {
     result.T_world_sensor = result.places[0].registration.T_world_level;
     result.T_world_sensor->linear() *= R_level_sensor.toRotationMatrix();
   }
@@ -216,21 +215,25 @@ void Relocalizer::Add(RelocalizedPlace place, std::vector<RelocalizedPlace>& pla
   places.push_back(std::move(place));
 }
 
-bool Relocalizer::IsBelieved(const Relocalization& found) const {
+bool Relocalizer::IsBelieved(const Relocalization& found, double deck_weight) const {
   const RelocalizedPlace& best = found.places.front();
   return best.registration.fit >= options_.min_fit &&
          WorstSigma(best.registration) <= options_.max_sigma_m &&
          best.registration.column_inliers >= options_.min_columns &&
          best.explained >= options_.min_explained &&
-         std::all_of(found.places.begin() + 1, found.places.end(),
-                     [&](const RelocalizedPlace& other) { return IsBehind(other, best); });
+         std::all_of(
+             found.places.begin() + 1, found.places.end(),
+             [&](const RelocalizedPlace& other) { return IsBehind(other, best, deck_weight); });
 }
 
-bool Relocalizer::IsBehind(const RelocalizedPlace& other, const RelocalizedPlace& best) const {
+bool Relocalizer::IsBehind(const RelocalizedPlace& other,
+                           const RelocalizedPlace& best,
+                           double deck_weight) const {
   const Eigen::Vector3d off = other.registration.T_world_level.translation() -
                               best.registration.T_world_level.translation();
   const bool is_deck = off.head<2>().norm() < options_.decks.apart_m;
-  return best.score - other.score >= (is_deck ? options_.min_deck_margin : options_.min_margin);
+  return best.score - other.score >=
+         (is_deck ? options_.min_deck_margin / deck_weight : options_.min_margin);
 }
 
 }  // namespace atlas

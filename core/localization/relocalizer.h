@@ -12,6 +12,7 @@
 #include "core/base/status.h"
 #include "core/localization/local_map.h"
 #include "core/localization/other_decks.h"
+#include "core/localization/place_score.h"
 #include "core/localization/places/place_index.h"
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
@@ -43,7 +44,10 @@ struct RelocalizerOptions {
   double min_explained = 0.15;
   double max_sigma_m = 0.015;  // of the worst horizontal direction
   double min_margin = 0.08;
-  double min_deck_margin = 0.12;  // where that is a deck above or below: they look alike
+  // ... where that is a deck above or below: they look alike. The more where a scan of few
+  // columns counts less (DeckWeight).
+  double min_deck_margin = 0.12;
+  double many_columns = kManyColumns;
 };
 
 // A place that was registered.
@@ -91,9 +95,11 @@ class Relocalizer {
                           const ScanFeatures& features,
                           const Pose& start) const;
   void Add(RelocalizedPlace place, std::vector<RelocalizedPlace>& places) const;
-  bool IsBelieved(const Relocalization& found) const;
+  bool IsBelieved(const Relocalization& found, double deck_weight) const;
   // Whether that much more speaks for `best`.
-  bool IsBehind(const RelocalizedPlace& other, const RelocalizedPlace& best) const;
+  bool IsBehind(const RelocalizedPlace& other,
+                const RelocalizedPlace& best,
+                double deck_weight) const;
 
   MapProfile profile_;
   std::shared_ptr<const PlaceIndex> places_;

@@ -78,6 +78,39 @@ TEST(LocalizerTest, GoesOnBehindScansThatAreMissing) {
   }
 }
 
+// A recorder that waits with it: the vehicle stands for so long, and goes on or not.
+TEST(LocalizerTest, StandsInAPause) {
+  for (const double pause : {6.0, 13.0, 40.0, 100.0}) {
+    for (const double ahead_m : {0.0, 2.0}) {
+      Localizer localizer = StreetLocalizer();
+      localizer.Start(OnStreet(-14.0));
+      for (int i = 0; i < 4; ++i) At(localizer, testing::Street(), OnStreet(-14.0 + 2.0 * i));
+      for (int i = 0; i < 5; ++i) {
+        const Pose truth = OnStreet(-8.0 + ahead_m + 2.0 * i);
+        const auto scan = CastLeveledScan(testing::QuickSensor(), testing::Street(), truth);
+        const LocalizationResult result =
+            localizer.Localize(scan, kLevel, i == 0 ? pause : 1.0).value();
+        EXPECT_NE(result.health, LocalizationHealth::kLost)
+            << pause << ", " << ahead_m << ", " << i;
+        EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06) << pause << ", " << i;
+        const bool is_confirmed = result.health == LocalizationHealth::kGood;
+        EXPECT_TRUE(is_confirmed || i < 3) << pause << ", " << ahead_m << ", " << i;
+      }
+    }
+  }
+}
+
+TEST(LocalizerTest, WhoDroveOnInAPauseIsNotTakenForStanding) {
+  Localizer localizer = StreetLocalizer();
+  localizer.Start(OnStreet(-18.0));
+  for (int i = 0; i < 4; ++i) At(localizer, testing::Street(), OnStreet(-18.0 + 2.0 * i));
+  const Pose truth = OnStreet(-12.0 + 7 * 2.0);
+  const auto scan = CastLeveledScan(testing::QuickSensor(), testing::Street(), truth);
+  const LocalizationResult result = localizer.Localize(scan, kLevel, 7.0).value();
+  EXPECT_EQ(result.health, LocalizationHealth::kGood);
+  EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.06);
+}
+
 // Where it was told to be is not where it seems to be: it may be a place that looks like it.
 TEST(LocalizerTest, AFirstPlaceFarFromTheToldOneIsConfirmedFirst) {
   Localizer localizer = StreetLocalizer();
@@ -218,6 +251,42 @@ TEST_F(AmongPostsTest, ItDoesNotSayWhichAreBesideIt) {
   EXPECT_GT(std::sqrt(result.covariance(0, 0)), 1.0) << "ahead: one post or another";
   EXPECT_LT(std::sqrt(result.covariance(1, 1)), 0.3);
   EXPECT_NEAR(result.T_world_sensor.translation().y(), 0.3, 0.05);
+}
+
+// The map has posts, each like the next, and not what stands behind them. Whoever is supposed to be
+// beside the wrong one finds one there with every scan, but not at the speed that the scans tell.
+TEST(SupposedPlaceTest, APlaceThatDoesNotMoveAsTheVehicleDoesIsNotConfirmed) {
+  ShapeWorld posts;
+  posts.patches = {testing::Patch{}};
+  for (int i = -25; i <= 25; ++i) {
+    for (const double y_m : {-4.05, 4.05}) {
+      posts.boxes.push_back(
+          testing::Box{{1.0 * i + 0.05, y_m, -1.0}, {1.0 * i + 0.25, y_m + 0.2, 4.0}});
+    }
+  }
+  PaintedMap map;
+  map.Paint(posts, 30.0);
+  ShapeWorld world = posts;
+  for (int i = -12; i <= 12; ++i) {
+    for (const double y_m : {-6.05, 5.05}) {
+      const double x_m = 2.3 * i + 0.55 * ((i * i + (y_m > 0.0 ? 1 : 0)) % 5);
+      world.boxes.push_back(testing::Box{{x_m, y_m, -1.0}, {x_m + 0.6, y_m + 1.0, 6.0}});
+    }
+  }
+  PlaceTrackerOptions options;
+  options.confirmation.usual_fit = 0.5;
+  PlaceTracker tracker(map.profile(), map.Source(), options, 25.0);
+  tracker.Suppose(UprightPose({-7.0, 0.3, 1.8}, 0.0), 0.0);
+  for (int i = 0; i < 8; ++i) {
+    const Pose truth = UprightPose({-6.0 + 1.2 * i, 0.3, 1.8}, 0.0);
+    const LeveledScan scan = CastLeveledScan(testing::QuickSensor(), world, truth);
+    ASSERT_TRUE(tracker.Prepare().ok());
+    tracker.Expect(1.0);
+    const LocalizationResult result =
+        tracker.Track(ExtractFeatures(scan, QuickOptions().features), kLevel);
+    const double off_m = ErrorOf(result.T_world_sensor, truth).horizontal_m;
+    EXPECT_FALSE(result.health == LocalizationHealth::kGood && off_m > 0.3) << i << ": " << off_m;
+  }
 }
 
 // A bare plain to the west, houses to the east: nothing tells the speed until they are in sight.

@@ -31,7 +31,7 @@ class LocalizeCommand : public Command {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt");
     drive_.DeclareScans(arguments);
     arguments.Optional("--max-range", "M", options_.max_range_m,
-                       "Reach of what is matched [100; paper: 40]");
+                       "Reach of what is matched [100; paper: 40]; below 20 m places look alike");
     arguments.Optional(
         "--perturb", "T_M,R_DEG", perturbation_,
         "Single shots from starts so far off, as they are told to be; else the drive is tracked");
@@ -44,8 +44,10 @@ class LocalizeCommand : public Command {
                        "given and right to so much");
     arguments.Optional("--prior-height", "M", prior_height_m_,
                        "The same of the height: no other deck counts");
-    arguments.Choice("--deskew", {"on", "off", "auto"}, deskew_,
-                     "Undo the predicted motion during a scan; auto: where drives are skewed");
+    arguments.Choice(
+        "--deskew", {"on", "off", "auto"}, deskew_,
+        "Undo the predicted motion during a scan; auto: where drives are skewed; on: always, which "
+        "spoils scans that are not");
     arguments.Choice("--mode", {"atlas", "paper"}, mode_,
                      "How scans are matched; paper: its encode, decode and ICP, to compare with");
     track_.Declare(arguments);
