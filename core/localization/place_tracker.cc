@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/localization/other_decks.h"
@@ -74,45 +73,6 @@ MotionModel PlaceTracker::Next() const {
     next.Predict(scans_);
   }
   return next;
-}
-
-bool PlaceTracker::HasStood(const ScanFeatures& features) {
-  if (is_first_ || lost_ > 0 || scans_ <= options_.most_missing) {
-    return false;
-  }
-  MotionModel stood = motion_;
-  stood.ForgetMotion();
-  stood.Predict();
-  MotionModel stopped = motion_;  // and went on as before
-  stopped.Predict();
-  constexpr double kNone = -std::numeric_limits<double>::max();
-  bool has_stood = scans_ > options_.most_predicted;
-  double asked = LikelihoodNear(has_stood ? stood : Next(), features).value_or(kNone) +
-                 options_.believed_log_ratio;
-  if (has_stood) motion_ = stood;
-  for (const MotionModel& model : {stood, stopped}) {
-    const std::optional<double> likelihood = LikelihoodNear(model, features);
-    if (likelihood && *likelihood > asked) {
-      asked = *likelihood;
-      motion_ = model;
-      has_stood = true;
-    }
-  }
-  return has_stood;
-}
-
-std::optional<double> PlaceTracker::LikelihoodNear(const MotionModel& model,
-                                                   const ScanFeatures& features) const {
-  const PosePrior prior{LevelFrame(model.T_world_sensor()), model.covariance()};
-  if (carried_ > 0) {
-    const double fit = MotionSince(recent_, features, prior, options_.odometry).fit;
-    return fit >= options_.odometry.min_fit ? std::optional(fit) : std::nullopt;
-  }
-  const RegistrationResult here =
-      Register(map_.window(), features, prior.T_world_level, prior, options_.registration);
-  return confirmation_.IsAsUsual(here, features, usual_fit_)
-             ? std::optional(At(here, false).log_likelihood)
-             : std::nullopt;
 }
 
 Status PlaceTracker::Prepare() {
@@ -259,8 +219,8 @@ void PlaceTracker::Remember(const LocalizationResult& result,
   lost_ = 0;
 }
 
-PosePrior PlaceTracker::Prior() const {
-  return {LevelFrame(motion_.T_world_sensor()), motion_.covariance()};
+PosePrior PlaceTracker::PriorOf(const MotionModel& motion) {
+  return {LevelFrame(motion.T_world_sensor()), motion.covariance()};
 }
 
 PlaceTracker::Place PlaceTracker::At(const RegistrationResult& registration, bool has_prior) const {

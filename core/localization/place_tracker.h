@@ -204,10 +204,12 @@ class PlaceTracker {
   MotionModel Next() const;  // at the next scan
   // Whether the scan says that the vehicle stood since the last one; then that is its motion.
   bool HasStood(const ScanFeatures& features);
-  // How well it fits near where that motion led; none where it does not fit as usual.
+  // How well it fits near where that motion led, carried to the scans before it, else to the map;
+  // none where it does not fit as usual.
   std::optional<double> LikelihoodNear(const MotionModel& model,
                                        const ScanFeatures& features) const;
-  PosePrior Prior() const;
+  static PosePrior PriorOf(const MotionModel& motion);
+  PosePrior Prior() const { return PriorOf(motion_); }
   Place At(const RegistrationResult& registration, bool has_prior) const;
   // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
   void SpreadStarts(const PosePrior& prior);
@@ -290,20 +292,19 @@ class PlaceTracker {
   MotionModel motion_;
   Confirmation confirmation_;
   bool is_first_ = true;
-  bool is_told_ = false;    // where it is at the first scan, and how surely
-  StartHint hint_;          // where it is not
-  double scans_ = 1.0;      // from the last scan to the next
-  bool has_stood_ = false;  // in a pause before the scan at hand
-  double usual_fit_ = 0.0;  // of good results, exponentially forgotten
-  int lost_ = 0;            // scans in a row
-  int unheld_ = 0;          // scans in a row
-  int without_map_ = 0;     // scans in a row on which the map was not all there
-  RecentScans recent_;      // while it is known where each was taken
-  int carried_ = 0;         // scans in a row, the one at hand as well
-  double carried_m_ = 0.0;  // the way that it made meanwhile
-  std::optional<Eigen::Vector4d>
-      off_carried_;                    // of the last scan that fitted, from where it came to
-  Pose last_kept_ = Pose::Identity();  // where the last of recent_ was taken
+  bool is_told_ = false;                        // where it is at the first scan, and how surely
+  StartHint hint_;                              // where it is not
+  double scans_ = 1.0;                          // from the last scan to the next
+  bool has_stood_ = false;                      // in a pause before the scan at hand
+  double usual_fit_ = 0.0;                      // of good results, exponentially forgotten
+  int lost_ = 0;                                // scans in a row
+  int unheld_ = 0;                              // scans in a row
+  int without_map_ = 0;                         // scans in a row on which the map was not all there
+  RecentScans recent_;                          // while it is known where each was taken
+  int carried_ = 0;                             // scans in a row, the one at hand as well
+  double carried_m_ = 0.0;                      // the way that it made meanwhile
+  std::optional<Eigen::Vector4d> off_carried_;  // from there to where the last scan fitted
+  Pose last_kept_ = Pose::Identity();           // where the last of recent_ was taken
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;
