@@ -203,7 +203,12 @@ TEST_F(KeyframeRequestsTest, LargeOnesThatNobodyReadsTakeAPlaceEach) {
     peers.push_back(Connect(4'096));
     peers.back()->Send(ReadOf(5));
   }
-  WaitUntilAtRest();
+  // Whoever has a place keeps it until it is read from, so nobody is before all have been answered.
+  const auto refused_of = [](const NetFigures& figures) {
+    return figures.kinds[static_cast<std::size_t>(RequestKind::kReadKeyframes)]
+        .requests[static_cast<std::size_t>(StatusCode::kUnavailable)];
+  };
+  ExpectFigure(refused_of, kPeers - net_.max_works);
   std::size_t refused = 0;
   std::size_t first_came = 0;
   for (const auto& peer : peers) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <future>
 #include <limits>
 #include <memory>
@@ -66,13 +67,17 @@ class NetTest : public ServiceTest {
   void ExpectHolds(std::uint64_t bytes) const { ExpectFigure(&NetFigures::held_bytes, bytes); }
   // So much of large requests that are not whole, and their deadlines are known.
   void ExpectParts(std::uint64_t bytes) const { ExpectFigure(&NetFigures::part_bytes, bytes); }
-  void ExpectFigure(std::uint64_t NetFigures::*figure, std::uint64_t expected) const {
+  // `figure`: a member of NetFigures, or what is made of them.
+  template <typename Figure>
+  void ExpectFigure(Figure figure, std::uint64_t expected) const {
+    const auto read = [&]() -> std::uint64_t {
+      return std::invoke(figure, server_->ReadFigures());
+    };
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (server_->ReadFigures().*figure != expected &&
-           std::chrono::steady_clock::now() < deadline) {
+    while (read() != expected && std::chrono::steady_clock::now() < deadline) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    EXPECT_EQ(server_->ReadFigures().*figure, expected);
+    EXPECT_EQ(read(), expected);
   }
   // What was queued until nothing changes any more, and is then. A plan that takes long looks as if
   // nothing changed: with more than `expected` queued, it is waited for.
