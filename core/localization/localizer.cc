@@ -49,7 +49,12 @@ Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
   }
   std::move(found.begin(), found.end(), std::back_inserter(places_));
   Follow(features, R_level_sensor);
-  return places_.front().result;
+  LocalizationResult result = places_.front().result;
+  const double reach_m = options_.features.max_range_m;
+  if (reach_m < options_.min_good_reach_m && result.health == LocalizationHealth::kGood) {
+    result.health = LocalizationHealth::kWeak;
+  }
+  return result;
 }
 
 bool Localizer::IsLookedFor() const {

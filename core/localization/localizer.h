@@ -26,6 +26,11 @@ struct LocalizerOptions {
   FeatureOptions features;
   PlaceTrackerOptions tracker;
 
+  // Whose features reach no further than this is weak at best: decks and straight roads look alike
+  // then. Of two simulated drives 40 of 216 scans (10 m) and 34 of 242 (15 m) fitted well where
+  // they were not, from 20 m on none.
+  double min_good_reach_m = 20.0;
+
   // Lost or in doubt for so many scans, or adrift this far, it is looked for in the whole map, and
   // again after so many more.
   int looked_after = 3;

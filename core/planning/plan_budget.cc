@@ -49,8 +49,9 @@ Status PlanBudget::AddMemory(std::size_t bytes) {
   max_memory_seen_bytes_ = std::max(max_memory_seen_bytes_, memory_bytes_);
   if (memory_bytes_ > options_.max_memory_bytes) {
     return Status(StatusCode::kResourceExhausted,
-                  StrCat("plan: needs more than the limit of ", options_.max_memory_bytes,
-                         " bytes of memory; expected a nearer goal or a higher limit"));
+                  StrCat("plan: needs more than the limit of ",
+                         static_cast<double>(options_.max_memory_bytes) / (1 << 20),
+                         " MiB of memory; expected a nearer goal or a higher limit"));
   }
   return {};
 }

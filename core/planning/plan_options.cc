@@ -37,7 +37,9 @@ Status PlanOptions::Validate(const MapProfile& profile) const {
       {"snap far below in metres", snap_far_below_m, 0.0, 50.0},
       {"snap above in metres", snap_above_m, 0.0, 50.0},
       {"waypoint spacing in metres", waypoint_spacing_m, 0.0, 1000.0},
-      {"time limit in seconds", max_time_s, 0.0, 1e6},
+      {"time limit in seconds", max_time_s, 1e-3, 1e6},
+      {"limit of expansions", static_cast<double>(max_expansions), 1.0, 1e18},
+      {"memory limit in MiB", static_cast<double>(max_memory_bytes) / (1 << 20), 1e-3, 1e9},
   };
   for (const Range& range : ranges) {
     if (!(range.value >= range.low && range.value <= range.high)) {  // NaN fails too

@@ -158,6 +158,9 @@ def target_cases(cases, drives, work):
     file = drives.good / "poses.txt"
     cases.refused("render into a missing folder", ["render", "-o", closed / "nowhere/map.png"], "not_found",
                   "nowhere")
+    cases.refused("no route into a missing folder",
+                  ["plan", "--from", "900,900,0", "--to", "910,900,0", "-o", closed / "nowhere/route.csv"],
+                  "not_found", "nowhere")
     picture = drives.folder / "folder.png"
     picture.mkdir()
     cases.refused("render over a folder", ["render", "-o", picture], "conflict", "folder.png")

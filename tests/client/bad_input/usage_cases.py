@@ -91,7 +91,8 @@ USAGE = {
         *(["--from", "0,0,0", "--to", "5,0,0", *wrong] for wrong in (
             ["--width", "99"], ["--width", "nan"], ["--margin", "-1"], ["--headroom", "-2"], ["--max-step", "5"],
             ["--max-gap", "9"], ["--comfort", "-1"], ["--comfort-weight", "1e9"], ["--max-expansions", "-1"],
-            ["--max-time", "-1"], ["--max-memory", "much"], ["-o", "WORK/route.txt"])),
+            ["--max-expansions", "0"], ["--max-time", "-1"], ["--max-time", "0"], ["--max-memory", "much"],
+            ["--max-memory", "0"], ["-o", "WORK/route.txt"])),
     ],
     "export": [[], ["--points"], ["--points", "WORK/x.las"], ["--points", "WORK/x"],
                ["--points", "WORK/x.pcd", "--center", "0,0"], ["--points", "WORK/x.pcd", "--radius", "5"],

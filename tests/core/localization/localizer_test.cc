@@ -51,6 +51,24 @@ TEST(LocalizerTest, FollowsADriveFromARoughStart) {
   }
 }
 
+TEST(LocalizerTest, WhoSeesTooNearIsWeakWhereItIs) {
+  for (const float reach_m : {15.0F, 19.9F, 20.0F}) {
+    LocalizerOptions options = QuickOptions();
+    options.min_good_reach_m = LocalizerOptions().min_good_reach_m;
+    options.features.max_range_m = reach_m;
+    Localizer localizer(StreetMap().profile(), StreetMap().Source(), options);
+    localizer.Start(OnStreet(-6.3, 0.1));
+    for (int i = 0; i < 5; ++i) {
+      const Pose truth = OnStreet(-6.0 + 0.5 * i);
+      const LocalizationResult result = At(localizer, testing::Street(), truth);
+      EXPECT_EQ(result.health,
+                reach_m < 20.0F ? LocalizationHealth::kWeak : LocalizationHealth::kGood)
+          << reach_m << ' ' << i;
+      EXPECT_LT(ErrorOf(result.T_world_sensor, truth).horizontal_m, 0.1) << reach_m << ' ' << i;
+    }
+  }
+}
+
 TEST(LocalizerTest, FindsTheSecondScanHoweverFastTheVehicleIs) {
   for (const double ahead_m : {0.0, 1.0, 2.5, 4.0}) {
     Localizer localizer = StreetLocalizer();

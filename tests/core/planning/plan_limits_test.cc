@@ -38,6 +38,20 @@ TEST(PlanLimitsTest, ExceededBudgetsAreTyped) {
   EXPECT_EQ(small.error().code(), StatusCode::kResourceExhausted);
 }
 
+TEST(PlanLimitsTest, NoBudgetAtAllIsAMistake) {
+  TinyWorld world;
+  world.Draw(kCorridor, 0.0);
+  PlanOptions without[3];
+  without[0].max_expansions = 0;
+  without[1].max_memory_bytes = 0;
+  without[2].max_time_s = 0.0;
+  for (const PlanOptions& options : without) {
+    const auto route = world.Plan(options);
+    ASSERT_FALSE(route.has_value());
+    EXPECT_EQ(route.error().code(), StatusCode::kInvalidArgument) << route.error().message();
+  }
+}
+
 TEST(PlanLimitsTest, TimeIsLimitedByTheClockThatIsPassedIn) {
   TinyWorld world;
   world.Draw(kCorridor, 0.0);

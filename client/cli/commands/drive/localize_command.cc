@@ -30,8 +30,9 @@ class LocalizeCommand : public Command {
   void Declare(ArgumentSet& arguments) override {
     drive_.Declare(arguments, "velodyne/NNNNNN.bin, poses.txt");
     drive_.DeclareScans(arguments);
-    arguments.Optional("--max-range", "M", options_.max_range_m,
-                       "Reach of what is matched [100; paper: 40]; below 20 m places look alike");
+    arguments.Optional(
+        "--max-range", "M", options_.max_range_m,
+        "Reach of what is matched [100; paper: 40]; below 20 no scan is called good");
     arguments.Optional(
         "--perturb", "T_M,R_DEG", perturbation_,
         "Single shots from starts so far off, as they are told to be; else the drive is tracked");

@@ -119,6 +119,7 @@ class PlanCommand : public Command {
       const auto named = RouteFormatOf(file_);
       if (!named) return named.error();
       format = *named;
+      ATLAS_RETURN_IF_ERROR(CheckPlace(file_));
     }
     request_.options.max_memory_bytes = std::size_t{memory_mib_} << 20;
     request_.now_s = [] {
