@@ -75,12 +75,12 @@ def draw_tracks(tracks, path):
             if row["restart"] == "1":
                 axis.axvline(int(row["scan"]), color="gray", linewidth=1.5)
         record = track.record()
-        axis.set_title(f"{track.title.replace('`', '')}: RMSE {record['rmse_m']} m, {record['failures']} failed",
-                       fontsize=10)
+        error = f"RMSE {record['rmse_m']} m" if track.hits else "none located"
+        axis.set_title(f"{track.title.replace('`', '')}: {error}, {record['failures']} failed", fontsize=10)
         axis.set_ylabel("error, m")
         axis.grid(alpha=0.3)
     axes[0].legend(fontsize=8, ncol=3)
-    axes[-1].set_xlabel("scan (gray: tracking begins again after a jump)")
+    axes[-1].set_xlabel("scan (red: failed; gray: tracking begins again after a jump)")
     figure.tight_layout()
     figure.savefig(path, dpi=110)
 

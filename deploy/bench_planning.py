@@ -58,8 +58,8 @@ def emit_rows(name, rows, emit):
 
     both_ends("cost", [row["warm"]["searched_cost"] / row["all"]["searched_cost"] for row in both],
               "of an exhaustive search's", LOSS)
-    both_ends("straightened", [row["warm"]["cost"] / row["all"]["searched_cost"] for row in both],
-              "of an exhaustive search's", LOSS)
+    both_ends("straightened", [row["warm"]["cost"] / row["all"]["cost"] for row in both],
+              "of an exhaustive search's, straightened as well", LOSS)
     both_ends("fewer_expansions", [row["all"]["expansions"] / row["warm"]["expansions"] for row in both],
               "times", FEWER, is_worst_high=False)
     both_ends("decoded", [row["warm"]["ms"] for row in both], "ms", WARM_MS)

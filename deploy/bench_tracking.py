@@ -26,8 +26,9 @@ COLUMNS = [("drive", "title"), ("scans", "scans"), ("restarts", "restarts"), ("R
 
 
 class Track:
-    def __init__(self, name, title, rows, summary):
+    def __init__(self, name, title, goals, rows, summary):
         self.name, self.title, self.rows, self.summary = name, title, rows, summary
+        self.goal_m, self.goal_on_deck = goals
         self.hits = [row for row in rows if not self.is_failure(row)]
 
     @staticmethod
@@ -36,7 +37,13 @@ class Track:
         return row["health"] == "lost" or not (float(row["error_m"]) <= 1.0 and float(row["error_deg"]) <= 5.0)
 
     def rmse(self, field):
-        return math.sqrt(sum(float(row[field]) ** 2 for row in self.hits) / max(1, len(self.hits)))
+        """None where no scan was located."""
+        if not self.hits:
+            return None
+        return math.sqrt(sum(float(row[field]) ** 2 for row in self.hits) / len(self.hits))
+
+    def rmse_text(self, field):
+        return f"{self.rmse(field):.3f}" if self.hits else ""
 
     def on_deck(self):
         return sum(abs(float(row["up_m"])) < SAME_DECK_M and row["health"] != "lost" for row in self.rows)
@@ -47,7 +54,7 @@ class Track:
     def record(self):
         nees = self.nees()
         return {"title": self.title, "scans": len(self.rows), "restarts": self.summary["restarts"],
-                **{key: f"{self.rmse(field):.3f}" for key, field in (
+                **{key: self.rmse_text(field) for key, field in (
                     ("rmse_m", "error_m"), ("rmse_deg", "error_deg"), ("along_m", "along_m"),
                     ("across_m", "across_m"), ("up_m", "up_m"))},
                 "failures": len(self.rows) - len(self.hits),
@@ -70,27 +77,34 @@ def folder_of(name, bin_dir, drive, work):
 
 
 def track(bin_dir, drive, run):
-    name, title, mapped, tracked, map_flags, track_flags, _ = run
+    """By our method, and by the paper's."""
+    name, title, mapped, tracked, map_flags, track_flags, goal_m = run
     with tempfile.TemporaryDirectory() as work, Atlas(bin_dir) as atlas:
         atlas.run("ingest", folder_of(mapped, bin_dir, drive, work), *map_flags)
         atlas.run("wait")
+        folder = folder_of(tracked, bin_dir, drive, work)
         lines, picture = pathlib.Path(work) / "track.csv", pathlib.Path(work) / "track.png"
-        summary = atlas.run("localize", folder_of(tracked, bin_dir, drive, work), *track_flags, "--output", lines,
-                            "--plot", picture)
+
+        def localize(name, title, goals, *flags):
+            summary = atlas.run("localize", folder, *track_flags, "--output", lines, *flags)
+            with open(lines, newline="", encoding="ascii") as file:
+                return Track(name, title, goals, list(csv.DictReader(file)), summary)
+
+        ours = localize(name, title, (goal_m, 1.0), "--plot", picture)
         shutil.copy(picture, IMAGES / f"track_{name}.png")
-        with open(lines, newline="", encoding="ascii") as file:
-            return Track(name, title, list(csv.DictReader(file)), summary)
+        paper = localize(f"{name}.paper", f"{title}, the paper's method", (None, None), "--mode", "paper")
+        return [ours, paper]
 
 
 def track_all(bin_dir, emit, drive):
-    tracks = []
-    for run in RUNS:
-        tracks.append(track(bin_dir, drive, run))
-        found, name = tracks[-1], f"tracking.{run[0]}"
-        emit(name + ".translation_rmse", found.rmse("error_m"), "m", "goal", run[-1])
-        emit(name + ".rotation_rmse", found.rmse("error_deg"), "deg", "none", None)
+    tracks = [found for run in RUNS for found in track(bin_dir, drive, run)]
+    for found in tracks:
+        name = f"tracking.{found.name}"
+        if found.hits:
+            emit(name + ".translation_rmse", found.rmse("error_m"), "m", "goal", found.goal_m)
+            emit(name + ".rotation_rmse", found.rmse("error_deg"), "deg", "none", None)
         emit(name + ".failures", len(found.rows) - len(found.hits), f"of {len(found.rows)}", "none", None)
-        emit(name + ".on_deck", found.on_deck() / len(found.rows), "of scans", "goal", 1.0)
+        emit(name + ".on_deck", found.on_deck() / len(found.rows), "of scans", "goal", found.goal_on_deck)
         emit(name + ".restarts", found.summary["restarts"], "jumps", "none", None)
         emit(name + ".rate", found.summary["hz"], "scans/CPU s", "none", None)
     return tracks

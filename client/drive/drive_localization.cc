@@ -108,13 +108,13 @@ class DriveLocalization {
 
   static bool IsDamaged(const Status& status) { return status.code() == StatusCode::kInvalidData; }
 
-  // Lost, where the scan before it was.
+  // Lost, where the scan before it was; the world's origin where none was.
   void NoteUnreadable(const DriveScan& scan, const Status& why) {
     report_.unreadable.push_back({scan.number, why});
     LocalizedScan localized;
     localized.scan = scan.number;
     localized.time_s = scan.time_s;
-    localized.located.T_world_sensor = last_.value_or(scan.T_world_sensor);
+    localized.located.T_world_sensor = last_.value_or(Pose::Identity());
     localized.located.health = LocalizationHealth::kLost;
     Judge(scan.T_world_sensor, localized);
     on_scan_(localized);
@@ -194,6 +194,12 @@ Status DriveLocalizationOptions::Validate() const {
   }
   if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
+  }
+  const PlaceTrackerOptions searched;
+  if (shots && !(shots->translation_m <= searched.max_start_m)) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("starts ", shots->translation_m, " m off: expected ", searched.max_start_m,
+                   " at most; whoever is further off is to be relocalized")};
   }
   if (start) {
     if (shots || mode != LocalizationMode::kAtlas) {

@@ -6,6 +6,7 @@
 #include "client/drive/place_reader.h"
 #include "client/drive/tiles_around.h"
 #include "core/keyframe/keyframe_builder.h"
+#include "core/localization/cloud_localizer.h"
 #include "core/localization/icp/paper_localizer.h"
 
 namespace atlas {
@@ -27,14 +28,11 @@ RelocalizerSource RelocalizerOf(MapView& view, const RelocalizerOptions& options
 
 class AtlasScanLocalizer : public ScanLocalizer {
  public:
-  AtlasScanLocalizer(const DriveSurvey& survey,
-                     const LocalizerOptions& options,
+  AtlasScanLocalizer(const SensorLayout& layout,
+                     const CloudLocalizerOptions& options,
                      MapView& view,
-                     std::optional<double> revolutions,
                      OnLocalization on_localization)
-      : survey_(survey),
-        revolutions_(revolutions),
-        localizer_(view.profile(), TilesOf(view), options, RelocalizerOf(view, {})),
+      : localizer_(view.profile(), layout, TilesOf(view), options, RelocalizerOf(view, {})),
         on_localization_(std::move(on_localization)) {}
 
   void Start(const Pose& T_world_sensor, const StartKnowledge& known) override {
@@ -44,12 +42,10 @@ class AtlasScanLocalizer : public ScanLocalizer {
   Result<LocatedScan> Locate(const PointCloud& cloud,
                              const Eigen::Quaterniond& R_level_sensor,
                              double scans) override {
-    const LeveledScan leveled = SegmentScan(cloud, survey_.layout, survey_.ring_step,
-                                            R_level_sensor, {}, DuringRevolution());
-    const Result<LocalizationResult> result = localizer_.Localize(leveled, R_level_sensor, scans);
+    const Result<LocalizationResult> result = localizer_.Localize(cloud, R_level_sensor, scans);
     if (!result) return Error(result.error());
     if (on_localization_) {
-      Status status = on_localization_(leveled, R_level_sensor, *result);
+      Status status = on_localization_(localizer_.leveled(), R_level_sensor, *result);
       if (!status.ok()) return Error(std::move(status));
     }
     return LocatedScan{result->T_world_sensor, result->health, result->registration.fit,
@@ -57,20 +53,7 @@ class AtlasScanLocalizer : public ScanLocalizer {
   }
 
  private:
-  std::optional<Pose> DuringRevolution() const {
-    if (!revolutions_) return std::nullopt;
-    const Pose T_now_later = localizer_.T_now_later();
-    const Eigen::AngleAxisd turn(T_now_later.linear());
-    Pose during = Pose::Identity();
-    during.linear() =
-        Eigen::AngleAxisd(turn.angle() / *revolutions_, turn.axis()).toRotationMatrix();
-    during.translation() = T_now_later.translation() / *revolutions_;
-    return during;
-  }
-
-  DriveSurvey survey_;
-  std::optional<double> revolutions_;
-  Localizer localizer_;
+  CloudLocalizer localizer_;
   OnLocalization on_localization_;
 };
 
@@ -107,9 +90,11 @@ std::unique_ptr<ScanLocalizer> MakeAtlasLocalizer(const DriveSurvey& survey,
                                                   MapView& view,
                                                   std::optional<double> revolutions,
                                                   OnLocalization on_localization) {
-  LocalizerOptions options;
-  options.features.max_range_m = static_cast<float>(max_range_m);
-  return std::make_unique<AtlasScanLocalizer>(survey, options, view, revolutions,
+  CloudLocalizerOptions options;
+  options.localizer.features.max_range_m = static_cast<float>(max_range_m);
+  options.ring_step = survey.ring_step;
+  options.revolutions = revolutions;
+  return std::make_unique<AtlasScanLocalizer>(survey.layout, options, view,
                                               std::move(on_localization));
 }
 

@@ -134,6 +134,9 @@ struct PlaceTrackerOptions {
   double beyond_start_m = 0.5;
   double beyond_start_rad = 0.05;
   double start_up_m = 1.0;  // in height, whatever is told
+  // A start is looked for no further off than this: with any heading that takes seconds. Who is
+  // further off is lost, and for a relocalizer.
+  double max_start_m = 10.0;
   // One whose height is not sure is tried on surfaces so far from each other.
   double told_step_m = 0.4;
 };

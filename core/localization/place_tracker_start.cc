@@ -1,6 +1,8 @@
 // A start that is known to some metres: bays and posts repeat, so that a scan may fit well where it
 // was not taken. Other places are tried in what is known of the start (decision 0626).
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/localization/place_tracker.h"
 
@@ -16,7 +18,8 @@ bool PlaceTracker::IsVagueStart() const {
 
 SearchReach PlaceTracker::StartReach() const {
   if (!is_told_) {
-    return {hint_.within_m, hint_.within_m, hint_.within_rad};
+    const double within_m = std::min(hint_.within_m, options_.max_start_m);
+    return {within_m, within_m, std::min(hint_.within_rad, std::numbers::pi)};
   }
   const PoseCovariance covariance = motion_.covariance();
   const HorizontalSpread spread = SpreadOf(covariance);

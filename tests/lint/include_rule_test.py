@@ -86,6 +86,7 @@ ALLOWED = {
     "client/score": FLOOR_1,
     "client/map": FLOOR_1 + ["core/tile", "client/connection"],
     "client/vehicle": FLOOR_1 + ["core/tile", "client/connection", "client/map"],
+    "client/onboard": FLOOR_1 + ["core/tile", "core/localization", "core/localization/places", "core/planning", "client/vehicle"],
     "client/atlas_file": FLOOR_1 + ["client/connection", "client/map", "client/vehicle", "server/store",
                                    "core/tile", "server/store/sqlite/restore.h",
                                    "server/store/sqlite/store_snapshot.h"],

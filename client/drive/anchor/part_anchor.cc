@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "client/drive/place_reader.h"
@@ -77,6 +78,15 @@ bool IsNear(const Pose& found, const Pose& expected, double gap_m, const AnchorO
              options.max_surprise_m + options.agreement.drift * gap_m &&
          turned.angle() <= options.max_surprise_rad;
 }
+
+// Whether a drive that begins there begins where it is said to, as well as the map tells.
+bool BeginsWithin(const Eigen::Vector3d& begin_m, const PlacePrior& prior, double slack_m) {
+  return (begin_m.head<2>() - prior.center).norm() <= prior.radius_m + slack_m &&
+         std::abs(begin_m.z() - prior.z_m) <= prior.height_m + slack_m;
+}
+
+constexpr std::string_view kForMerge =
+    "; its own poses drift: atlas-merge run aligns sessions that are staged";
 
 // For people.
 double InThousandths(double value) {
@@ -265,7 +275,10 @@ Result<PartAnchor> PartAnchoring::Find(Scans scans, bool is_first_part) {
         StrCat("of ", anchor.probed, " scans that were looked for ", anchor.found,
                " were found in the map, and ", anchor.agreeing,
                " agree on where the drive lies; expected ", options_.min_agreeing, " or more, and ",
-               options_.min_ratio, " times as many as lie elsewhere");
+               options_.min_ratio, " times as many as lie elsewhere",
+               2 * anchor.found >= anchor.probed && anchor.found >= options_.min_agreeing
+                   ? kForMerge
+                   : std::string_view());
     return anchor;
   }
   for (Candidate& candidate : candidates) {
@@ -273,7 +286,7 @@ Result<PartAnchor> PartAnchoring::Find(Scans scans, bool is_first_part) {
       return Error(std::move(status));
     }
   }
-  Settle(candidates, anchor);
+  Settle(candidates, scans.front()->T_world_sensor, probes.prior, anchor);
   return anchor;
 }
 
@@ -281,8 +294,12 @@ bool PartAnchoring::IsBelieved(std::size_t agreeing, std::size_t elsewhere) cons
   return agreeing >= options_.min_agreeing && agreeing >= options_.min_ratio * elsewhere;
 }
 
-void PartAnchoring::Settle(const std::vector<Candidate>& candidates, PartAnchor& anchor) const {
+void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
+                           const Pose& first,
+                           const PlacePrior& prior,
+                           PartAnchor& anchor) const {
   const Candidate& best = candidates.front();
+  const Eigen::Vector3d begin_m = best.fit.T_map_drive.ToPose() * first.translation();
   anchor.tracked = best.tracked.size();
   anchor.contradicting = best.contradicting;
   anchor.rms_m = best.fit.rms_m;
@@ -298,14 +315,19 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates, PartAnchor&
   } else if (best.fit.rms_m > options_.max_rms_m) {
     anchor.why_not =
         StrCat("the drive is found, but bent against the map: ", InThousandths(best.fit.rms_m),
-               " m RMS from one transform, expected at most ", options_.max_rms_m, " m");
+               " m RMS from one transform, expected at most ", options_.max_rms_m, " m", kForMerge);
   } else if (best.support < options_.min_margin * elsewhere) {
     anchor.why_not =
         StrCat("the drive fits the map in two places: where its scans were found ",
                InThousandths(best.support / elsewhere),
                " times as well as elsewhere, expected at least ", options_.min_margin, " times");
+  } else if (!BeginsWithin(begin_m, prior, options_.max_surprise_m)) {
+    anchor.why_not = StrCat("the drive is found, but begins at (", InThousandths(begin_m.x()), ", ",
+                            InThousandths(begin_m.y()), ", ", InThousandths(begin_m.z()),
+                            ") m, further from the prior than that is said to be off");
   } else {
     anchor.T_map_drive = best.fit.T_map_drive;
+    anchor.begin_m = begin_m;
   }
 }
 

@@ -24,8 +24,8 @@ struct RawIcpOptions {
   float fine_reach_m = 0.3F;       // ... and in the end
   float voxel_m = 0.25F;           // one return of a scan per voxel is matched
   int max_iterations = 30;
-  double converged_m = 2e-4;
-  double converged_rad = 2e-5;
+  double converged_m = 1e-3;  // as RegistrationOptions
+  double converged_rad = 1e-4;
   // Geman-McClure: this share of the reach, but not less than so much.
   float kernel_share = 0.3F;
   float min_kernel_m = 0.05F;

@@ -68,7 +68,8 @@ USAGE = {
         ["DRIVE", "--rings", "1000"],
     ],
     "localize": [
-        [], ["DRIVE", "--perturb", "1"], ["DRIVE", "--perturb", "-1,1"], ["DRIVE", "--perturb", "nan,1"],
+        [], ["DRIVE", "--perturb", "1"], ["DRIVE", "--perturb", "-1,1"], ["DRIVE", "--perturb", "nan,1"], ["DRIVE", "--perturb", "30,1"],
+        ["DRIVE", "--perturb", "1,1", "--no-restart"],
         ["DRIVE", "--trials", "5"], ["DRIVE", "--perturb", "1,1", "--trials", "0"],
         ["DRIVE", "--max-range", "0"], ["DRIVE", "--max-range", "1e6"], ["DRIVE", "--rings", "0"],
         ["DRIVE", "--scans", "none"], ["DRIVE", "--seed", "-1"], ["DRIVE", "--mode", "guess"],

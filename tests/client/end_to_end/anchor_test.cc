@@ -23,17 +23,6 @@ class AnchorTest : public VehicleTest {
     WriteStreet(shared_root / "other_lane", 2);
     WriteMoved(shared_root / "other_lane", shared_root / "moved", {Far()});
   }
-  static void WriteStreet(const fs::path& folder, std::uint64_t seed) {
-    DriveOptions options;
-    options.sensor = *LidarSensorByName("h350");
-    options.seed = seed;
-    options.spacing_m = 2.5;
-    const auto drive =
-        SimulatedDrive::Create(MakeWorld(*WorldKindByName("street")).value(), options);
-    ASSERT_TRUE(drive) << drive.error().message();
-    const Status status = WriteDrive(*drive, folder, {});
-    ASSERT_TRUE(status.ok()) << status.message();
-  }
   static LevelTransform Far() { return {137.3 * kDegree, {512.5, -1'234.25, 17.5}}; }
   // The same drive in another frame: each part behind a jump in one of its own.
   static void WriteMoved(const fs::path& from,
@@ -207,6 +196,13 @@ TEST_F(AnchorTest, APriorIsBelieved) {
       Anchor(daemon, shared_root / "moved",
              {"--prior", near(900.0), "--prior-radius", "20", "--session", "wrong"});
   EXPECT_EQ(wrong.exit_code, static_cast<int>(ExitCode::kNotFound)) << wrong.out;
+  // Scans of the drive pass there, but it does not begin there.
+  const CommandRun beside =
+      Anchor(daemon, shared_root / "moved",
+             {"--prior", near(30.0), "--prior-radius", "20", "--session", "beside"});
+  EXPECT_EQ(beside.exit_code, static_cast<int>(ExitCode::kNotFound)) << beside.out;
+  EXPECT_NE(beside.err.find("further from the prior"), std::string::npos) << beside.err;
+  EXPECT_EQ(StateOf(daemon, "beside"), "staged");
   const auto within = [&](double off_m) {
     return std::to_string(begin.z() + off_m) + ",1.5";
   };
@@ -218,6 +214,34 @@ TEST_F(AnchorTest, APriorIsBelieved) {
              {"--prior", near(15.0), "--prior-radius", "20", "--prior-height", within(-0.8)});
   ASSERT_EQ(right.exit_code, 0) << right.err;
   ExpectAt(daemon, "continued", shared_root / "other_lane", 0.05, 0.1);
+  const auto begins = AnchorOf(right).at("begins").as_array();
+  EXPECT_NEAR(begins.at(0).to_number<double>(), begin.x(), 0.05);
+  EXPECT_NEAR(begins.at(1).to_number<double>(), begin.y(), 0.05);
+}
+
+// By 1 % and 0.5 degrees in 100 m, as odometries do.
+TEST_F(AnchorTest, ADriveWhosePosesDriftIsForAMerge) {
+  DriveOptions options;
+  options.sensor = *LidarSensorByName("h350");
+  options.seed = 2;
+  options.spacing_m = 2.5;
+  const fs::path drifting = shared_root / "drifting";
+  const auto drive = SimulatedDrive::Create(MakeWorld(*WorldKindByName("street")).value(), options);
+  ASSERT_TRUE(drive) << drive.error().message();
+  DriveWriteOptions drifts;
+  drifts.drift.emplace().seed = 11;
+  ASSERT_TRUE(WriteDrive(*drive, drifting, {}, drifts).ok());
+  const DaemonProcess daemon(NewData(), kSmall);
+  Map(daemon, shared_root / "street");
+  const std::string before = Digest(daemon);
+  for (const std::string range : {"0:30", ":"}) {
+    const std::string session = range == ":" ? "all" : "part";
+    const CommandRun run = Anchor(daemon, drifting, {"--range", range, "--session", session});
+    EXPECT_EQ(run.exit_code, static_cast<int>(ExitCode::kNotFound)) << run.out;
+    EXPECT_NE(run.err.find("atlas-merge run"), std::string::npos) << run.err;
+    EXPECT_EQ(StateOf(daemon, session), "staged");
+  }
+  EXPECT_EQ(Digest(daemon), before);
 }
 
 TEST_F(AnchorTest, WithoutAMapThereIsNothingToFindItIn) {

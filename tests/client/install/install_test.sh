@@ -8,7 +8,7 @@ trap 'rm -rf "$folder"' EXIT
 "$cmake" --install "$build" --prefix "$folder/prefix" >/dev/null
 "$cmake" --install "$build" --prefix "$folder/programs" --component programs >/dev/null
 [[ $(find "$folder/programs" -type f -printf '%P\n' | sort | xargs) == "bin/atlas bin/atlas-merge bin/atlasd" ]]
-if grep -rlE '<boost/asio|\.pb\.h|google/protobuf|<openssl|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
+if grep -rlE '<boost/asio|\.pb\.h|google/protobuf|<openssl|nanoflann|sqlite3?\.h|SQLiteCpp|"server/' "$folder/prefix/include"; then
   echo "public headers include what should stay behind the library"
   exit 1
 fi
@@ -19,6 +19,7 @@ awk '/^```cpp$/ { on = 1; next } /^```$/ { on = 0 } on' "$source/docs/client.md"
   -DCMAKE_CXX_COMPILER="$compiler" >/dev/null
 "$cmake" --build "$folder/build"
 "$folder/build/vehicle" "$folder/tiles"
+[[ $("$folder/build/localized") == "lost without a map, no route" ]]
 
 # An atlas without a tile, as its daemon left it.
 mkfifo "$folder/said"

@@ -38,6 +38,10 @@ boost::json::array AnchorsJson(const std::vector<SessionAnchor>& anchors) {
       json["contradicting"] = part.contradicting;
       json["rms_m"] = Rounded(part.rms_m, 4);
       json["rms_deg"] = Rounded(kDegrees * part.rms_yaw_rad, 4);
+      if (anchor.is_anchored()) {
+        json["begins"] = {Rounded(part.begin_m.x(), 3), Rounded(part.begin_m.y(), 3),
+                          Rounded(part.begin_m.z(), 3)};
+      }
     }
     if (!anchor.is_anchored()) json["why"] = part.why_not;
     array.push_back(std::move(json));
@@ -54,9 +58,11 @@ std::string AnchorText(const SessionAnchor& anchor) {
              " deg, moved by (", FixedText(shift_m.x(), 3), ", ", FixedText(shift_m.y(), 3), ", ",
              FixedText(shift_m.z(), 3), ") m");
   if (anchor.is_resumed) return where + ", as an earlier run did";
-  return StrCat(where, "; ", part.agreeing, " of ", part.found, " scans agree, ", part.tracked,
-                " tracked to ", FixedText(part.rms_m, 3), " m and ",
-                FixedText(kDegrees * part.rms_yaw_rad, 3), " deg RMS");
+  return StrCat(where, ", begins at (", FixedText(part.begin_m.x(), 1), ", ",
+                FixedText(part.begin_m.y(), 1), ", ", FixedText(part.begin_m.z(), 1), ") m; ",
+                part.agreeing, " of ", part.found, " scans agree, ", part.tracked, " tracked to ",
+                FixedText(part.rms_m, 3), " m and ", FixedText(kDegrees * part.rms_yaw_rad, 3),
+                " deg RMS");
 }
 
 Status CheckAnchored(const std::vector<SessionAnchor>& anchors) {

@@ -33,9 +33,9 @@ class LocalizeCommand : public Command {
     arguments.Optional(
         "--max-range", "M", options_.max_range_m,
         "Reach of what is matched [100; paper: 40]; below 20 no scan is called good");
-    arguments.Optional(
-        "--perturb", "T_M,R_DEG", perturbation_,
-        "Single shots from starts so far off, as they are told to be; else the drive is tracked");
+    arguments.Optional("--perturb", "T_M,R_DEG", perturbation_,
+                       "Single shots from starts up to so far off (10 m), as they are told to be; "
+                       "else the drive is tracked");
     arguments.Optional("--trials", "N", trials_, "Single shots a scan [10]");
     arguments.Optional("--seed", "K", options_.seed, "Of the disturbances [0]");
     arguments.Flag("--no-restart", no_restart_, "After a jump it has to find itself");
@@ -92,6 +92,9 @@ class LocalizeCommand : public Command {
     options_.deskewing = *deskewing;
     if (trials_ && !perturbation_) {
       return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
+    }
+    if (no_restart_ && perturbation_) {
+      return {StatusCode::kInvalidArgument, "--no-restart is of a drive: without --perturb"};
     }
     options_.is_restarted = !no_restart_;
     CompleteStart();

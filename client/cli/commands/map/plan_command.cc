@@ -41,7 +41,7 @@ boost::json::value EndJson(const std::optional<RouteEnd>& end) {
   return end ? boost::json::value(RouteEndJson(*end)) : nullptr;
 }
 
-boost::json::object RouteJson(const Route& route, double ms) {
+boost::json::object RouteJson(const Route& route, double clearance_reach_m, double ms) {
   boost::json::array waypoints;
   boost::json::array clearances;
   boost::json::array slopes;
@@ -59,6 +59,7 @@ boost::json::object RouteJson(const Route& route, double ms) {
           {"searched_cost", Rounded(route.searched_cost, 3)},
           {"waypoints", std::move(waypoints)},
           {"clearance_m", std::move(clearances)},
+          {"clearance_reach_m", Rounded(clearance_reach_m, 3)},
           {"slope_deg", std::move(slopes)},
           {"tiles_loaded", route.tiles_loaded},
           {"expansions", route.expansions},
@@ -149,7 +150,7 @@ class PlanCommand : public Command {
       ATLAS_RETURN_IF_ERROR(WriteWholeFile(file_, Bytes(text.begin(), text.end())));
     }
     if (context.is_json) {
-      context.PrintJson(RouteJson(*route, ms));
+      context.PrintJson(RouteJson(*route, request_.options.clearance_reach_m(), ms));
     } else {
       PrintRoute(*route, ms, map->profile().cell_size_m(), context.out);
     }

@@ -14,8 +14,9 @@ void DeclarePlanFlags(ArgumentSet& arguments, PlanOptions& options, std::uint32_
   arguments.Optional("--headroom", "M", options.headroom_m, "Free height that it needs [2]");
   arguments.Optional("--max-gap", "M", options.max_gap_m,
                      "Longest hole in the map that is driven over [0.2]");
-  arguments.Optional("--comfort", "M", options.comfort_m,
-                     "Closer than this beyond the margin costs more [0.5]");
+  arguments.Optional(
+      "--comfort", "M", options.comfort_m,
+      "Closer than this beyond the margin costs more; clearance is measured up to there [0.5]");
   arguments.Optional("--comfort-weight", "W", options.comfort_weight,
                      "Beside an obstacle a metre costs 1 + W [1]");
   arguments.Flag("--allow-unknown", options.allow_unknown,

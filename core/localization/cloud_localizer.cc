@@ -1,0 +1,43 @@
+#include "core/localization/cloud_localizer.h"
+
+#include <utility>
+
+#include "core/keyframe/keyframe_builder.h"
+
+namespace atlas {
+
+CloudLocalizer::CloudLocalizer(const MapProfile& profile,
+                               SensorLayout layout,
+                               TilesAround tiles,
+                               const CloudLocalizerOptions& options,
+                               RelocalizerSource relocalizer)
+    : layout_(std::move(layout)),
+      options_(options),
+      localizer_(profile, std::move(tiles), options.localizer, std::move(relocalizer)) {}
+
+void CloudLocalizer::Start(const Pose& T_world_sensor, const StartKnowledge& known) {
+  localizer_.Start(T_world_sensor, known);
+}
+
+Result<LocalizationResult> CloudLocalizer::Localize(const PointCloud& cloud,
+                                                    const Eigen::Quaterniond& R_level_sensor,
+                                                    double scans) {
+  leveled_ =
+      SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor, {}, DuringRevolution());
+  return localizer_.Localize(leveled_, R_level_sensor, scans);
+}
+
+std::optional<Pose> CloudLocalizer::DuringRevolution() const {
+  if (!options_.revolutions) {
+    return std::nullopt;
+  }
+  const Pose T_now_later = localizer_.T_now_later();
+  const Eigen::AngleAxisd turn(T_now_later.linear());
+  Pose during = Pose::Identity();
+  during.linear() =
+      Eigen::AngleAxisd(turn.angle() / *options_.revolutions, turn.axis()).toRotationMatrix();
+  during.translation() = T_now_later.translation() / *options_.revolutions;
+  return during;
+}
+
+}  // namespace atlas
