@@ -182,6 +182,11 @@ def target_cases(cases, drives, work):
     poses.write_bytes(file.read_bytes())
     cases.refused("render poses as contradictions", ["render", "-o", drives.folder / "x.png", "--contradictions", poses],
                   "invalid_data", "poses.csv")
+    elsewhere = drives.folder / "elsewhere.csv"
+    elsewhere.write_text("kind,x_m,y_m,layer_m,low_m,high_m,hits,passes,first_scan,last_scan,score\n"
+                         "appeared,9000.100,0.100,0.000,0.000,1.000,3,0,1,3,9.00\n", encoding="ascii")
+    cases.refused("render what contradicts another map", ["render", "-o", drives.folder / "x.png", "--contradictions",
+                                                          elsewhere], "conflict", "elsewhere.csv")
     cases.refused("export where nothing is", ["export", "--points", drives.folder / "far.pcd", "--center", "9000,0",
                                               "--radius", "1"], "not_found", "nothing to export")
     cases.refused("query into a file", ["query", *near, "-o", file], "conflict", "poses.txt", is_stream=True)

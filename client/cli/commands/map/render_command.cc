@@ -16,12 +16,13 @@
 namespace atlas {
 namespace {
 
-LevelReader ReaderOf(MapSource& source, RouteGround& ground) {
-  return [&source, &ground](std::uint8_t level, const TileCallback& on_tile) -> Status {
+LevelReader ReaderOf(MapSource& source, RouteGround& ground, RouteGround& cells) {
+  return [&source, &ground, &cells](std::uint8_t level, const TileCallback& on_tile) -> Status {
     return source.ReadLevel(level, std::nullopt, [&](const TileBlob& read) -> Status {
       const Result<Tile> tile = DecodeTile(read.blob, source.profile());
       if (!tile) return tile.error().WithContext(StrCat("tile ", read.id));
       ground.Add(*tile);
+      cells.Add(*tile);
       return on_tile(*tile);
     });
   };
@@ -46,6 +47,28 @@ std::vector<MapMark> MarksOf(const std::vector<ContradictionPlace>& places, doub
     marks.push_back({place.center_m, cell_size_m, ColorOf(place.kind)});
   }
   return marks;
+}
+
+std::vector<Eigen::Vector3d> CentersOf(const std::vector<ContradictionPlace>& places) {
+  std::vector<Eigen::Vector3d> centers_m;
+  for (const ContradictionPlace& place : places) {
+    centers_m.emplace_back(place.center_m.x(), place.center_m.y(), 0.0);
+  }
+  return centers_m;
+}
+
+// What lies on no tile contradicts another map, or this one before it changed.
+Status NoteCells(const std::string& file, const RouteGround& cells, std::ostream& err) {
+  const std::size_t beside = cells.points() - cells.on_tiles();
+  if (beside == 0) return {};
+  if (cells.on_tiles() == 0) {
+    return {StatusCode::kConflict,
+            StrCat(file, ": none of its ", cells.points(),
+                   " cells lies on a tile of this map: it was written in another one")};
+  }
+  err << "note: " << beside << " of " << cells.points() << " cells of " << file
+      << " lie on no tile of this map\n";
+  return {};
 }
 
 class RenderCommand : public Command {
@@ -94,8 +117,11 @@ class RenderCommand : public Command {
     if (!map) return map.error();
     options.marks = MarksOf(contradictions, map->profile().cell_size_m());
     RouteGround ground(options.route, map->profile());
-    const auto picture = RenderMap(ReaderOf(map->source(), ground), options, map->profile());
+    const std::vector<Eigen::Vector3d> centers_m = CentersOf(contradictions);
+    RouteGround cells(centers_m, map->profile());
+    const auto picture = RenderMap(ReaderOf(map->source(), ground, cells), options, map->profile());
     if (!picture) return picture.error();
+    ATLAS_RETURN_IF_ERROR(NoteCells(contradictions_, cells, context.err));
     std::optional<RouteCheck> route;
     if (!path_.empty()) {
       route = CheckOf(path_, planned_in, RouteAtlasOf(map->atlas_id(), map->profile()), ground);
