@@ -24,6 +24,10 @@ struct Made {
   std::shared_ptr<const Relocalizer> relocalizer;
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   std::uint64_t finest_places = 0;
+
+  bool IsFor(const Eigen::Vector2d& place, double radius_m) const {
+    return relocalizer != nullptr && (place - center).norm() < 0.5 * radius_m;
+  }
 };
 
 }  // namespace
@@ -48,11 +52,11 @@ RelocalizerSource RelocalizerOf(AtlasView& view,
   return [&view, profile, last_place = std::move(last_place), radius_m, options, relocalizer,
           made = Made()]() mutable -> Result<std::shared_ptr<const Relocalizer>> {
     const Eigen::Vector2d place = last_place();
-    const bool is_near = (place - made.center).norm() < 0.5 * radius_m;
-    const Eigen::Vector2d center = is_near ? made.center : place;
+    const bool is_made = made.IsFor(place, radius_m);
+    const Eigen::Vector2d center = is_made ? made.center : place;
     const auto map = view.Around(center, radius_m, options);
     if (!map) return Error(map.error());
-    if (made.relocalizer == nullptr || !is_near || map->finest_places > made.finest_places) {
+    if (!is_made || map->finest_places > made.finest_places) {
       made = {nullptr, center, map->finest_places};
       if (map->finest_places > 0) {
         made.relocalizer = std::make_shared<const Relocalizer>(profile, PlacesOf(*map, profile),

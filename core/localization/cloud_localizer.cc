@@ -22,6 +22,10 @@ void CloudLocalizer::Start(const Pose& T_world_sensor, const StartKnowledge& kno
 Result<LocalizationResult> CloudLocalizer::Localize(const PointCloud& cloud,
                                                     const Eigen::Quaterniond& R_level_sensor,
                                                     double scans) {
+  if (layout_.channels() == 0) {
+    return Error(StatusCode::kInvalidArgument,
+                 "localizer: the sensor's layout has no channel; SensorLayoutEstimator learns it");
+  }
   leveled_ =
       SegmentScan(cloud, layout_, options_.ring_step, R_level_sensor, {}, DuringRevolution());
   return localizer_.Localize(leveled_, R_level_sensor, scans);

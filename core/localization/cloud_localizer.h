@@ -36,6 +36,7 @@ class CloudLocalizer {
 
   // Requires Start(). `cloud` in the sensor's frame; `R_level_sensor` turns it upright, as an IMU
   // says, whatever its heading; `scans` as Localizer::Localize, which says how it fails.
+  // kInvalidArgument: the layout has no channel.
   Result<LocalizationResult> Localize(const PointCloud& cloud,
                                       const Eigen::Quaterniond& R_level_sensor,
                                       double scans = 1.0);

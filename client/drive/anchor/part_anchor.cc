@@ -214,31 +214,61 @@ Status PartAnchoring::Track(Scans scans, const std::vector<double>& way_m, Candi
   }
   std::reverse(backwards.begin(), backwards.end());
   for (const auto& order : {forwards, backwards}) {
-    Pose T_here = T_map_drive;
-    double last_m = way_m[seed];
-    std::vector<FoundScan> last;
-    for (const std::size_t i : order) {
-      const Pose expected = T_here * scans[i]->T_world_sensor;
-      double fit = 0.0;
-      const auto found = FindNear(*scans[i], expected, fit);
-      if (!found) return found.error();
-      if (!*found) continue;
-      const double gap_m = std::abs(way_m[i] - last_m);
-      if (!IsNear((*found)->T_map_sensor, expected, gap_m, options_)) {
-        ++candidate.contradicting;
-        continue;
-      }
-      candidate.tracked.push_back(**found);
-      candidate.support += fit;
-      last.push_back(**found);
-      if (last.size() > kLastScans) last.erase(last.begin());
-      T_here = FitTransform(last).T_map_drive.ToPose();
-      last_m = way_m[i];
-    }
+    ATLAS_RETURN_IF_ERROR(Follow(scans, way_m, order, T_map_drive, candidate));
   }
   if (candidate.tracked.empty()) return {};
   candidate.fit = FitTransform(candidate.tracked);
   return {};
+}
+
+// Scans in `order`, the first where `T_map_drive` puts it, each where the last ones say.
+Status PartAnchoring::Follow(Scans scans,
+                             const std::vector<double>& way_m,
+                             const std::vector<std::size_t>& order,
+                             const Pose& T_map_drive,
+                             Candidate& candidate) {
+  Pose T_here = T_map_drive;
+  double last_m = order.empty() ? 0.0 : way_m[order.front()];
+  std::vector<FoundScan> last;
+  for (const std::size_t i : order) {
+    const Pose expected = T_here * scans[i]->T_world_sensor;
+    double fit = 0.0;
+    const auto found = FindNear(*scans[i], expected, fit);
+    if (!found) return found.error();
+    if (!*found) continue;
+    const double gap_m = std::abs(way_m[i] - last_m);
+    if (!IsNear((*found)->T_map_sensor, expected, gap_m, options_)) {
+      ++candidate.contradicting;
+      continue;
+    }
+    candidate.tracked.push_back(**found);
+    candidate.support += fit;
+    last.push_back(**found);
+    if (last.size() > kLastScans) last.erase(last.begin());
+    T_here = FitTransform(last).T_map_drive.ToPose();
+    last_m = way_m[i];
+  }
+  return {};
+}
+
+Result<PartAnchoring::Misfit> PartAnchoring::Measure(Scans scans,
+                                                     const LevelTransform& T_map_drive) {
+  const std::vector<double> way_m = WaysOf(scans);
+  Candidate candidate;
+  Status status = Follow(scans, way_m, SpreadAlong(way_m, way_m.size(), options_.track_spacing_m),
+                         T_map_drive.ToPose(), candidate);
+  if (!status.ok()) return Error(std::move(status));
+  Misfit misfit;
+  misfit.tracked = candidate.tracked.size();
+  for (const FoundScan& scan : candidate.tracked) {
+    misfit.rms_m +=
+        (scan.T_map_sensor.translation() - T_map_drive.ToPose() * scan.T_drive_sensor.translation())
+            .squaredNorm();
+  }
+  if (misfit.tracked > 0) {
+    misfit.rms_m = std::sqrt(misfit.rms_m / static_cast<double>(misfit.tracked));
+  }
+  return misfit;
 }
 
 // nullopt: it does not fit the map there, or nothing is mapped.

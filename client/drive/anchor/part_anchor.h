@@ -82,6 +82,13 @@ class PartAnchoring {
   using Scans = std::span<const DriveScan* const>;
   // The prior is of the part that begins the drive. Errors are those of the scans and of the view.
   Result<PartAnchor> Find(Scans scans, bool is_first_part);
+  // Of scans behind those that lie in the map by `T_map_drive`: how many of them fit the map around
+  // where that puts them, and how far off that they are, RMS. Fails as Find().
+  struct Misfit {
+    std::size_t tracked = 0;
+    double rms_m = 0.0;
+  };
+  Result<Misfit> Measure(Scans scans, const LevelTransform& T_map_drive);
 
  private:
   struct Probes;
@@ -96,6 +103,11 @@ class PartAnchoring {
   Status ProbeAll(Scans scans, const std::vector<double>& way_m, Probes& probes) const;
   bool IsClear(const Probes& probes) const;
   Status Track(Scans scans, const std::vector<double>& way_m, Candidate& candidate);
+  Status Follow(Scans scans,
+                const std::vector<double>& way_m,
+                const std::vector<std::size_t>& order,
+                const Pose& T_map_drive,
+                Candidate& candidate);
   Result<std::optional<FoundScan>> FindNear(const DriveScan& scan,
                                             const Pose& T_map_sensor,
                                             double& fit);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "client/drive/impossible_steps.h"
@@ -17,6 +18,8 @@ constexpr std::chrono::milliseconds kPatience{60'000};  // until what is there i
 // Stored poses are whole micrometres.
 constexpr double kSameShift_m = 1e-4;
 constexpr double kSameYaw_rad = 1e-6;
+// What was anchored lies in one frame to a micrometre, what a merge corrected is bent by more.
+constexpr double kOneFrame_m = 2e-3;
 
 bool IsOwnFrame(const LevelTransform& transform) {
   return transform.shift_m.norm() < kSameShift_m && std::abs(transform.yaw_rad) < kSameYaw_rad;
@@ -30,11 +33,19 @@ const DriveScan* FindScan(const DriveFolder& drive, std::uint32_t number) {
   return found != drive.scans.end() && found->number == number ? &*found : nullptr;
 }
 
+// A session that is there.
+struct Begun {
+  SessionAnchor anchor;
+  std::uint32_t first = 0;  // of its keyframes that are scans of this drive, by number
+  std::uint32_t last = 0;
+  double bent_m = 0.0;  // how far one of these is from where the frame of the last puts it, at most
+};
+
 // What the last keyframe that is there says. nullopt: none is.
-Result<std::optional<SessionAnchor>> Resumed(const AnchoredDrive& drive,
-                                             const SessionKey& session,
-                                             const SessionSummary& stored,
-                                             AtlasClient& client) {
+Result<std::optional<Begun>> Resumed(const AnchoredDrive& drive,
+                                     const SessionKey& session,
+                                     const SessionSummary& stored,
+                                     AtlasClient& client) {
   const auto keyframes = client.ListKeyframes(session);
   if (!keyframes) return Error(keyframes.error());
   if (keyframes->empty()) return std::nullopt;
@@ -51,18 +62,48 @@ Result<std::optional<SessionAnchor>> Resumed(const AnchoredDrive& drive,
                " keyframes has number and time of a scan of this drive: another drive's, or at "
                "other times (--start); --session gives this one another name"));
   }
-  SessionAnchor anchor;
+  Begun begun;
+  SessionAnchor& anchor = begun.anchor;
   anchor.key = session;
   anchor.is_resumed = true;
+  begun.first = begun.last = last->sequence;
   const LevelTransform transform = LevelTransformBetween(
       last->T_world_sensor.ToPose(), FindScan(drive.drive, last->sequence)->T_world_sensor);
   if (stored.state == "staged" && IsOwnFrame(transform)) {
-    anchor.part.why_not = "it was begun in the drive's own frame";
+    anchor.part.why_not =
+        "it was begun in the drive's own frame; --session gives another try another name, and "
+        "atlas-merge run aligns what is staged";
   } else {
     anchor.part.T_map_drive = transform;
   }
-  return anchor;
+  const Pose T_map_drive = transform.ToPose();
+  for (const KeyframeSummary& keyframe : *keyframes) {
+    if (!is_ours(keyframe)) continue;
+    begun.first = std::min(begun.first, keyframe.sequence);
+    const Pose& T_drive_sensor = FindScan(drive.drive, keyframe.sequence)->T_world_sensor;
+    const Eigen::Vector3d off_m =
+        keyframe.T_world_sensor.ToPose().translation() - T_map_drive * T_drive_sensor.translation();
+    begun.bent_m = std::max(begun.bent_m, off_m.norm());
+  }
+  return begun;
 }
+
+// Those of a session's scans that are behind what is there of it, and those before it, from there
+// on.
+std::vector<std::vector<const DriveScan*>> BesideBegun(const SessionScans& session,
+                                                       const Begun& begun) {
+  std::vector<std::vector<const DriveScan*>> beside(2);
+  for (const DriveScan* scan : session.scans) {
+    if (scan->number > begun.last) beside[0].push_back(scan);
+    if (scan->number < begun.first) beside[1].push_back(scan);
+  }
+  std::reverse(beside[1].begin(), beside[1].end());
+  return beside;
+}
+
+constexpr std::string_view kOtherName =
+    "; --session gives what is not there yet another name, and atlas-merge run aligns it where it "
+    "is staged";
 
 // The whole map, read when it is needed first.
 class Map {
@@ -71,20 +112,49 @@ class Map {
       : survey_(survey), options_(options), client_(client), source_(client), view_(source_) {}
 
   Result<SessionAnchor> Anchor(const SessionScans& session) {
-    if (!anchoring_) {
-      // What is not fused in time, damaged tiles among it, is left out.
-      const auto fused = client_.WaitUntilFused(kPatience);
-      if (!fused && fused.error().code() != StatusCode::kTimeout) return Error(fused.error());
-      auto anchoring = PartAnchoring::Create(survey_, view_, options_);
-      if (!anchoring) return Error(anchoring.error());
-      anchoring_.emplace(*std::move(anchoring));
-    }
+    if (Status status = Read(); !status.ok()) return Error(std::move(status));
     auto part = anchoring_->Find(session.scans, session.is_first);
     if (!part) return Error(part.error());
     return SessionAnchor{session.key, *std::move(part), false};
   }
 
+  // Whether what comes to a session in the map lies where its frame puts it, as far as that is
+  // mapped; kConflict.
+  Status CheckGoesOn(const SessionScans& session, const Begun& begun) {
+    for (const auto& scans : BesideBegun(session, begun)) {
+      if (scans.empty()) continue;
+      if (begun.bent_m > kOneFrame_m) {
+        return {StatusCode::kConflict,
+                StrCat("session ", session.key, " was corrected since it was begun: its keyframes ",
+                       "lie up to ", std::round(begun.bent_m * 1e3) / 1e3,
+                       " m from where one frame puts them", kOtherName)};
+      }
+      ATLAS_RETURN_IF_ERROR(Read());
+      const auto misfit = anchoring_->Measure(scans, *begun.anchor.part.T_map_drive);
+      if (!misfit) return misfit.error();
+      if (misfit->tracked >= options_.min_agreeing && misfit->rms_m > options_.max_rms_m) {
+        return {StatusCode::kConflict,
+                StrCat("session ", session.key, ": what is new of the drive lies ",
+                       std::round(misfit->rms_m * 1e3) / 1e3,
+                       " m RMS from where the session's frame puts it, expected at most ",
+                       options_.max_rms_m, " m: the drive's own poses drift", kOtherName)};
+      }
+    }
+    return {};
+  }
+
  private:
+  Status Read() {
+    if (anchoring_) return {};
+    // What is not fused in time, damaged tiles among it, is left out.
+    const auto fused = client_.WaitUntilFused(kPatience);
+    if (!fused && fused.error().code() != StatusCode::kTimeout) return fused.error();
+    auto anchoring = PartAnchoring::Create(survey_, view_, options_);
+    if (!anchoring) return anchoring.error();
+    anchoring_.emplace(*std::move(anchoring));
+    return {};
+  }
+
   const DriveSurvey& survey_;
   const AnchorOptions& options_;
   AtlasClient& client_;
@@ -111,7 +181,11 @@ Result<std::vector<SessionAnchor>> AnchorSessions(const AnchoredDrive& drive,
       auto resumed = Resumed(drive, session.key, *known, client);
       if (!resumed) return Error(resumed.error());
       if (*resumed) {
-        anchors.push_back(**std::move(resumed));
+        if (known->IsInMap()) {
+          Status status = map.CheckGoesOn(session, **resumed);
+          if (!status.ok()) return Error(std::move(status));
+        }
+        anchors.push_back(std::move((*resumed)->anchor));
         continue;
       }
     }

@@ -242,6 +242,35 @@ TEST_F(AnchorTest, ADriveWhosePosesDriftIsForAMerge) {
     EXPECT_EQ(StateOf(daemon, session), "staged");
   }
   EXPECT_EQ(Digest(daemon), before);
+  // A stretch that is short enough lies well; what comes behind it does not.
+  ASSERT_EQ(Anchor(daemon, drifting, {"--range", "0:12", "--session", "grows"}).exit_code, 0);
+  ASSERT_EQ(StateOf(daemon, "grows"), "live");
+  const std::string begun = Digest(daemon);
+  const CommandRun rest = Anchor(daemon, drifting, {"--session", "grows"});
+  EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
+  EXPECT_NE(rest.err.find("drift"), std::string::npos) << rest.err;
+  EXPECT_EQ(Digest(daemon), begun);
+  EXPECT_EQ(Connect(daemon).ListKeyframes({"vehicle", "grows"})->size(), 12U);
+}
+
+// A merge bends it; the daemon would take the next scan for an impossible step.
+TEST_F(AnchorTest, ASessionThatWasCorrectedIsNotGoneOnWith) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  Map(daemon, shared_root / "street");
+  ASSERT_EQ(Anchor(daemon, shared_root / "moved", {"--range", "0:40"}).exit_code, 0);
+  AtlasClient client = Connect(daemon);
+  const KeyframeSummary last = client.ListKeyframes({"vehicle", "continued"})->back();
+  PoseCorrection correction;
+  correction.key = {{"vehicle", "continued"}, last.sequence};
+  correction.T_world_sensor = last.T_world_sensor;
+  correction.T_world_sensor.x_um += 10'000;
+  ASSERT_TRUE(client.UpdatePoses(std::vector{correction}, "test"));
+  const CommandRun rest = Anchor(daemon, shared_root / "moved");
+  EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
+  EXPECT_NE(rest.err.find("corrected"), std::string::npos) << rest.err;
+  EXPECT_EQ(client.ListKeyframes({"vehicle", "continued"})->size(), 40U);
+  const CommandRun nothing_new = Anchor(daemon, shared_root / "moved", {"--range", "5:9"});
+  EXPECT_EQ(nothing_new.exit_code, 0) << nothing_new.err;
 }
 
 TEST_F(AnchorTest, WithoutAMapThereIsNothingToFindItIn) {

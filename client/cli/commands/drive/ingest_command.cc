@@ -149,7 +149,8 @@ class IngestCommand : public Command {
     } else {
       PrintReport(*report, positions_.has_value(), wall.count(), context.out);
     }
-    return CheckAnchored(report->anchors);
+    ATLAS_RETURN_IF_ERROR(CheckAnchored(report->anchors));
+    return is_anchored_ ? CheckNotQuarantined(report->upload) : Status();
   }
 
  private:

@@ -37,6 +37,17 @@ boost::json::value SessionStatesJson(const LastingUploadReport& upload) {
   return states;
 }
 
+Status CheckNotQuarantined(const LastingUploadReport& upload) {
+  for (const UploadedSession& session : upload.sessions) {
+    const SessionSummary& summary = session.summary;
+    if (summary.state != "quarantined") continue;
+    return {StatusCode::kConflict,
+            StrCat("session ", summary.key, " is out of the map: ", summary.reason,
+                   "; atlas session release lets it in as it is")};
+  }
+  return {};
+}
+
 void PrintSessionNotes(const LastingUploadReport& upload, std::ostream& err) {
   if (!upload.sessions_unknown.ok()) {
     err << "note: whether the sessions are in the map nobody could be asked: "
