@@ -79,12 +79,6 @@ bool IsNear(const Pose& found, const Pose& expected, double gap_m, const AnchorO
          turned.angle() <= options.max_surprise_rad;
 }
 
-// Whether a drive that begins there begins where it is said to, as well as the map tells.
-bool BeginsWithin(const Eigen::Vector3d& begin_m, const PlacePrior& prior, double slack_m) {
-  return (begin_m.head<2>() - prior.center).norm() <= prior.radius_m + slack_m &&
-         std::abs(begin_m.z() - prior.z_m) <= prior.height_m + slack_m;
-}
-
 constexpr std::string_view kForMerge =
     "; its own poses drift: atlas-merge run aligns sessions that are staged";
 
@@ -351,7 +345,7 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
         StrCat("the drive fits the map in two places: where its scans were found ",
                InThousandths(best.support / elsewhere),
                " times as well as elsewhere, expected at least ", options_.min_margin, " times");
-  } else if (!BeginsWithin(begin_m, prior, options_.max_surprise_m)) {
+  } else if (!BeginsWithin(begin_m, prior, options_)) {
     anchor.why_not = StrCat("the drive is found, but begins at (", InThousandths(begin_m.x()), ", ",
                             InThousandths(begin_m.y()), ", ", InThousandths(begin_m.z()),
                             ") m, further from the prior than that is said to be off");
@@ -359,6 +353,13 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
     anchor.T_map_drive = best.fit.T_map_drive;
     anchor.begin_m = begin_m;
   }
+}
+
+bool BeginsWithin(const Eigen::Vector3d& begin_m,
+                  const PlacePrior& prior,
+                  const AnchorOptions& options) {
+  return (begin_m.head<2>() - prior.center).norm() <= prior.radius_m + options.max_surprise_m &&
+         std::abs(begin_m.z() - prior.z_m) <= prior.height_m + options.max_surprise_m;
 }
 
 }  // namespace atlas

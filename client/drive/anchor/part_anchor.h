@@ -124,4 +124,9 @@ class PartAnchoring {
   std::unique_ptr<ScanLocalizer> localizer_;
 };
 
+// Whether a drive that begins there begins where it is said to, as well as the map tells.
+bool BeginsWithin(const Eigen::Vector3d& begin_m,
+                  const PlacePrior& prior,
+                  const AnchorOptions& options);
+
 }  // namespace atlas

@@ -105,6 +105,21 @@ constexpr std::string_view kOtherName =
     "; --session gives what is not there yet another name, and atlas-merge run aligns it where it "
     "is staged";
 
+// Of one that is there already.
+Status CheckPrior(const SessionScans& session,
+                  const SessionAnchor& anchor,
+                  const AnchorOptions& options) {
+  if (!session.is_first || !anchor.is_anchored()) return {};
+  const Eigen::Vector3d begin_m =
+      anchor.part.T_map_drive->ToPose() * session.scans.front()->T_world_sensor.translation();
+  if (BeginsWithin(begin_m, options.prior, options)) return {};
+  return {StatusCode::kConflict,
+          StrCat("session ", session.key, " is there already, and begins at (", begin_m.x(), ", ",
+                 begin_m.y(), ", ", begin_m.z(),
+                 ") m, further from the prior than that is said to be off; --session gives this "
+                 "drive another name")};
+}
+
 // The whole map, read when it is needed first.
 class Map {
  public:
@@ -184,6 +199,9 @@ Result<std::vector<SessionAnchor>> AnchorSessions(const AnchoredDrive& drive,
         if (known->IsInMap()) {
           Status status = map.CheckGoesOn(session, **resumed);
           if (!status.ok()) return Error(std::move(status));
+        }
+        if (Status status = CheckPrior(session, (*resumed)->anchor, options); !status.ok()) {
+          return Error(std::move(status));
         }
         anchors.push_back(std::move((*resumed)->anchor));
         continue;

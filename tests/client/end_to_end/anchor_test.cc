@@ -214,6 +214,9 @@ TEST_F(AnchorTest, APriorIsBelieved) {
              {"--prior", near(15.0), "--prior-radius", "20", "--prior-height", within(-0.8)});
   ASSERT_EQ(right.exit_code, 0) << right.err;
   ExpectAt(daemon, "continued", shared_root / "other_lane", 0.05, 0.1);
+  const CommandRun contradicted =
+      Anchor(daemon, shared_root / "moved", {"--prior", near(900.0), "--prior-radius", "20"});
+  EXPECT_EQ(contradicted.exit_code, static_cast<int>(ExitCode::kConflict)) << contradicted.out;
   const auto begins = AnchorOf(right).at("begins").as_array();
   EXPECT_NEAR(begins.at(0).to_number<double>(), begin.x(), 0.05);
   EXPECT_NEAR(begins.at(1).to_number<double>(), begin.y(), 0.05);
