@@ -101,6 +101,7 @@ struct PartAnchoring::Candidate {
   std::vector<AnchorGuess> guesses;
   std::vector<FoundScan> tracked;
   std::size_t contradicting = 0;
+  std::vector<Pose> astray;  // where scans were expected that are lost there, or weak elsewhere
   AnchorFit fit;
   double support = 0.0;  // of the tracked ones, how well each fits the map
 };
@@ -118,6 +119,7 @@ PartAnchoring::PartAnchoring(const DriveSurvey& survey,
                              std::shared_ptr<const PlaceIndex> places,
                              const AnchorOptions& options)
     : survey_(survey),
+      view_(&view),
       options_(options),
       relocalizer_(view.profile(), std::move(places), TilesOf(view), OptionsOfRelocalizer()),
       localizer_(MakeAtlasLocalizer(survey, kTrackingRange_m, view)) {}
@@ -226,18 +228,23 @@ Status PartAnchoring::Follow(Scans scans,
   std::vector<FoundScan> last;
   for (const std::size_t i : order) {
     const Pose expected = T_here * scans[i]->T_world_sensor;
-    double fit = 0.0;
-    const auto found = FindNear(*scans[i], expected, fit);
-    if (!found) return found.error();
-    if (!*found) continue;
-    const double gap_m = std::abs(way_m[i] - last_m);
-    if (!IsNear((*found)->T_map_sensor, expected, gap_m, options_)) {
+    const Result<LocatedScan> located = LocateNear(*scans[i], expected);
+    if (!located) return located.error();
+    const bool is_near =
+        located->health != LocalizationHealth::kLost &&
+        IsNear(located->T_world_sensor, expected, std::abs(way_m[i] - last_m), options_);
+    if (located->health != LocalizationHealth::kGood) {
+      if (!is_near) candidate.astray.push_back(expected);
+      continue;
+    }
+    if (!is_near) {
       ++candidate.contradicting;
       continue;
     }
-    candidate.tracked.push_back(**found);
-    candidate.support += fit;
-    last.push_back(**found);
+    const FoundScan found{scans[i]->T_world_sensor, located->T_world_sensor};
+    candidate.tracked.push_back(found);
+    candidate.support += located->fit;
+    last.push_back(found);
     if (last.size() > kLastScans) last.erase(last.begin());
     T_here = FitTransform(last).T_map_drive.ToPose();
     last_m = way_m[i];
@@ -254,6 +261,12 @@ Result<PartAnchoring::Misfit> PartAnchoring::Measure(Scans scans,
   if (!status.ok()) return Error(std::move(status));
   Misfit misfit;
   misfit.tracked = candidate.tracked.size();
+  misfit.astray = candidate.contradicting;
+  for (const Pose& expected : candidate.astray) {
+    const Result<bool> is_mapped = IsMapped(expected);
+    if (!is_mapped) return Error(is_mapped.error());
+    misfit.astray += *is_mapped ? 1U : 0U;
+  }
   for (const FoundScan& scan : candidate.tracked) {
     misfit.rms_m +=
         (scan.T_map_sensor.translation() - T_map_drive.ToPose() * scan.T_drive_sensor.translation())
@@ -265,19 +278,33 @@ Result<PartAnchoring::Misfit> PartAnchoring::Measure(Scans scans,
   return misfit;
 }
 
-// nullopt: it does not fit the map there, or nothing is mapped.
-Result<std::optional<FoundScan>> PartAnchoring::FindNear(const DriveScan& scan,
-                                                         const Pose& T_map_sensor,
-                                                         double& fit) {
+Result<LocatedScan> PartAnchoring::LocateNear(const DriveScan& scan, const Pose& T_map_sensor) {
   constexpr StartHint kFollowed{0.5, 0.05};  // the scans before it tell where it is
   const Result<PointCloud> cloud = ReadScan(scan.scan);
   if (!cloud) return Error(cloud.error());
   localizer_->Start(T_map_sensor, kFollowed);
-  const Result<LocatedScan> located = localizer_->Locate(*cloud, LevelOf(scan), 1.0);
+  auto located = localizer_->Locate(*cloud, LevelOf(scan), 1.0);
   if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
-  fit = located->fit;
-  if (located->health != LocalizationHealth::kGood) return std::nullopt;
-  return FoundScan{scan.T_world_sensor, located->T_world_sensor};
+  return located;
+}
+
+// Whether the map has ground below a sensor there, or beside it.
+Result<bool> PartAnchoring::IsMapped(const Pose& T_map_sensor) const {
+  constexpr double kBeside_m = 2.0;
+  constexpr double kNear_m = 1.5;
+  const Eigen::Vector3d& p = T_map_sensor.translation();
+  const double ground_z_m = p.z() - survey_.mount.height_m;
+  for (const double dx_m : {0.0, -kBeside_m, kBeside_m}) {
+    for (const double dy_m : {0.0, -kBeside_m, kBeside_m}) {
+      const auto layers = view_->LayersAt({p.x() + dx_m, p.y() + dy_m});
+      if (!layers) return Error(layers.error());
+      const bool is_near = std::any_of(layers->begin(), layers->end(), [&](const TileLayer& layer) {
+        return std::abs(1e-3 * layer.altitude_mm - ground_z_m) <= kNear_m;
+      });
+      if (is_near) return true;
+    }
+  }
+  return false;
 }
 
 Result<PartAnchor> PartAnchoring::Find(Scans scans, bool is_first_part) {

@@ -82,10 +82,12 @@ class PartAnchoring {
   using Scans = std::span<const DriveScan* const>;
   // The prior is of the part that begins the drive. Errors are those of the scans and of the view.
   Result<PartAnchor> Find(Scans scans, bool is_first_part);
-  // Of scans behind those that lie in the map by `T_map_drive`: how many of them fit the map around
-  // where that puts them, and how far off that they are, RMS. Fails as Find().
+  // Of scans that are to lie in the map by `T_map_drive`, in their order: how many of them fit it
+  // around where that puts them, and how far off there, RMS; and how many do not, although that
+  // place is mapped. Fails as Find().
   struct Misfit {
     std::size_t tracked = 0;
+    std::size_t astray = 0;
     double rms_m = 0.0;
   };
   Result<Misfit> Measure(Scans scans, const LevelTransform& T_map_drive);
@@ -108,9 +110,8 @@ class PartAnchoring {
                 const std::vector<std::size_t>& order,
                 const Pose& T_map_drive,
                 Candidate& candidate);
-  Result<std::optional<FoundScan>> FindNear(const DriveScan& scan,
-                                            const Pose& T_map_sensor,
-                                            double& fit);
+  Result<LocatedScan> LocateNear(const DriveScan& scan, const Pose& T_map_sensor);
+  Result<bool> IsMapped(const Pose& T_map_sensor) const;
   bool IsBelieved(std::size_t agreeing, std::size_t elsewhere) const;
   // `first`: the first scan in the drive; `prior`: of where it is in the map.
   void Settle(const std::vector<Candidate>& candidates,
@@ -119,6 +120,7 @@ class PartAnchoring {
               PartAnchor& anchor) const;
 
   DriveSurvey survey_;
+  MapView* view_;
   AnchorOptions options_;
   Relocalizer relocalizer_;
   std::unique_ptr<ScanLocalizer> localizer_;

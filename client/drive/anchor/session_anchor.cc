@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -36,8 +38,7 @@ const DriveScan* FindScan(const DriveFolder& drive, std::uint32_t number) {
 // A session that is there.
 struct Begun {
   SessionAnchor anchor;
-  std::uint32_t first = 0;  // of its keyframes that are scans of this drive, by number
-  std::uint32_t last = 0;
+  std::set<std::uint32_t> scans;  // of this drive, by number, of which it has keyframes
   double bent_m = 0.0;  // how far one of these is from where the frame of the last puts it, at most
 };
 
@@ -66,7 +67,6 @@ Result<std::optional<Begun>> Resumed(const AnchoredDrive& drive,
   SessionAnchor& anchor = begun.anchor;
   anchor.key = session;
   anchor.is_resumed = true;
-  begun.first = begun.last = last->sequence;
   const LevelTransform transform = LevelTransformBetween(
       last->T_world_sensor.ToPose(), FindScan(drive.drive, last->sequence)->T_world_sensor);
   if (stored.state == "staged" && IsOwnFrame(transform)) {
@@ -79,26 +79,13 @@ Result<std::optional<Begun>> Resumed(const AnchoredDrive& drive,
   const Pose T_map_drive = transform.ToPose();
   for (const KeyframeSummary& keyframe : *keyframes) {
     if (!is_ours(keyframe)) continue;
-    begun.first = std::min(begun.first, keyframe.sequence);
+    begun.scans.insert(keyframe.sequence);
     const Pose& T_drive_sensor = FindScan(drive.drive, keyframe.sequence)->T_world_sensor;
     const Eigen::Vector3d off_m =
         keyframe.T_world_sensor.ToPose().translation() - T_map_drive * T_drive_sensor.translation();
     begun.bent_m = std::max(begun.bent_m, off_m.norm());
   }
   return begun;
-}
-
-// Those of a session's scans that are behind what is there of it, and those before it, from there
-// on.
-std::vector<std::vector<const DriveScan*>> BesideBegun(const SessionScans& session,
-                                                       const Begun& begun) {
-  std::vector<std::vector<const DriveScan*>> beside(2);
-  for (const DriveScan* scan : session.scans) {
-    if (scan->number > begun.last) beside[0].push_back(scan);
-    if (scan->number < begun.first) beside[1].push_back(scan);
-  }
-  std::reverse(beside[1].begin(), beside[1].end());
-  return beside;
 }
 
 constexpr std::string_view kOtherName =
@@ -133,27 +120,35 @@ class Map {
     return SessionAnchor{session.key, *std::move(part), false};
   }
 
-  // Whether what comes to a session in the map lies where its frame puts it, as far as that is
-  // mapped; kConflict.
+  // Whether what comes to a session lies where its frame puts it, as far as that is mapped;
+  // kConflict.
   Status CheckGoesOn(const SessionScans& session, const Begun& begun) {
-    for (const auto& scans : BesideBegun(session, begun)) {
-      if (scans.empty()) continue;
-      if (begun.bent_m > kOneFrame_m) {
-        return {StatusCode::kConflict,
-                StrCat("session ", session.key, " was corrected since it was begun: its keyframes ",
-                       "lie up to ", std::round(begun.bent_m * 1e3) / 1e3,
-                       " m from where one frame puts them", kOtherName)};
-      }
-      ATLAS_RETURN_IF_ERROR(Read());
-      const auto misfit = anchoring_->Measure(scans, *begun.anchor.part.T_map_drive);
-      if (!misfit) return misfit.error();
-      if (misfit->tracked >= options_.min_agreeing && misfit->rms_m > options_.max_rms_m) {
-        return {StatusCode::kConflict,
-                StrCat("session ", session.key, ": what is new of the drive lies ",
-                       std::round(misfit->rms_m * 1e3) / 1e3,
-                       " m RMS from where the session's frame puts it, expected at most ",
-                       options_.max_rms_m, " m: the drive's own poses drift", kOtherName)};
-      }
+    std::vector<const DriveScan*> scans;
+    for (const DriveScan* scan : session.scans) {
+      if (!begun.scans.contains(scan->number)) scans.push_back(scan);
+    }
+    if (scans.empty()) return {};
+    const auto refused = [&](const std::string& why) -> Status {
+      return {StatusCode::kConflict, StrCat("session ", session.key, why, kOtherName)};
+    };
+    if (begun.bent_m > kOneFrame_m) {
+      return refused(StrCat(" was corrected since it was begun: its keyframes lie up to ",
+                            std::round(begun.bent_m * 1e3) / 1e3,
+                            " m from where one frame puts them"));
+    }
+    ATLAS_RETURN_IF_ERROR(Read());
+    const auto misfit = anchoring_->Measure(scans, *begun.anchor.part.T_map_drive);
+    if (!misfit) return misfit.error();
+    if (misfit->astray > misfit->tracked) {
+      return refused(StrCat(": of what is new of the drive ", misfit->astray,
+                            " scans do not fit the map where the session's frame puts them, and ",
+                            misfit->tracked, " do: the drive's own poses drift"));
+    }
+    if (misfit->rms_m > options_.max_rms_m) {
+      return refused(StrCat(": what is new of the drive lies ",
+                            std::round(misfit->rms_m * 1e3) / 1e3,
+                            " m RMS from where the session's frame puts it, expected at most ",
+                            options_.max_rms_m, " m: the drive's own poses drift"));
     }
     return {};
   }
@@ -196,7 +191,7 @@ Result<std::vector<SessionAnchor>> AnchorSessions(const AnchoredDrive& drive,
       auto resumed = Resumed(drive, session.key, *known, client);
       if (!resumed) return Error(resumed.error());
       if (*resumed) {
-        if (known->IsInMap()) {
+        if ((*resumed)->anchor.is_anchored()) {
           Status status = map.CheckGoesOn(session, **resumed);
           if (!status.ok()) return Error(std::move(status));
         }

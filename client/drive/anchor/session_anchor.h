@@ -37,7 +37,7 @@ struct SessionAnchor {
 
 // One a session. Waits a minute for what is uploaded to be fused, then takes the map as it is.
 // kNotFound: there is no map yet. kConflict: a session of that name has no keyframe of this drive,
-// or is in the map, and what comes to it does not lie where its frame puts it.
+// or what comes to it does not lie where its frame puts it.
 // kUnsupported: a daemon before 1.10.
 Result<std::vector<SessionAnchor>> AnchorSessions(const AnchoredDrive& drive,
                                                   const std::vector<SessionScans>& sessions,

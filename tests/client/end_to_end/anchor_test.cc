@@ -249,9 +249,11 @@ TEST_F(AnchorTest, ADriveWhosePosesDriftIsForAMerge) {
   ASSERT_EQ(Anchor(daemon, drifting, {"--range", "0:12", "--session", "grows"}).exit_code, 0);
   ASSERT_EQ(StateOf(daemon, "grows"), "live");
   const std::string begun = Digest(daemon);
-  const CommandRun rest = Anchor(daemon, drifting, {"--session", "grows"});
-  EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
-  EXPECT_NE(rest.err.find("drift"), std::string::npos) << rest.err;
+  for (const std::string range : {":", "12:40", "60:75", "80:"}) {
+    const CommandRun rest = Anchor(daemon, drifting, {"--range", range, "--session", "grows"});
+    EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
+    EXPECT_NE(rest.err.find("drift"), std::string::npos) << rest.err;
+  }
   EXPECT_EQ(Digest(daemon), begun);
   EXPECT_EQ(Connect(daemon).ListKeyframes({"vehicle", "grows"})->size(), 12U);
 }
@@ -260,7 +262,8 @@ TEST_F(AnchorTest, ADriveWhosePosesDriftIsForAMerge) {
 TEST_F(AnchorTest, ASessionThatWasCorrectedIsNotGoneOnWith) {
   const DaemonProcess daemon(NewData(), kSmall);
   Map(daemon, shared_root / "street");
-  ASSERT_EQ(Anchor(daemon, shared_root / "moved", {"--range", "0:40"}).exit_code, 0);
+  const std::vector<std::string> begun = {"--range", "0:40", "--scans", "even"};
+  ASSERT_EQ(Anchor(daemon, shared_root / "moved", begun).exit_code, 0);
   AtlasClient client = Connect(daemon);
   const KeyframeSummary last = client.ListKeyframes({"vehicle", "continued"})->back();
   PoseCorrection correction;
@@ -268,11 +271,13 @@ TEST_F(AnchorTest, ASessionThatWasCorrectedIsNotGoneOnWith) {
   correction.T_world_sensor = last.T_world_sensor;
   correction.T_world_sensor.x_um += 10'000;
   ASSERT_TRUE(client.UpdatePoses(std::vector{correction}, "test"));
-  const CommandRun rest = Anchor(daemon, shared_root / "moved");
-  EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
-  EXPECT_NE(rest.err.find("corrected"), std::string::npos) << rest.err;
-  EXPECT_EQ(client.ListKeyframes({"vehicle", "continued"})->size(), 40U);
-  const CommandRun nothing_new = Anchor(daemon, shared_root / "moved", {"--range", "5:9"});
+  for (const std::string range : {":", "0:38"}) {  // behind it, and in between
+    const CommandRun rest = Anchor(daemon, shared_root / "moved", {"--range", range});
+    EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
+    EXPECT_NE(rest.err.find("corrected"), std::string::npos) << rest.err;
+  }
+  EXPECT_EQ(client.ListKeyframes({"vehicle", "continued"})->size(), 20U);
+  const CommandRun nothing_new = Anchor(daemon, shared_root / "moved", begun);
   EXPECT_EQ(nothing_new.exit_code, 0) << nothing_new.err;
 }
 
