@@ -1,7 +1,6 @@
 // From a revolution's returns to where the vehicle is: segmentation, deskewing and the localizer.
 #pragma once
 
-#include <functional>
 #include <optional>
 
 #include <Eigen/Geometry>

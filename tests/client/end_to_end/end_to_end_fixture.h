@@ -29,14 +29,16 @@ inline void WriteOverpass(const fs::path& folder) {
 }
 
 // A street of 230 m with a scan every 2.5 m; other seeds have other noise, and lanes.
-inline void WriteStreet(const fs::path& folder, std::uint64_t seed) {
+inline void WriteStreet(const fs::path& folder,
+                        std::uint64_t seed,
+                        const DriveWriteOptions& write = {}) {
   DriveOptions options;
   options.sensor = *LidarSensorByName("h350");
   options.seed = seed;
   options.spacing_m = 2.5;
   const auto drive = SimulatedDrive::Create(MakeWorld(*WorldKindByName("street")).value(), options);
   ASSERT_TRUE(drive) << drive.error().message();
-  const Status status = WriteDrive(*drive, folder, {});
+  const Status status = WriteDrive(*drive, folder, {}, write);
   ASSERT_TRUE(status.ok()) << status.message();
 }
 
