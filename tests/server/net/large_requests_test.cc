@@ -164,11 +164,7 @@ TEST_F(LargeRequestTest, ASmallOneCountsAsWhatItUnfoldsTo) {
   ASSERT_LT(sync.ByteSizeLong(), net_.large_frame_bytes);
   const auto waiting = Connect();
   waiting->Send(sync);
-  const auto deadline = Clock::now() + std::chrono::seconds(30);
-  while (server_->ReadFigures().held_bytes < kUnfoldedBytes && Clock::now() < deadline) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  EXPECT_GT(server_->ReadFigures().held_bytes, kUnfoldedBytes);
+  EXPECT_TRUE(WaitFor([](const NetFigures& now) { return now.held_bytes > kUnfoldedBytes; }));
   const auto others = Connect();
   std::size_t refused = 0;
   for (std::uint64_t id = 8; id < 11; ++id) {

@@ -70,27 +70,46 @@ class NetTest : public ServiceTest {
   // `figure`: a member of NetFigures, or what is made of them.
   template <typename Figure>
   void ExpectFigure(Figure figure, std::uint64_t expected) const {
-    const auto read = [&]() -> std::uint64_t {
-      return std::invoke(figure, server_->ReadFigures());
-    };
+    std::uint64_t read = 0;
+    WaitFor([&](const NetFigures& now) {
+      read = std::invoke(figure, now);
+      return read == expected;
+    });
+    EXPECT_EQ(read, expected);
+  }
+  // False if it never becomes true.
+  template <typename Predicate>
+  bool WaitFor(Predicate is_so) const {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (read() != expected && std::chrono::steady_clock::now() < deadline) {
+    while (!is_so(server_->ReadFigures())) {
+      if (std::chrono::steady_clock::now() > deadline) {
+        return false;
+      }
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    EXPECT_EQ(read(), expected);
+    return true;
   }
-  // What was queued until nothing changes any more, and is then. A plan that takes long looks as if
-  // nothing changed: with more than `expected` queued, it is waited for.
+  // A request has come, and is not over.
+  static bool HoldsSomething(const NetFigures& now) { return now.held_bytes > 0; }
+  // What was queued until nothing changes any more, and is then. Requests that are still on their
+  // way and a plan that takes long look as if nothing changed: it is waited for what is expected.
   struct Queued {
     std::uint64_t most = 0;
     std::uint64_t at_rest = 0;
   };
-  Queued WaitUntilAtRest(std::uint64_t expected = std::numeric_limits<std::uint64_t>::max()) const {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    std::uint64_t most = 0;
+  struct QueuedBounds {
+    std::uint64_t more_than = 0;                                        // at some time
+    std::uint64_t at_most = std::numeric_limits<std::uint64_t>::max();  // at rest
+  };
+  Queued WaitUntilAtRest(const QueuedBounds& expected) const {
+    constexpr int kAtRest = 50;
     NetFigures last;
-    for (int unchanged = 0; unchanged < 50 || (last.queued_bytes > expected &&
-                                               std::chrono::steady_clock::now() < deadline);) {
+    std::uint64_t most = 0;
+    int unchanged = 0;
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (std::chrono::steady_clock::now() < deadline &&
+           (unchanged < kAtRest || most <= expected.more_than ||
+            last.queued_bytes > expected.at_most)) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       const NetFigures now = server_->ReadFigures();
       most = std::max(most, now.queued_bytes);

@@ -81,7 +81,7 @@ TEST_F(SlowReadersTest, OneQueuesNoMoreThanItMay) {
     const auto peer = Connect(4'096);
     peer->SendBytes(RequestsFor(is_sync));
     const std::uint64_t bound = net_.max_queued_bytes + kFrameBytes;
-    const Queued queued = WaitUntilAtRest(bound);
+    const Queued queued = WaitUntilAtRest({.more_than = 0, .at_most = bound});
     EXPECT_GT(queued.at_rest, 0u);
     EXPECT_LE(queued.at_rest, bound);
     EXPECT_LE(queued.most, net_.max_queued_bytes + kFrameBytes + kPlanBytes);
@@ -97,8 +97,9 @@ TEST_F(SlowReadersTest, AllTogetherQueueNoMoreThanTheyMay) {
     peers.push_back(Connect(4'096));
     peers.back()->SendBytes(RequestsFor(i % 2 == 0));
   }
-  const std::uint64_t most = WaitUntilAtRest().most;
-  EXPECT_GT(most, net_.max_all_queued_bytes / 4);
+  const std::uint64_t expected = net_.max_all_queued_bytes / 4;
+  const std::uint64_t most = WaitUntilAtRest({.more_than = expected}).most;
+  EXPECT_GT(most, expected);
   EXPECT_LE(most, net_.max_all_queued_bytes + kPeers * (kLeastBytes + kFrameBytes));
   // Another one gets all it asks for.
   const auto good = Connect();
@@ -127,9 +128,10 @@ TEST_F(SlowReadersTest, WhatRepliesKeepCountsAsQueued) {
     const auto peer = Connect(4'096);
     peer->SendBytes(RequestsFor(is_sync));
     const std::uint64_t bound = net_.max_queued_bytes + kFrameBytes + tiles * sizeof(SyncItem);
-    const std::uint64_t queued = WaitUntilAtRest(bound).at_rest;
     // A query knows the tiles of one level.
-    EXPECT_GT(queued, is_sync ? 256 * sizeof(SyncItem) : tiles / 4 * 32);
+    const std::uint64_t expected = is_sync ? 256 * sizeof(SyncItem) : tiles / 4 * 32;
+    const std::uint64_t queued = WaitUntilAtRest({.more_than = expected, .at_most = bound}).at_rest;
+    EXPECT_GT(queued, expected);
     EXPECT_LE(queued, bound);
   }
 }
@@ -143,7 +145,9 @@ TEST_F(SlowReadersTest, WhatBecameOfWhatIsHeldCountsForTheRequest) {
     peers.push_back(Connect(4'096));
     peers.back()->Send(ManyHeldSync(i + 1));
   }
-  EXPECT_LT(WaitUntilAtRest(kTold / 2 - 1).at_rest, kTold / 2) << "not among replies";
+  EXPECT_TRUE(WaitFor([](const NetFigures& now) { return now.held_bytes >= 3 * kTold; }));
+  const Queued queued = WaitUntilAtRest({.more_than = 0, .at_most = kTold / 2 - 1});
+  EXPECT_LT(queued.at_rest, kTold / 2) << "not among replies";
   const std::uint64_t held = server_->ReadFigures().held_bytes;
   EXPECT_GE(held, 3 * kTold);
   EXPECT_LT(held, 4 * kTold) << "what was asked is gone";
@@ -159,12 +163,14 @@ TEST_F(SlowReadersTest, WhatBecameOfWhatIsHeldCountsForTheRequest) {
 TEST_F(SlowReadersTest, WhatIsLeftOfARequestGoesWithItsPeer) {
   net_.drain = milliseconds(100);
   ServeTiles();
-  Connect(4'096)->Send(ManyHeldSync(1));
+  auto leaves = Connect(4'096);
+  leaves->Send(ManyHeldSync(1));
+  EXPECT_TRUE(WaitFor(HoldsSomething));
+  leaves.reset();
   ExpectHoldsNothing();
   const auto stays = Connect(4'096);
   stays->Send(ManyHeldSync(2));
-  WaitUntilAtRest();
-  EXPECT_GT(server_->ReadFigures().held_bytes, 0u);
+  EXPECT_TRUE(WaitFor(HoldsSomething));
   StopServer();
 }
 
@@ -174,7 +180,8 @@ TEST_F(SlowReadersTest, ASyncThatEndsByItsDeadlineIsCountedAsLate) {
   wire::Envelope sync = ManyHeldSync(1);
   sync.mutable_sync_request()->set_timeout_ms(100);
   peer->Send(sync);
-  WaitUntilAtRest();  // longer than that
+  EXPECT_TRUE(WaitFor(HoldsSomething));
+  std::this_thread::sleep_for(milliseconds(500));  // longer than that
   std::optional<wire::Envelope> reply;
   do {
     reply = peer->Receive();
