@@ -2,6 +2,7 @@
 #include "core/planning/search/corridor.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "core/planning/search/ahead.h"
@@ -16,7 +17,7 @@ constexpr double kMiddleCell_m = 0.4;
 constexpr int kLevelsToStreets = 3;
 // Of the middle level, which is checked with the finest: what a search leaning towards the goal
 // may need beside the cheapest way.
-constexpr float kDearerLanes_m = 2.0F;
+constexpr float kDearerLanes_m = 4.0F;
 
 std::uint8_t MiddleLevel(const MapProfile& profile) {
   std::uint8_t level = 1;
@@ -31,6 +32,18 @@ void MarkClosed(SurfaceTiles& tiles) {
     for (SurfaceNode& node : tiles.tile(slot).nodes) {
       if (node.Has(SurfaceNode::kClosed)) {
         node.flags |= SurfaceNode::kCorridor;
+      }
+    }
+  }
+}
+
+// Those at the edge, too: a way that leads on from there is known, if not the cheapest.
+void MarkReached(SurfaceTiles& tiles) {
+  for (std::uint32_t slot = 0; slot < tiles.size(); ++slot) {
+    SurfaceTile& tile = tiles.tile(slot);
+    for (std::size_t i = 0; i < tile.search.size(); ++i) {
+      if (tile.search[i].cost < std::numeric_limits<float>::infinity()) {
+        tile.nodes[i].flags |= SurfaceNode::kCorridor;
       }
     }
   }
@@ -56,7 +69,8 @@ Corridor::Corridor(TileSource& source,
 
 Result<std::optional<double>> Corridor::Find(const NodeRef& start,
                                              const NodeRef& goal,
-                                             const Width& width) {
+                                             const Width& width,
+                                             float leaning) {
   if (!coarse_) {
     return std::nullopt;
   }
@@ -64,7 +78,7 @@ Result<std::optional<double>> Corridor::Find(const NodeRef& start,
   if (!has_streets) {
     return Error(has_streets.error());
   }
-  return *has_streets ? FindLanes(start, goal) : std::nullopt;
+  return *has_streets ? FindLanes(start, goal, leaning) : std::nullopt;
 }
 
 Result<bool> Corridor::FindStreets(const NodeRef& start, const NodeRef& goal, const Width& width) {
@@ -92,7 +106,9 @@ Result<bool> Corridor::FindStreets(const NodeRef& start, const NodeRef& goal, co
   return true;
 }
 
-Result<std::optional<double>> Corridor::FindLanes(const NodeRef& start, const NodeRef& goal) {
+Result<std::optional<double>> Corridor::FindLanes(const NodeRef& start,
+                                                  const NodeRef& goal,
+                                                  float leaning) {
   const auto from = middle_->Above(map_.tiles(), goal);
   const auto to = middle_->Above(map_.tiles(), start);
   if (!from || !to) {
@@ -102,7 +118,7 @@ Result<std::optional<double>> Corridor::FindLanes(const NodeRef& start, const No
     return std::nullopt;
   }
   middle_->tiles().ClearSearch();
-  const GuidedAhead ahead(middle_->tiles(), coarse_->tiles(), 1.0F);
+  const GuidedAhead ahead(middle_->tiles(), coarse_->tiles(), leaning);
   GridSearch<CoarseMap, GuidedAhead> search(*middle_, ahead, budget_);
   const auto is_found = search.RunTo(*from, *to);
   if (!is_found) {
@@ -115,7 +131,7 @@ Result<std::optional<double>> Corridor::FindLanes(const NodeRef& start, const No
   if (Status status = search.CloseUpTo(static_cast<float>(least) + kDearerLanes_m); !status.ok()) {
     return Error(std::move(status));
   }
-  MarkClosed(middle_->tiles());
+  MarkReached(middle_->tiles());
   return least;
 }
 

@@ -32,9 +32,13 @@ class Corridor {
            SurfaceMap& map);
 
   // Marks the nodes of tiles() that a finer search may go along (SurfaceNode::kCorridor), with what
-  // is left from them to the goal as their cost. The least that any route inside of it costs; none
-  // where there is no corridor. Errors as of PlanBudget and of the tile source.
-  Result<std::optional<double>> Find(const NodeRef& start, const NodeRef& goal, const Width& width);
+  // is left from them to the goal as their cost, at most `leaning` times the least: the higher, the
+  // fewer are marked. What the cheapest route inside of it costs, to the same; none where there is
+  // no corridor, whatever the leaning. Errors as of PlanBudget and of the tile source.
+  Result<std::optional<double>> Find(const NodeRef& start,
+                                     const NodeRef& goal,
+                                     const Width& width,
+                                     float leaning);
 
   // Both ends were found on the coarse level: there is a pyramid to find corridors in.
   bool has_coarse_ends() const { return has_coarse_ends_; }
@@ -43,7 +47,7 @@ class Corridor {
 
  private:
   Result<bool> FindStreets(const NodeRef& start, const NodeRef& goal, const Width& width);
-  Result<std::optional<double>> FindLanes(const NodeRef& start, const NodeRef& goal);
+  Result<std::optional<double>> FindLanes(const NodeRef& start, const NodeRef& goal, float leaning);
 
   PlanBudget& budget_;
   SurfaceMap& map_;

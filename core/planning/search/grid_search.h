@@ -34,12 +34,15 @@ class GridSearch {
 
   // Errors, of this and of CloseUpTo: as of PlanBudget, and of loading tiles.
   //
-  // From `start` until `end` is closed; false when nothing is left before.
-  Result<bool> RunTo(const NodeRef& start, const NodeRef& end) {
+  // From `start` until `end` is closed; false when nothing is left before, or `patience` nodes are
+  // closed.
+  Result<bool> RunTo(const NodeRef& start,
+                     const NodeRef& end,
+                     std::uint64_t patience = std::numeric_limits<std::uint64_t>::max()) {
     if (Status status = Begin(start); !status.ok()) {
       return Error(std::move(status));
     }
-    while (true) {
+    for (; patience > 0; --patience) {
       const auto closed = Next();
       if (!closed) {
         return Error(closed.error());
@@ -48,6 +51,7 @@ class GridSearch {
         return !closed->is_none();
       }
     }
+    return false;
   }
 
   // Goes on as long as ways may cost no more than `limit`.

@@ -1,6 +1,7 @@
 // Guided where a corridor leads, else everywhere.
 #include "core/planning/search/route_search.h"
 
+#include <limits>
 #include <utility>
 
 #include "core/planning/search/ahead.h"
@@ -11,27 +12,37 @@
 namespace atlas {
 namespace {
 
-// The search leans so much towards the goal. Measured in a city and a garage (docs/results.md):
-// leaning by 5 % costs half of all routes less than 0.2 and 0.9 %, by 2 % it expands up to twice as
-// many nodes.
+// The finest search leans so much towards the goal, the middle one towards the start
+// (docs/decisions/0612-leaning-lanes.md).
 constexpr float kLeaning = 1.05F;
+constexpr float kLaneLeaning = 1.03F;
 constexpr float kUpright = 1.0F;
 // The coarse level takes for open what is not, by 2 % of a street and more at crossings: streets
 // that much dearer may be the cheapest after all. Where there is no way on them, others may lead
 // on.
 constexpr Corridor::Width kWidths[] = {{1.05F, 20.0F}, {1.5F, 200.0F}};
 // On shorter ways what coarse cells round at both ends is more than leaning may add.
-constexpr double kShort_m = 60.0;
+constexpr double kShort_m = 20.0;
+// Lanes that lean are few, and where the middle level takes for a way what is none, nothing leads
+// on in them. Where something does, the finest search needs half as many nodes.
+constexpr double kPatiencePerMetre = 50.0;
+constexpr double kLeastPatience = 40'000.0;
+constexpr std::uint64_t kEndless = std::numeric_limits<std::uint64_t>::max();
+
+std::uint64_t Patience(double metres) {
+  return static_cast<std::uint64_t>(kLeastPatience + kPatiencePerMetre * metres);
+}
 
 template <typename Ahead>
 Result<std::vector<NodeRef>> Search(SurfaceMap& map,
                                     const Ahead& ahead,
                                     PlanBudget& budget,
                                     const NodeRef& start,
-                                    const NodeRef& goal) {
+                                    const NodeRef& goal,
+                                    std::uint64_t patience) {
   map.tiles().ClearSearch();
   GridSearch<SurfaceMap, Ahead> search(map, ahead, budget);
-  const auto end = search.RunTo(start, goal);
+  const auto end = search.RunTo(start, goal, patience);
   if (!end) {
     return Error(end.error());
   }
@@ -63,25 +74,28 @@ Result<std::vector<NodeRef>> RouteSearch::Guided(Corridor& corridor,
                                                  const NodeRef& start,
                                                  const NodeRef& goal) {
   for (const Corridor::Width& width : kWidths) {
-    const auto bound = corridor.Find(start, goal, width);
-    if (!bound) {
-      return Error(bound.error());
-    }
-    if (!*bound) {
-      continue;
-    }
-    const bool is_short = **bound < kShort_m;
-    const GuidedAhead ahead(map_.tiles(), corridor.tiles(), is_short ? kUpright : kLeaning);
-    auto way = Search(map_, ahead, budget_, start, goal);
-    if (!way || !way->empty()) {
-      return way;
+    for (const float leaning : {kLaneLeaning, kUpright}) {
+      const auto cost = corridor.Find(start, goal, width, leaning);
+      if (!cost) {
+        return Error(cost.error());
+      }
+      if (!*cost) {
+        break;
+      }
+      const GuidedAhead ahead(map_.tiles(), corridor.tiles(),
+                              **cost < kShort_m ? kUpright : kLeaning);
+      auto way = Search(map_, ahead, budget_, start, goal,
+                        leaning > kUpright ? Patience(**cost) : kEndless);
+      if (!way || !way->empty()) {
+        return way;
+      }
     }
   }
   return std::vector<NodeRef>();
 }
 
 Result<std::vector<NodeRef>> RouteSearch::Everywhere(const NodeRef& start, const NodeRef& goal) {
-  return Search(map_, StraightAhead(map_.tiles(), goal), budget_, start, goal);
+  return Search(map_, StraightAhead(map_.tiles(), goal), budget_, start, goal, kEndless);
 }
 
 }  // namespace atlas

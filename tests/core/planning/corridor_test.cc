@@ -161,6 +161,31 @@ TEST(CorridorTest, FewerNodesAreExpandedWhereThereAreManyWays) {
   EXPECT_LT(2 * route->expansions, all->expansions);
 }
 
+// A kerb that the coarser levels take for a way all along, and a ramp far aside: lanes straight
+// over the kerb lead nowhere, so that others have to be found.
+TEST(CorridorTest, LanesThatLeadNowhereAreNotTheLast) {
+  constexpr double kKerb_m = 0.25;
+  TinyWorld world;
+  for (std::int64_t y = 0; y < 300; ++y) {
+    for (std::int64_t x = 0; x < 600; ++x) {
+      const double up = y >= 260 && y < 290
+                            ? std::clamp(static_cast<double>(x - 270) / 60.0, 0.0, 1.0)
+                            : (x >= 300 ? 1.0 : 0.0);
+      world.Put(x, y, FreeLayer(kKerb_m * up));
+    }
+  }
+  world.BuildPyramid();
+  PlanRequest request{{3.0, 5.0, 0.0}, {57.0, 5.0, 0.0}, SmallVehicle(0)};
+  request.options.max_slope_deg = 30.0;
+  const auto route = PlanRoute(world, world.profile(), request);
+  request.options.is_exhaustive = true;
+  const auto all = PlanRoute(world, world.profile(), request);
+  ASSERT_TRUE(route && route->found && all && all->found);
+  EXPECT_GT(all->searched_cost, 65.0) << "by the ramp";
+  EXPECT_LE(route->searched_cost, 1.02 * all->searched_cost);
+  EXPECT_LT(route->expansions, 3 * all->expansions);
+}
+
 TEST(CorridorTest, AGoalThatIsShutInIsToldWithoutASearchOverEverything) {
   TinyWorld world;
   for (std::int64_t y = 0; y < 400; ++y) {
