@@ -1,6 +1,7 @@
 #include "client/drive/drive_localization.h"
 
 #include <utility>
+#include <vector>
 
 #include "client/drive/drive_survey.h"
 #include "client/drive/localization_trial.h"
@@ -12,6 +13,19 @@
 namespace atlas {
 namespace {
 
+// Of scans that follow each other, where the drive says when they were made: then a revolution of
+// the sensor is known before the first one.
+std::optional<double> UsualIntervalOf(const DriveFolder& drive,
+                                      const std::vector<SelectedScan>& selected) {
+  std::vector<double> intervals_s;
+  for (std::size_t i = 1; i < selected.size(); ++i) {
+    const auto& before_s = drive.scans[selected[i - 1].index].time_s;
+    const auto& time_s = drive.scans[selected[i].index].time_s;
+    if (before_s && time_s && *time_s > *before_s) intervals_s.push_back(*time_s - *before_s);
+  }
+  return intervals_s.empty() ? std::nullopt : std::optional(UsualInterval_s(intervals_s));
+}
+
 class DriveLocalization {
  public:
   DriveLocalization(const DriveFolder& drive,
@@ -22,7 +36,9 @@ class DriveLocalization {
 
   Result<DriveLocalizationReport> Run() {
     std::optional<std::uint32_t> last_part;
-    for (const SelectedScan& selected : SelectScans(drive_, options_.selection)) {
+    const std::vector<SelectedScan> scans = SelectScans(drive_, options_.selection);
+    clock_ = ScanClock(UsualIntervalOf(drive_, scans));
+    for (const SelectedScan& selected : scans) {
       const DriveScan& scan = drive_.scans[selected.index];
       const Result<PointCloud> cloud = ReadScan(scan.scan);
       if (!cloud && !(IsDamaged(cloud.error()) && !options_.shots)) return Error(cloud.error());

@@ -5,6 +5,23 @@
 
 namespace atlas {
 
+double UsualInterval_s(std::span<double> intervals_s) {
+  constexpr double kShortest = 0.5;
+  constexpr double kLongest = 1.5;  // two of them are one that is missing
+  const auto quartile = intervals_s.begin() + static_cast<std::ptrdiff_t>(intervals_s.size() / 4);
+  std::nth_element(intervals_s.begin(), quartile, intervals_s.end());
+  const double about_s = *quartile;
+  double sum_s = 0.0;
+  int usual = 0;
+  for (const double interval_s : intervals_s) {
+    if (interval_s > kShortest * about_s && interval_s < kLongest * about_s) {
+      sum_s += interval_s;
+      ++usual;
+    }
+  }
+  return sum_s / usual;
+}
+
 double ScanClock::Tick(std::optional<double> time_s) {
   if (!time_s) return 1.0;
   const std::optional<double> before_s = std::exchange(last_s_, time_s);
@@ -14,13 +31,14 @@ double ScanClock::Tick(std::optional<double> time_s) {
     return 1.0;
   }
   const double since_s = *time_s - *before_s;
-  if (!interval_s_) interval_s_ = since_s;
-  return std::min(since_s / *interval_s_, kMost);
+  intervals_s_[intervals_++ % kKept] = since_s;
+  return std::min(since_s / Usual_s(), kMost);
 }
 
-void ScanClock::Restart() {
-  last_s_.reset();
-  interval_s_.reset();
+double ScanClock::Usual_s() const {
+  if (usual_s_) return *usual_s_;
+  auto intervals_s = intervals_s_;
+  return UsualInterval_s(std::span(intervals_s).first(std::min(intervals_, kKept)));
 }
 
 }  // namespace atlas

@@ -1,5 +1,7 @@
 #include "core/localization/scan_clock.h"
 
+#include <random>
+
 #include <gtest/gtest.h>
 
 namespace atlas {
@@ -8,7 +10,7 @@ namespace {
 TEST(ScanClockTest, WhatIsMissingCounts) {
   ScanClock clock;
   EXPECT_EQ(clock.Tick(10.0), 1.0);
-  EXPECT_EQ(clock.Tick(10.25), 1.0) << "the first interval is the usual one";
+  EXPECT_EQ(clock.Tick(10.25), 1.0) << "the only one is the usual one";
   EXPECT_DOUBLE_EQ(clock.Tick(10.75), 2.0);
   EXPECT_DOUBLE_EQ(clock.Tick(11.0), 1.0);
   EXPECT_DOUBLE_EQ(clock.Tick(11.125), 0.5);
@@ -51,14 +53,82 @@ TEST(ScanClockTest, AGapOfHoursIsALongOneAndNotMore) {
   EXPECT_EQ(clock.Tick(86'400.0), 100.0);
 }
 
-TEST(ScanClockTest, AfterARestartAllIsNew) {
+TEST(ScanClockTest, AfterARestartTheSensorIsTheSame) {
   ScanClock clock;
   clock.Tick(0.0);
   clock.Tick(0.1);
   clock.Restart();
   EXPECT_EQ(clock.Tick(50.0), 1.0);
-  EXPECT_EQ(clock.Tick(50.5), 1.0);
-  EXPECT_DOUBLE_EQ(clock.Tick(51.5), 2.0);
+  EXPECT_NEAR(clock.Tick(50.2), 2.0, 1e-9);
+}
+
+// The first interval is as wrong as any: deskewing went by it for the whole drive.
+TEST(ScanClockTest, WhatIsMissingAtTheBeginningIsNotTheUsualInterval) {
+  for (const int missing : {1, 3, 30}) {
+    ScanClock clock;
+    clock.Tick(0.0);
+    double time_s = 0.25 * (missing + 1);
+    EXPECT_EQ(clock.Tick(time_s), 1.0);
+    for (int i = 0; i < 300; ++i) {
+      EXPECT_NEAR(clock.Tick(time_s += 0.25), 1.0, 1e-9) << missing;
+    }
+    EXPECT_NEAR(clock.Tick(time_s += 0.75), 3.0, 1e-9);
+  }
+}
+
+TEST(ScanClockTest, ASensorThatIsKnownHasNothingToLearn) {
+  ScanClock clock(0.1);
+  clock.Tick(0.0);
+  EXPECT_NEAR(clock.Tick(0.3), 3.0, 1e-9);
+  EXPECT_NEAR(clock.Tick(0.4), 1.0, 1e-9);
+}
+
+TEST(ScanClockTest, AnIntervalThatIsTooShortIsForgottenAfterThree) {
+  ScanClock clock;
+  clock.Tick(0.0);
+  double time_s = 0.005;
+  clock.Tick(time_s);
+  for (int i = 0; i < 300; ++i) {
+    const double scans = clock.Tick(time_s += 0.25);
+    if (i >= 2) {
+      EXPECT_NEAR(scans, 1.0, 1e-9) << i;
+    }
+  }
+}
+
+TEST(ScanClockTest, HalfOfTheScansMayBeMissing) {
+  std::mt19937 random(1);
+  ScanClock clock;
+  double time_s = 0.0;
+  clock.Tick(time_s);
+  for (int i = 0; i < 1'000; ++i) {
+    const int intervals = 1 + (random() % 2 == 0 ? 1 : 0) + (random() % 8 == 0 ? 2 : 0);
+    const double scans = clock.Tick(time_s += 0.1 * intervals);
+    if (i >= 20) {
+      EXPECT_NEAR(scans, intervals, 1e-6) << i;
+    }
+  }
+}
+
+// As times of arrival do.
+TEST(ScanClockTest, TimesThatJitterAreEvenOnAverage) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> late_s(0.0, 0.02);
+  ScanClock clock;
+  double scans = 0.0;
+  for (int i = 0; i <= 200; ++i) {
+    const double told = clock.Tick(0.1 * i + late_s(random));
+    if (i > 100) scans += told;
+  }
+  EXPECT_NEAR(scans, 100.0, 1.0);
+}
+
+TEST(ScanClockTest, AnotherPaceIsLearnt) {
+  ScanClock clock;
+  double time_s = 0.0;
+  for (int i = 0; i < 100; ++i) clock.Tick(time_s += 0.05);
+  for (int i = 0; i < 100; ++i) clock.Tick(time_s += 0.1);
+  EXPECT_NEAR(clock.Tick(time_s += 0.1), 1.0, 1e-9);
 }
 
 }  // namespace
