@@ -24,17 +24,6 @@ double YawBetween(const Pose& T_to_sensor, const Pose& T_from_sensor) {
       .yaw_rad;
 }
 
-struct Residual {
-  Eigen::Vector3d place_m;
-  double yaw_rad = 0.0;
-};
-
-Residual ResidualOf(const LevelTransform& T_map_drive, const FoundScan& scan) {
-  return {
-      scan.T_map_sensor.translation() - T_map_drive.ToPose() * scan.T_drive_sensor.translation(),
-      Wrapped(YawBetween(scan.T_map_sensor, scan.T_drive_sensor) - T_map_drive.yaw_rad)};
-}
-
 // One step of weighted least squares from `before`, which is near.
 LevelTransform Step(std::span<const FoundScan> found,
                     std::span<const double> weights,
@@ -59,7 +48,7 @@ LevelTransform Step(std::span<const FoundScan> found,
     const double heading = weights[i] / (kHeadingSigma_rad * kHeadingSigma_rad);
     gradient += place * (p.x() * q.y() - p.y() * q.x());
     information += place * p.head<2>().squaredNorm();
-    gradient += heading * ResidualOf(before, found[i]).yaw_rad;
+    gradient += heading * OffsetFrom(before, found[i]).yaw_rad;
     information += heading;
   }
   LevelTransform after;
@@ -72,7 +61,7 @@ LevelTransform Step(std::span<const FoundScan> found,
 std::vector<double> WeightsOf(std::span<const FoundScan> found, const LevelTransform& T_map_drive) {
   std::vector<double> off_m;
   for (const FoundScan& scan : found) {
-    off_m.push_back(ResidualOf(T_map_drive, scan).place_m.norm());
+    off_m.push_back(OffsetFrom(T_map_drive, scan).place_m.norm());
   }
   std::vector<double> sorted = off_m;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -109,8 +98,8 @@ bool Agree(const FoundScan& a, const FoundScan& b, const AgreementOptions& optio
   const double way_m = (a.T_drive_sensor.translation() - b.T_drive_sensor.translation()).norm();
   const double most_m = options.distance_m + options.drift * way_m;
   return std::abs(Wrapped(of_a.yaw_rad - of_b.yaw_rad)) <= options.yaw_rad &&
-         ResidualOf(of_a, b).place_m.norm() <= most_m &&
-         ResidualOf(of_b, a).place_m.norm() <= most_m;
+         OffsetFrom(of_a, b).place_m.norm() <= most_m &&
+         OffsetFrom(of_b, a).place_m.norm() <= most_m;
 }
 
 std::vector<std::size_t> LargestAgreement(std::span<const FoundScan> found,
@@ -126,25 +115,21 @@ std::vector<std::size_t> LargestAgreement(std::span<const FoundScan> found,
   return largest;
 }
 
-AnchorFit FitTransform(std::span<const FoundScan> found) {
-  AnchorFit fit;
-  fit.T_map_drive = LevelTransformBetween(found.front().T_map_sensor, found.front().T_drive_sensor);
+FrameOffset OffsetFrom(const LevelTransform& T_map_drive, const FoundScan& scan) {
+  return {
+      scan.T_map_sensor.translation() - T_map_drive.ToPose() * scan.T_drive_sensor.translation(),
+      Wrapped(YawBetween(scan.T_map_sensor, scan.T_drive_sensor) - T_map_drive.yaw_rad)};
+}
+
+LevelTransform FitTransform(std::span<const FoundScan> found) {
+  LevelTransform T_map_drive =
+      LevelTransformBetween(found.front().T_map_sensor, found.front().T_drive_sensor);
   const std::vector<double> even(found.size(), 1.0);
-  fit.T_map_drive = Step(found, even, fit.T_map_drive);
+  T_map_drive = Step(found, even, T_map_drive);
   for (int i = 0; i < kIterations; ++i) {
-    fit.T_map_drive = Step(found, WeightsOf(found, fit.T_map_drive), fit.T_map_drive);
+    T_map_drive = Step(found, WeightsOf(found, T_map_drive), T_map_drive);
   }
-  double square_m2 = 0.0;
-  double square_rad2 = 0.0;
-  for (const FoundScan& scan : found) {
-    const Residual residual = ResidualOf(fit.T_map_drive, scan);
-    square_m2 += residual.place_m.squaredNorm();
-    square_rad2 += residual.yaw_rad * residual.yaw_rad;
-  }
-  const auto count = static_cast<double>(found.size());
-  fit.rms_m = std::sqrt(square_m2 / count);
-  fit.rms_yaw_rad = std::sqrt(square_rad2 / count);
-  return fit;
+  return T_map_drive;
 }
 
 }  // namespace atlas

@@ -44,14 +44,15 @@ bool Agree(const FoundScan& a, const FoundScan& b, const AgreementOptions& optio
 std::vector<std::size_t> LargestAgreement(std::span<const FoundScan> found,
                                           const AgreementOptions& options);
 
-struct AnchorFit {
-  LevelTransform T_map_drive;
-  double rms_m = 0.0;  // of where the scans were found, from where the transform puts them
-  double rms_yaw_rad = 0.0;
+// Of where a scan was found, from where a transform puts it.
+struct FrameOffset {
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
+  double yaw_rad = 0.0;
 };
+FrameOffset OffsetFrom(const LevelTransform& T_map_drive, const FoundScan& scan);
 
 // The transform that fits all of `found`, not empty: least squares of places (0.05 m) and headings
 // (0.1 degrees), robust against a few that are off.
-AnchorFit FitTransform(std::span<const FoundScan> found);
+LevelTransform FitTransform(std::span<const FoundScan> found);
 
 }  // namespace atlas

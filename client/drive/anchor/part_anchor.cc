@@ -17,40 +17,11 @@ namespace atlas {
 namespace {
 
 constexpr double kRelocalizationRange_m = 40.0;
-constexpr double kTrackingRange_m = 100.0;
-constexpr std::size_t kLastScans = 10;  // that say how the drive lies here
 
 RelocalizerOptions OptionsOfRelocalizer() {
   RelocalizerOptions options;
   options.features.max_range_m = static_cast<float>(kRelocalizationRange_m);
   return options;
-}
-
-Eigen::Quaterniond LevelOf(const DriveScan& scan) {
-  return SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear())).R_level_sensor;
-}
-
-// How far each scan is along the drive.
-std::vector<double> WaysOf(std::span<const DriveScan* const> scans) {
-  std::vector<double> way_m{0.0};
-  for (std::size_t i = 1; i < scans.size(); ++i) {
-    way_m.push_back(way_m.back() + (scans[i]->T_world_sensor.translation() -
-                                    scans[i - 1]->T_world_sensor.translation())
-                                       .norm());
-  }
-  return way_m;
-}
-
-// Up to `count`, evenly spread along the way, at least `spacing_m` apart.
-std::vector<std::size_t> SpreadAlong(const std::vector<double>& way_m,
-                                     std::size_t count,
-                                     double spacing_m) {
-  const double step_m = std::max(spacing_m, way_m.back() / static_cast<double>(count));
-  std::vector<std::size_t> spread;
-  for (std::size_t i = 0; i < way_m.size(); ++i) {
-    if (spread.empty() || way_m[i] >= way_m[spread.back()] + step_m) spread.push_back(i);
-  }
-  return spread;
 }
 
 // Each far from those before it: in the order of their indices with the bits reversed.
@@ -71,16 +42,8 @@ std::vector<std::size_t> Scattered(const std::vector<std::size_t>& spread) {
   return scattered;
 }
 
-// Whether a scan lies where it was expected, `gap_m` behind the last one that told.
-bool IsNear(const Pose& found, const Pose& expected, double gap_m, const AnchorOptions& options) {
-  const Eigen::AngleAxisd turned(found.linear().transpose() * expected.linear());
-  return (found.translation() - expected.translation()).norm() <=
-             options.max_surprise_m + options.agreement.drift * gap_m &&
-         turned.angle() <= options.max_surprise_rad;
-}
-
 constexpr std::string_view kForMerge =
-    "; its own poses drift: atlas-merge run aligns sessions that are staged";
+    "; if its own poses drift, atlas-merge run aligns sessions that are staged";
 
 // For people.
 double InThousandths(double value) {
@@ -96,14 +59,12 @@ struct PartAnchoring::Probes {
   std::vector<AnchorGuess> guesses;
 };
 
-// How the drive may lie, by guesses that agree, and which scans fit the map then.
+// How the drive may lie, by guesses that agree, and how its scans fit the map then.
 struct PartAnchoring::Candidate {
   std::vector<AnchorGuess> guesses;
-  std::vector<FoundScan> tracked;
-  std::size_t contradicting = 0;
-  std::vector<Pose> astray;  // where scans were expected that are lost there, or weak elsewhere
-  AnchorFit fit;
-  double support = 0.0;  // of the tracked ones, how well each fits the map
+  LevelTransform T_map_drive;
+  FrameFit fit;
+  double support = 0.0;  // of the scans that were found, how well each fits the map
 };
 
 Status AnchorOptions::Validate() const {
@@ -119,10 +80,9 @@ PartAnchoring::PartAnchoring(const DriveSurvey& survey,
                              std::shared_ptr<const PlaceIndex> places,
                              const AnchorOptions& options)
     : survey_(survey),
-      view_(&view),
       options_(options),
       relocalizer_(view.profile(), std::move(places), TilesOf(view), OptionsOfRelocalizer()),
-      localizer_(MakeAtlasLocalizer(survey, kTrackingRange_m, view)) {}
+      follower_(survey, view, options.follow) {}
 
 Result<PartAnchoring> PartAnchoring::Create(const DriveSurvey& survey,
                                             MapView& view,
@@ -138,7 +98,7 @@ Result<PartAnchoring> PartAnchoring::Create(const DriveSurvey& survey,
   return PartAnchoring(survey, view, *std::move(places), options);
 }
 
-Status PartAnchoring::Probe(Scans scans, std::size_t index, Probes& probes) const {
+Status PartAnchoring::Probe(PartScans scans, std::size_t index, Probes& probes) const {
   if (!probes.probed.insert(index).second) return {};
   const DriveScan& scan = *scans[index];
   const Result<PointCloud> cloud = ReadScan(scan.scan);
@@ -151,7 +111,8 @@ Status PartAnchoring::Probe(Scans scans, std::size_t index, Probes& probes) cons
   prior.radius_m += way.head<2>().norm() + drift_m;
   prior.z_m += way.z();
   prior.height_m += drift_m;
-  const Eigen::Quaterniond R_level_sensor = LevelOf(scan);
+  const Eigen::Quaterniond R_level_sensor =
+      SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear())).R_level_sensor;
   const LeveledScan leveled =
       SegmentScan(*cloud, survey_.layout, survey_.ring_step, R_level_sensor, {});
   const auto found = relocalizer_.Find(leveled, R_level_sensor, prior);
@@ -167,9 +128,8 @@ Status PartAnchoring::Probe(Scans scans, std::size_t index, Probes& probes) cons
 }
 
 // Spread over the whole way first, then, where that does not tell, around those that were found.
-Status PartAnchoring::ProbeAll(Scans scans,
-                               const std::vector<double>& way_m,
-                               Probes& probes) const {
+Status PartAnchoring::ProbeAll(PartScans scans, Probes& probes) const {
+  const std::vector<double> way_m = WaysOf(scans);
   for (const std::size_t i :
        Scattered(SpreadAlong(way_m, options_.probes, options_.probe_spacing_m))) {
     ATLAS_RETURN_IF_ERROR(Probe(scans, i, probes));
@@ -195,123 +155,34 @@ bool PartAnchoring::IsClear(const Probes& probes) const {
          AgreeingOf(believed, options_.agreement).size() == believed.size();
 }
 
-// From the seed to the end and to the beginning, with what the last ones say of the transform.
-Status PartAnchoring::Track(Scans scans, const std::vector<double>& way_m, Candidate& candidate) {
-  std::vector<FoundScan> agreeing;
+Status PartAnchoring::Track(PartScans scans, Candidate& candidate) {
+  std::vector<FoundScan> found;
   for (const AnchorGuess& guess : candidate.guesses) {
-    agreeing.push_back(guess.scan);
+    found.push_back(guess.scan);
   }
-  const Pose T_map_drive = FitTransform(agreeing).T_map_drive.ToPose();
   const std::size_t seed = candidate.guesses[candidate.guesses.size() / 2].index;
-  std::vector<std::size_t> forwards;
-  std::vector<std::size_t> backwards;
-  for (const std::size_t i : SpreadAlong(way_m, way_m.size(), options_.track_spacing_m)) {
-    (i >= seed ? forwards : backwards).push_back(i);
+  const auto followed = follower_.Follow(scans, seed, FitTransform(found));
+  if (!followed) return followed.error();
+  found.clear();
+  for (const FollowedScan& scan : *followed) {
+    if (scan.is_found) found.push_back(scan.scan);
+    candidate.support += scan.fit;
   }
-  std::reverse(backwards.begin(), backwards.end());
-  for (const auto& order : {forwards, backwards}) {
-    ATLAS_RETURN_IF_ERROR(Follow(scans, way_m, order, T_map_drive, candidate));
-  }
-  if (candidate.tracked.empty()) return {};
-  candidate.fit = FitTransform(candidate.tracked);
+  if (!found.empty()) candidate.T_map_drive = FitTransform(found);
+  candidate.fit = MeasureFrame(*followed, candidate.T_map_drive);
   return {};
 }
 
-// Scans in `order`, the first where `T_map_drive` puts it, each where the last ones say.
-Status PartAnchoring::Follow(Scans scans,
-                             const std::vector<double>& way_m,
-                             const std::vector<std::size_t>& order,
-                             const Pose& T_map_drive,
-                             Candidate& candidate) {
-  Pose T_here = T_map_drive;
-  double last_m = order.empty() ? 0.0 : way_m[order.front()];
-  std::vector<FoundScan> last;
-  for (const std::size_t i : order) {
-    const Pose expected = T_here * scans[i]->T_world_sensor;
-    const Result<LocatedScan> located = LocateNear(*scans[i], expected);
-    if (!located) return located.error();
-    const bool is_near =
-        located->health != LocalizationHealth::kLost &&
-        IsNear(located->T_world_sensor, expected, std::abs(way_m[i] - last_m), options_);
-    if (located->health != LocalizationHealth::kGood) {
-      if (!is_near) candidate.astray.push_back(expected);
-      continue;
-    }
-    if (!is_near) {
-      ++candidate.contradicting;
-      continue;
-    }
-    const FoundScan found{scans[i]->T_world_sensor, located->T_world_sensor};
-    candidate.tracked.push_back(found);
-    candidate.support += located->fit;
-    last.push_back(found);
-    if (last.size() > kLastScans) last.erase(last.begin());
-    T_here = FitTransform(last).T_map_drive.ToPose();
-    last_m = way_m[i];
-  }
-  return {};
+Result<FrameFit> PartAnchoring::Measure(PartScans scans, const LevelTransform& T_map_drive) {
+  const auto followed = follower_.Follow(scans, 0, T_map_drive);
+  if (!followed) return Error(followed.error());
+  return MeasureFrame(*followed, T_map_drive);
 }
 
-Result<PartAnchoring::Misfit> PartAnchoring::Measure(Scans scans,
-                                                     const LevelTransform& T_map_drive) {
-  const std::vector<double> way_m = WaysOf(scans);
-  Candidate candidate;
-  Status status = Follow(scans, way_m, SpreadAlong(way_m, way_m.size(), options_.track_spacing_m),
-                         T_map_drive.ToPose(), candidate);
-  if (!status.ok()) return Error(std::move(status));
-  Misfit misfit;
-  misfit.tracked = candidate.tracked.size();
-  misfit.astray = candidate.contradicting;
-  for (const Pose& expected : candidate.astray) {
-    const Result<bool> is_mapped = IsMapped(expected);
-    if (!is_mapped) return Error(is_mapped.error());
-    misfit.astray += *is_mapped ? 1U : 0U;
-  }
-  for (const FoundScan& scan : candidate.tracked) {
-    misfit.rms_m +=
-        (scan.T_map_sensor.translation() - T_map_drive.ToPose() * scan.T_drive_sensor.translation())
-            .squaredNorm();
-  }
-  if (misfit.tracked > 0) {
-    misfit.rms_m = std::sqrt(misfit.rms_m / static_cast<double>(misfit.tracked));
-  }
-  return misfit;
-}
-
-Result<LocatedScan> PartAnchoring::LocateNear(const DriveScan& scan, const Pose& T_map_sensor) {
-  constexpr StartHint kFollowed{0.5, 0.05};  // the scans before it tell where it is
-  const Result<PointCloud> cloud = ReadScan(scan.scan);
-  if (!cloud) return Error(cloud.error());
-  localizer_->Start(T_map_sensor, kFollowed);
-  auto located = localizer_->Locate(*cloud, LevelOf(scan), 1.0);
-  if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
-  return located;
-}
-
-// Whether the map has ground below a sensor there, or beside it.
-Result<bool> PartAnchoring::IsMapped(const Pose& T_map_sensor) const {
-  constexpr double kBeside_m = 2.0;
-  constexpr double kNear_m = 1.5;
-  const Eigen::Vector3d& p = T_map_sensor.translation();
-  const double ground_z_m = p.z() - survey_.mount.height_m;
-  for (const double dx_m : {0.0, -kBeside_m, kBeside_m}) {
-    for (const double dy_m : {0.0, -kBeside_m, kBeside_m}) {
-      const auto layers = view_->LayersAt({p.x() + dx_m, p.y() + dy_m});
-      if (!layers) return Error(layers.error());
-      const bool is_near = std::any_of(layers->begin(), layers->end(), [&](const TileLayer& layer) {
-        return std::abs(1e-3 * layer.altitude_mm - ground_z_m) <= kNear_m;
-      });
-      if (is_near) return true;
-    }
-  }
-  return false;
-}
-
-Result<PartAnchor> PartAnchoring::Find(Scans scans, bool is_first_part) {
-  const std::vector<double> way_m = WaysOf(scans);
+Result<PartAnchor> PartAnchoring::Find(PartScans scans, bool is_first_part) {
   Probes probes;
   if (is_first_part) probes.prior = options_.prior;
-  if (Status status = ProbeAll(scans, way_m, probes); !status.ok()) return Error(std::move(status));
+  if (Status status = ProbeAll(scans, probes); !status.ok()) return Error(std::move(status));
   std::vector<Candidate> candidates;
   for (auto& guesses : CandidatesOf(probes.guesses, options_.agreement, options_.min_agreeing,
                                     options_.candidates)) {
@@ -333,11 +204,12 @@ Result<PartAnchor> PartAnchoring::Find(Scans scans, bool is_first_part) {
     return anchor;
   }
   for (Candidate& candidate : candidates) {
-    if (Status status = Track(scans, way_m, candidate); !status.ok()) {
+    if (Status status = Track(scans, candidate); !status.ok()) {
       return Error(std::move(status));
     }
   }
-  Settle(candidates, scans.front()->T_world_sensor, probes.prior, anchor);
+  Settle(candidates, BelievedOf(probes.guesses), scans.front()->T_world_sensor, probes.prior,
+         anchor);
   return anchor;
 }
 
@@ -346,27 +218,34 @@ bool PartAnchoring::IsBelieved(std::size_t agreeing, std::size_t elsewhere) cons
 }
 
 void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
+                           const std::vector<AnchorGuess>& believed,
                            const Pose& first,
                            const PlacePrior& prior,
                            PartAnchor& anchor) const {
   const Candidate& best = candidates.front();
-  const Eigen::Vector3d begin_m = best.fit.T_map_drive.ToPose() * first.translation();
-  anchor.tracked = best.tracked.size();
-  anchor.contradicting = best.contradicting;
-  anchor.rms_m = best.fit.rms_m;
-  anchor.rms_yaw_rad = best.fit.rms_yaw_rad;
+  const Eigen::Vector3d begin_m = best.T_map_drive.ToPose() * first.translation();
+  anchor.fit = best.fit;
   double elsewhere = 0.0;
   for (std::size_t i = 1; i < candidates.size(); ++i) {
     elsewhere = std::max(elsewhere, candidates[i].support);
   }
-  if (!IsBelieved(anchor.tracked, anchor.contradicting)) {
+  const auto off = static_cast<std::size_t>(
+      std::count_if(believed.begin(), believed.end(), [&](const AnchorGuess& guess) {
+        return OffsetFrom(best.T_map_drive, guess.scan).place_m.norm() >
+               options_.follow.max_surprise_m;
+      }));
+  const std::string bent = WhyBeyond(best.fit, options_.limits);
+  if (!IsBelieved(best.fit.tracked, best.fit.astray)) {
     anchor.why_not =
-        StrCat(anchor.agreeing, " scans agree on where the drive lies, but of those around them ",
-               anchor.tracked, " fit the map there and ", anchor.contradicting, " do not");
-  } else if (best.fit.rms_m > options_.max_rms_m) {
-    anchor.why_not =
-        StrCat("the drive is found, but bent against the map: ", InThousandths(best.fit.rms_m),
-               " m RMS from one transform, expected at most ", options_.max_rms_m, " m", kForMerge);
+        StrCat(anchor.agreeing, " scans agree on where the drive lies, but of those along its way ",
+               best.fit.tracked, " fit the map there and ", best.fit.astray, " do not");
+  } else if (!bent.empty()) {
+    anchor.why_not = StrCat("the drive is found, but ", bent, kForMerge);
+  } else if (off > options_.max_off) {
+    anchor.why_not = StrCat("the drive is found, but ", off, " of the ", believed.size(),
+                            " scans that were found lie more than ", options_.follow.max_surprise_m,
+                            " m from where one transform puts them, expected at most ",
+                            options_.max_off, kForMerge);
   } else if (best.support < options_.min_margin * elsewhere) {
     anchor.why_not =
         StrCat("the drive fits the map in two places: where its scans were found ",
@@ -377,7 +256,7 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
                             InThousandths(begin_m.y()), ", ", InThousandths(begin_m.z()),
                             ") m, further from the prior than that is said to be off");
   } else {
-    anchor.T_map_drive = best.fit.T_map_drive;
+    anchor.T_map_drive = best.T_map_drive;
     anchor.begin_m = begin_m;
   }
 }
@@ -385,8 +264,9 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
 bool BeginsWithin(const Eigen::Vector3d& begin_m,
                   const PlacePrior& prior,
                   const AnchorOptions& options) {
-  return (begin_m.head<2>() - prior.center).norm() <= prior.radius_m + options.max_surprise_m &&
-         std::abs(begin_m.z() - prior.z_m) <= prior.height_m + options.max_surprise_m;
+  return (begin_m.head<2>() - prior.center).norm() <=
+             prior.radius_m + options.follow.max_surprise_m &&
+         std::abs(begin_m.z() - prior.z_m) <= prior.height_m + options.follow.max_surprise_m;
 }
 
 }  // namespace atlas

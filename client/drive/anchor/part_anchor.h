@@ -12,8 +12,9 @@
 
 #include "client/drive/anchor/anchor_fit.h"
 #include "client/drive/anchor/anchor_guess.h"
+#include "client/drive/anchor/frame_fit.h"
+#include "client/drive/anchor/scan_follower.h"
 #include "client/drive/drive_survey.h"
-#include "client/drive/scan_localizer.h"
 #include "client/map/map_view.h"
 #include "core/base/status.h"
 #include "core/localization/relocalizer.h"
@@ -35,11 +36,8 @@ struct AnchorOptions {
   std::size_t min_ratio = 3;
   std::size_t enough_agreeing = 8;  // of as many that were found: no other is looked for
   AgreementOptions agreement;
-  // From there on scans are tracked, with the drive's poses for the motion.
-  double track_spacing_m = 1.0;
-  // A scan that is farther from where it is expected contradicts.
-  double max_surprise_m = 0.5;
-  double max_surprise_rad = 2.0 * std::numbers::pi / 180.0;
+  // From there on the others are followed.
+  FollowOptions follow;
   // Places that scans look like, but were not believed: where as many of them agree on another
   // transform, the drive is tracked there, too, and has to fit the map so much less well, as a sum
   // over its scans. A world that looks the same from two sides is found out so: where one of them
@@ -49,9 +47,16 @@ struct AnchorOptions {
   std::size_t candidates = 4;
   double min_margin = 1.3;
   // A drive whose own poses are bent more than that is for a merge, not for a transform: live, it
-  // would blur the map. Recorded ones that are well known lie 0.09 m off, odometry that drifts by
-  // 1 % and 0.5 degrees in 100 m is 0.23 m and more off after 74 m.
-  double max_rms_m = 0.12;
+  // would blur the map, or double it. All of it: recorded ones that are well known lie 0.09 m off,
+  // odometry that drifts by 1 % and 0.5 degrees in 100 m is 0.23 m and more off after 74 m. And
+  // where it is off the most: those lie up to 0.13 m and 0.2 degrees off there, and one scan in a
+  // row is lost, at the end of the map.
+  FrameLimits limits{0.12, 0.18, 0.4 * std::numbers::pi / 180.0, 2};
+  // What comes to a session that is there may be the worst part of a drive that was accepted.
+  FrameLimits limits_of_rest{0.21, 0.21, 0.45 * std::numbers::pi / 180.0, 2};
+  // Of the scans that were found so many may lie elsewhere by the transform in the end: more are a
+  // part of the drive that does.
+  std::size_t max_off = 1;
 
   // kInvalidArgument naming the first option out of range.
   Status Validate() const;
@@ -62,10 +67,7 @@ struct PartAnchor {
   std::size_t probed = 0;                     // scans that were looked for in the whole map,
   std::size_t found = 0;                      // that were found,
   std::size_t agreeing = 0;                   // and that agree
-  std::size_t tracked = 0;                    // scans that the transform was fitted to,
-  std::size_t contradicting = 0;              // and that lie elsewhere
-  double rms_m = 0.0;                         // of the tracked ones from the transform
-  double rms_yaw_rad = 0.0;
+  FrameFit fit;                               // of scans along the way
   Eigen::Vector3d begin_m = Eigen::Vector3d::Zero();  // the first scan, in the map, if it is known
   std::string why_not;                                // for people
 };
@@ -78,19 +80,11 @@ class PartAnchoring {
                                       MapView& view,
                                       const AnchorOptions& options);
 
-  // Of one part, in their order, not empty.
-  using Scans = std::span<const DriveScan* const>;
   // The prior is of the part that begins the drive. Errors are those of the scans and of the view.
-  Result<PartAnchor> Find(Scans scans, bool is_first_part);
-  // Of scans that are to lie in the map by `T_map_drive`, in their order: how many of them fit it
-  // around where that puts them, and how far off there, RMS; and how many do not, although that
-  // place is mapped. Fails as Find().
-  struct Misfit {
-    std::size_t tracked = 0;
-    std::size_t astray = 0;
-    double rms_m = 0.0;
-  };
-  Result<Misfit> Measure(Scans scans, const LevelTransform& T_map_drive);
+  Result<PartAnchor> Find(PartScans scans, bool is_first_part);
+  // How scans that are to lie in the map by `T_map_drive` fit it around where that puts them. Fails
+  // as Find().
+  Result<FrameFit> Measure(PartScans scans, const LevelTransform& T_map_drive);
 
  private:
   struct Probes;
@@ -101,29 +95,22 @@ class PartAnchoring {
                 std::shared_ptr<const PlaceIndex> places,
                 const AnchorOptions& options);
 
-  Status Probe(Scans scans, std::size_t index, Probes& probes) const;
-  Status ProbeAll(Scans scans, const std::vector<double>& way_m, Probes& probes) const;
+  Status Probe(PartScans scans, std::size_t index, Probes& probes) const;
+  Status ProbeAll(PartScans scans, Probes& probes) const;
   bool IsClear(const Probes& probes) const;
-  Status Track(Scans scans, const std::vector<double>& way_m, Candidate& candidate);
-  Status Follow(Scans scans,
-                const std::vector<double>& way_m,
-                const std::vector<std::size_t>& order,
-                const Pose& T_map_drive,
-                Candidate& candidate);
-  Result<LocatedScan> LocateNear(const DriveScan& scan, const Pose& T_map_sensor);
-  Result<bool> IsMapped(const Pose& T_map_sensor) const;
+  Status Track(PartScans scans, Candidate& candidate);
   bool IsBelieved(std::size_t agreeing, std::size_t elsewhere) const;
   // `first`: the first scan in the drive; `prior`: of where it is in the map.
   void Settle(const std::vector<Candidate>& candidates,
+              const std::vector<AnchorGuess>& believed,
               const Pose& first,
               const PlacePrior& prior,
               PartAnchor& anchor) const;
 
   DriveSurvey survey_;
-  MapView* view_;
   AnchorOptions options_;
   Relocalizer relocalizer_;
-  std::unique_ptr<ScanLocalizer> localizer_;
+  ScanFollower follower_;
 };
 
 // Whether a drive that begins there begins where it is said to, as well as the map tells.

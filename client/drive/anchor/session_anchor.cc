@@ -142,14 +142,10 @@ class Map {
     if (misfit->astray > misfit->tracked) {
       return refused(StrCat(": of what is new of the drive ", misfit->astray,
                             " scans do not fit the map where the session's frame puts them, and ",
-                            misfit->tracked, " do: the drive's own poses drift"));
+                            misfit->tracked, " do"));
     }
-    if (misfit->rms_m > options_.max_rms_m) {
-      return refused(StrCat(": what is new of the drive lies ",
-                            std::round(misfit->rms_m * 1e3) / 1e3,
-                            " m RMS from where the session's frame puts it, expected at most ",
-                            options_.max_rms_m, " m: the drive's own poses drift"));
-    }
+    const std::string bent = WhyBeyond(*misfit, options_.limits_of_rest);
+    if (!bent.empty()) return refused(StrCat(": what is new of the drive is ", bent));
     return {};
   }
 

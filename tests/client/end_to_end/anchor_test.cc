@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <iomanip>
+#include <map>
 
 #include "client/drive/anchor/anchor_fit.h"
 #include "client/drive/drive_selection.h"
@@ -14,6 +15,13 @@ namespace atlas {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
+
+// What is wrong with a drive's own poses from one scan to another.
+struct Bend {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  Eigen::Vector3d step_m = Eigen::Vector3d::Zero();
+};
 
 class AnchorTest : public VehicleTest {
  protected:
@@ -27,7 +35,8 @@ class AnchorTest : public VehicleTest {
   // The same drive in another frame: each part behind a jump in one of its own.
   static void WriteMoved(const fs::path& from,
                          const fs::path& to,
-                         const std::vector<LevelTransform>& T_moved_world) {
+                         const std::vector<LevelTransform>& T_moved_world,
+                         const Bend& bend = {}) {
     fs::copy(from, to, fs::copy_options::recursive);
     const DriveFolder drive = OpenDriveFolder(from).value();
     std::ofstream poses(to / "poses.txt");
@@ -36,7 +45,8 @@ class AnchorTest : public VehicleTest {
     std::uint32_t line = 0;
     for (std::size_t i = 0; i < drive.scans.size(); ++i) {
       part += i > 0 && IsJump(drive.scans[i - 1], drive.scans[i]) ? 1U : 0U;
-      const Pose pose = T_moved_world.at(part).ToPose() * drive.scans[i].T_world_sensor;
+      Pose pose = T_moved_world.at(part).ToPose() * drive.scans[i].T_world_sensor;
+      if (i >= bend.begin && i < bend.end) pose.translation() += bend.step_m;
       for (; line <= drive.scans[i].number; ++line) {  // those between have no scan
         for (const double number : PoseToRowMajor(pose)) {
           poses << number << ' ';
@@ -243,10 +253,32 @@ TEST_F(AnchorTest, ADriveWhosePosesDriftIsForAMerge) {
   for (const std::string range : {":", "60:75"}) {
     const CommandRun rest = Anchor(daemon, drifting, {"--range", range, "--session", "grows"});
     EXPECT_EQ(rest.exit_code, static_cast<int>(ExitCode::kConflict)) << rest.out << rest.err;
-    EXPECT_NE(rest.err.find("drift"), std::string::npos) << rest.err;
+    EXPECT_NE(rest.err.find("atlas-merge run"), std::string::npos) << rest.err;
   }
   EXPECT_EQ(Digest(daemon), begun);
   EXPECT_EQ(Connect(daemon).ListKeyframes({"vehicle", "grows"})->size(), 12U);
+}
+
+// However well the rest of it fits: live, that part would double what is there.
+TEST_F(AnchorTest, ADriveOfWhichAPartIsOffStaysOut) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  Map(daemon, shared_root / "street");
+  const std::string before = Digest(daemon);
+  const std::size_t scans = OpenDriveFolder(shared_root / "other_lane")->scans.size();
+  const std::map<std::string, Bend> bends = {
+      {"end", {scans - 12, scans, {0.0, 1.5, 0.0}}},
+      {"begin", {0, 6, {0.8, 0.8, 0.0}}},
+      {"high", {scans / 2, scans / 2 + 12, {0.0, 0.0, 0.6}}},
+      {"near", {scans - 12, scans, {0.25, 0.25, 0.0}}},
+  };
+  for (const auto& [name, bend] : bends) {
+    const fs::path drive = shared_root / ("bent_" + name);
+    WriteMoved(shared_root / "other_lane", drive, {Far()}, bend);
+    const CommandRun run = Anchor(daemon, drive, {"--session", name});
+    EXPECT_EQ(run.exit_code, static_cast<int>(ExitCode::kNotFound)) << name << run.out;
+    EXPECT_EQ(StateOf(daemon, name), "staged") << name;
+    EXPECT_EQ(Digest(daemon), before) << name;
+  }
 }
 
 // A merge bends it; the daemon would take the next scan for an impossible step.

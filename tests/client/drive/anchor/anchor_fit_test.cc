@@ -98,23 +98,19 @@ TEST(AgreementTest, DriftIsBelievedAlongTheWay) {
 
 TEST(AnchorFitTest, FindsTheTransform) {
   for (const std::size_t count : {1U, 2U, 3U, 40U}) {
-    const AnchorFit fit = FitTransform(Found(Somewhere(), count, 0.0, 0.0));
-    EXPECT_LT((fit.T_map_drive.shift_m - Somewhere().shift_m).norm(), 1e-6) << count;
-    EXPECT_LT(YawOff(fit.T_map_drive, Somewhere()), 1e-9);
-    EXPECT_LT(fit.rms_m, 1e-6);
-    EXPECT_LT(fit.rms_yaw_rad, 1e-9);
+    const LevelTransform fit = FitTransform(Found(Somewhere(), count, 0.0, 0.0));
+    EXPECT_LT((fit.shift_m - Somewhere().shift_m).norm(), 1e-6) << count;
+    EXPECT_LT(YawOff(fit, Somewhere()), 1e-9);
   }
 }
 
-TEST(AnchorFitTest, AveragesAndSaysHowFarOffTheScansAre) {
+TEST(AnchorFitTest, Averages) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     const auto found = Found(Somewhere(), 100, 0.05, 0.1, seed);
-    const AnchorFit fit = FitTransform(found);
-    EXPECT_NEAR(fit.rms_m, 0.05 * std::sqrt(3.0), 0.02);
-    EXPECT_NEAR(fit.rms_yaw_rad, 0.1 * kDegree, 0.03 * kDegree);
+    const LevelTransform fit = FitTransform(found);
     for (const FoundScan& scan : found) {
       const Eigen::Vector3d& p = scan.T_drive_sensor.translation();
-      EXPECT_LT((fit.T_map_drive.ToPose() * p - Somewhere().ToPose() * p).norm(), 0.04);
+      EXPECT_LT((fit.ToPose() * p - Somewhere().ToPose() * p).norm(), 0.04);
     }
   }
 }
@@ -124,9 +120,9 @@ TEST(AnchorFitTest, AFewWrongOnesDoNotPullIt) {
   for (std::size_t i = 0; i < 8; ++i) {
     found[5 * i].T_map_sensor.translation() += Eigen::Vector3d(0.45, 0.0, 0.1);
   }
-  const AnchorFit fit = FitTransform(found);
+  const LevelTransform fit = FitTransform(found);
   const Eigen::Vector3d& p = found[20].T_drive_sensor.translation();
-  EXPECT_LT((fit.T_map_drive.ToPose() * p - Somewhere().ToPose() * p).norm(), 0.03);
+  EXPECT_LT((fit.ToPose() * p - Somewhere().ToPose() * p).norm(), 0.03);
 }
 
 // All at one place: the headings alone say how it is turned.
@@ -136,9 +132,9 @@ TEST(AnchorFitTest, ADriveThatStandsIsTurnedByItsHeadings) {
     scan.T_drive_sensor.translation() = Eigen::Vector3d(7.0, 8.0, 9.0);
     scan.T_map_sensor.translation() = Somewhere().ToPose() * Eigen::Vector3d(7.0, 8.0, 9.0);
   }
-  const AnchorFit fit = FitTransform(found);
-  EXPECT_LT(YawOff(fit.T_map_drive, Somewhere()), 0.03 * kDegree);
-  EXPECT_LT(fit.rms_m, 1e-6);
+  const LevelTransform fit = FitTransform(found);
+  EXPECT_LT(YawOff(fit, Somewhere()), 0.03 * kDegree);
+  EXPECT_LT(OffsetFrom(fit, found.front()).place_m.norm(), 1e-6);
 }
 
 }  // namespace

@@ -1,0 +1,47 @@
+// How well the scans of a drive lie in a map where one transform puts them: all of them, and those
+// that lie worst, for a drive that fits nearly everywhere is as wrong as any where it does not.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "client/drive/anchor/anchor_fit.h"
+
+namespace atlas {
+
+// A scan whose place is mapped, by the transform.
+struct FollowedScan {
+  std::size_t index = 0;  // in the drive
+  bool is_found = false;  // else it is lost there, or elsewhere
+  double fit = 0.0;       // to the map, if it is found: LocatedScan
+  FoundScan scan;
+};
+
+struct FrameFit {
+  std::size_t tracked = 0;         // scans that were found
+  std::size_t astray = 0;          // and that were not,
+  std::size_t longest_astray = 0;  // so many in a row
+  // Of where they were found, from where the transform puts them: all, and the ten in a row that
+  // are off the most.
+  double rms_m = 0.0;
+  double worst_rms_m = 0.0;
+  double rms_yaw_rad = 0.0;
+  double worst_rms_yaw_rad = 0.0;
+};
+
+// More is not to be live in the map: it would be blurred there, or doubled.
+struct FrameLimits {
+  double rms_m = 0.0;
+  double worst_rms_m = 0.0;
+  double worst_rms_yaw_rad = 0.0;
+  std::size_t longest_astray = 0;
+};
+
+// `scans` in the order of the drive.
+FrameFit MeasureFrame(std::span<const FollowedScan> scans, const LevelTransform& T_map_drive);
+
+// What exceeds the limits, for people; empty: nothing does.
+std::string WhyBeyond(const FrameFit& fit, const FrameLimits& limits);
+
+}  // namespace atlas

@@ -1,0 +1,141 @@
+#include "client/drive/anchor/scan_follower.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/str_cat.h"
+#include "core/scan/scan_reader.h"
+
+namespace atlas {
+namespace {
+
+constexpr double kRange_m = 100.0;
+constexpr std::size_t kLastScans = 10;  // that say how the drive lies here
+
+}  // namespace
+
+std::vector<double> WaysOf(PartScans scans) {
+  std::vector<double> way_m{0.0};
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    way_m.push_back(way_m.back() + (scans[i]->T_world_sensor.translation() -
+                                    scans[i - 1]->T_world_sensor.translation())
+                                       .norm());
+  }
+  return way_m;
+}
+
+std::vector<std::size_t> SpreadAlong(const std::vector<double>& way_m,
+                                     std::size_t count,
+                                     double spacing_m) {
+  const double step_m = std::max(spacing_m, way_m.back() / static_cast<double>(count));
+  std::vector<std::size_t> spread;
+  for (std::size_t i = 0; i < way_m.size(); ++i) {
+    if (spread.empty() || way_m[i] >= way_m[spread.back()] + step_m) spread.push_back(i);
+  }
+  return spread;
+}
+
+ScanFollower::ScanFollower(const DriveSurvey& survey, MapView& view, const FollowOptions& options)
+    : options_(options),
+      mount_m_(survey.mount.height_m),
+      view_(&view),
+      localizer_(MakeAtlasLocalizer(survey, kRange_m, view)) {}
+
+Result<std::vector<FollowedScan>> ScanFollower::Follow(PartScans scans,
+                                                       std::size_t seed,
+                                                       const LevelTransform& T_map_drive) {
+  const std::vector<double> way_m = WaysOf(scans);
+  std::vector<std::size_t> forwards;
+  std::vector<std::size_t> backwards;
+  for (const std::size_t i : SpreadAlong(way_m, way_m.size(), options_.spacing_m)) {
+    (i >= seed ? forwards : backwards).push_back(i);
+  }
+  std::reverse(backwards.begin(), backwards.end());
+  std::vector<FollowedScan> followed;
+  for (const auto& order : {backwards, forwards}) {
+    Status status = Follow(scans, way_m, order, T_map_drive, followed);
+    if (!status.ok()) return Error(std::move(status));
+  }
+  std::sort(followed.begin(), followed.end(),
+            [](const FollowedScan& a, const FollowedScan& b) { return a.index < b.index; });
+  return followed;
+}
+
+Status ScanFollower::Follow(PartScans scans,
+                            const std::vector<double>& way_m,
+                            const std::vector<std::size_t>& order,
+                            const LevelTransform& T_map_drive,
+                            std::vector<FollowedScan>& followed) {
+  Pose T_here = T_map_drive.ToPose();
+  double last_m = order.empty() ? 0.0 : way_m[order.front()];
+  std::vector<FoundScan> last;
+  for (const std::size_t i : order) {
+    const Pose expected = T_here * scans[i]->T_world_sensor;
+    const double slack_m = options_.drift * std::abs(way_m[i] - last_m);
+    const Result<LocatedScan> located = LocateNear(*scans[i], expected);
+    if (!located) return located.error();
+    const bool is_good = located->health == LocalizationHealth::kGood;
+    const bool is_near = located->health != LocalizationHealth::kLost &&
+                         IsNear(located->T_world_sensor, expected, slack_m);
+    if (is_good && is_near) {
+      const FoundScan found{scans[i]->T_world_sensor, located->T_world_sensor};
+      followed.push_back({i, true, located->fit, found});
+      last.push_back(found);
+      if (last.size() > kLastScans) last.erase(last.begin());
+      T_here = FitTransform(last).ToPose();
+      last_m = way_m[i];
+      continue;
+    }
+    if (is_near) continue;
+    const Result<bool> is_mapped = is_good ? true : IsMapped(expected, slack_m);
+    if (!is_mapped) return is_mapped.error();
+    if (*is_mapped) followed.push_back({i, false, 0.0, {}});
+  }
+  return {};
+}
+
+Result<LocatedScan> ScanFollower::LocateNear(const DriveScan& scan, const Pose& T_map_sensor) {
+  constexpr StartHint kFollowed{0.5, 0.05};  // the scans before it tell where it is
+  const Result<PointCloud> cloud = ReadScan(scan.scan);
+  if (!cloud) return Error(cloud.error());
+  localizer_->Start(T_map_sensor, kFollowed);
+  const auto level = SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear())).R_level_sensor;
+  auto located = localizer_->Locate(*cloud, level, 1.0);
+  if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
+  return located;
+}
+
+// Whether the map has ground below a sensor there, or beside it, which may be `slack_m` farther.
+Result<bool> ScanFollower::IsMapped(const Pose& T_map_sensor, double slack_m) const {
+  constexpr double kBeside_m = 2.0;
+  constexpr double kNear_m = 1.5;
+  constexpr double kNextDeck_m = 3.0;
+  const Eigen::Vector3d& p = T_map_sensor.translation();
+  const double ground_z_m = p.z() - mount_m_;
+  const double near_m = std::min(kNear_m + slack_m, kNextDeck_m);
+  std::vector<double> offsets_m{0.0, -kBeside_m, kBeside_m};
+  for (double m = 2.0 * kBeside_m; m < kBeside_m + slack_m; m += kBeside_m) {
+    offsets_m.insert(offsets_m.end(), {-m, m});
+  }
+  for (const double dx_m : offsets_m) {
+    for (const double dy_m : offsets_m) {
+      const auto layers = view_->LayersAt({p.x() + dx_m, p.y() + dy_m});
+      if (!layers) return Error(layers.error());
+      const bool is_near = std::any_of(layers->begin(), layers->end(), [&](const TileLayer& layer) {
+        return std::abs(1e-3 * layer.altitude_mm - ground_z_m) <= near_m;
+      });
+      if (is_near) return true;
+    }
+  }
+  return false;
+}
+
+bool ScanFollower::IsNear(const Pose& found, const Pose& expected, double slack_m) const {
+  const Eigen::AngleAxisd turned(found.linear().transpose() * expected.linear());
+  return (found.translation() - expected.translation()).norm() <=
+             options_.max_surprise_m + slack_m &&
+         turned.angle() <= options_.max_surprise_rad;
+}
+
+}  // namespace atlas
