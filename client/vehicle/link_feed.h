@@ -28,6 +28,10 @@ class LinkFeed final : public TileFeed {
   // After each Sync of a disc: what it follows of the next one depends on it.
   void NoteDropped(const TileStore& store, const std::vector<TileId>& dropped) override;
 
+  // The last call left a reply on its way: the next one begins with what is left of it, and
+  // whatever else is asked of the daemon in between throws that away.
+  bool is_under_way() const { return rest_.reply != nullptr; }
+
  private:
   using Clock = std::chrono::steady_clock;
 

@@ -61,7 +61,14 @@ Result<StoreSyncReport> WatchedFeed::Sync(TileStore& store,
   const Result<AtlasClient*> client = link_.Client(options.deadline);
   if (!client) return Error(client.error());
   const bool is_watch_due = !watch_ && start >= next_watch_;
-  if (!Covers(*disc, options) || is_watch_due) Begin(**client, *disc, options);
+  if (!Covers(*disc, options) || is_watch_due) {
+    // On a slow link what is on its way is most of what there is: it comes first.
+    if (feed_.is_under_way()) {
+      settled_.reset();
+      return feed_.Sync(store, *disc, options);
+    }
+    Begin(**client, *disc, options);
+  }
   if (IsQuiet(store)) {
     StoreSyncReport report;
     report.revision = settled_->revision;

@@ -182,6 +182,40 @@ TEST_F(WatchedFeedTest, AWatchThatHasNotBegunIsNotReliedOn) {
   EXPECT_EQ(peer_.watches(), 1);
 }
 
+// To begin a watch throws away what is on its way: on a slow link that is most of what there is.
+TEST_F(WatchedFeedTest, WhatIsOnItsWayComesBeforeAWatchOfAnotherDisc) {
+  constexpr double kFar_m = 300.0;
+  for (int x = 0; x < 6; ++x) {
+    world_.Set(x, 2, 100 + x);
+  }
+  LinkOptions patient{.connection = peer_.options()};
+  patient.connection.request_timeout = seconds(30);
+  AtlasLink link(patient);
+  WatchedFeed feed(link);
+  AtlasView view(store_, feed);
+  const auto is_current = [&](double radius_m) {
+    AroundOptions brief;
+    brief.deadline = milliseconds(400);
+    return view.Around(kPlace_m, radius_m, brief)->is_current;
+  };
+  peer_.FallSilentAfter(6);  // in the middle of the first reply's tiles
+  EXPECT_FALSE(is_current(kRadius_m));
+  EXPECT_GT(store_.size(), 0U);
+  EXPECT_LT(store_.size(), world_.tiles().size());
+  for (const double radius_m : {kFar_m, kRadius_m, kFar_m}) {
+    EXPECT_FALSE(is_current(radius_m));
+  }
+  EXPECT_EQ(peer_.watches(), 1);
+  peer_.Release();
+  const Clock::time_point start = Clock::now();
+  while (!is_current(kFar_m) && Clock::now() - start < seconds(20)) {
+  }
+  EXPECT_EQ(store_.size(), world_.tiles().size());
+  EXPECT_EQ(static_cast<std::size_t>(peer_.tiles_sent()), world_.tiles().size()) << "each once";
+  is_current(kFar_m);
+  EXPECT_EQ(peer_.watches(), 2) << "when nothing is on its way";
+}
+
 TEST_F(WatchedFeedTest, WhatTheStoreLostIsAskedForThoughNothingChanged) {
   Settle();
   store_.Remove({0, 3, 3});
