@@ -63,9 +63,9 @@ std::string AnchorText(const SessionAnchor& anchor) {
   if (anchor.is_resumed) return where + ", as an earlier run did";
   return StrCat(where, ", begins at (", FixedText(part.begin_m.x(), 1), ", ",
                 FixedText(part.begin_m.y(), 1), ", ", FixedText(part.begin_m.z(), 1), ") m; ",
-                part.agreeing, " of ", part.found, " scans agree, ", part.fit.tracked, " tracked to ",
-                FixedText(part.fit.rms_m, 3), " m and ", FixedText(kDegrees * part.fit.rms_yaw_rad, 3),
-                " deg RMS");
+                part.agreeing, " of ", part.found, " scans agree, ", part.fit.tracked,
+                " tracked to ", FixedText(part.fit.rms_m, 3), " m and ",
+                FixedText(kDegrees * part.fit.rms_yaw_rad, 3), " deg RMS");
 }
 
 Status CheckAnchored(const std::vector<SessionAnchor>& anchors) {
