@@ -50,6 +50,7 @@ void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known
   }
   confirmation_.Trust();
   is_first_ = true;
+  untracked_ = 0.0;
   usual_fit_ = 0.0;
   lost_ = 0;
   unheld_ = 0;
@@ -87,6 +88,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   if (!has_stood_) {
     motion_ = Next();
   }
+  untracked_ = 0.0;
   if (carried_ > 0) {
     ++carried_;
     if (!CarryOn(features)) {

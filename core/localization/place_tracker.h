@@ -159,9 +159,12 @@ class PlaceTracker {
   // as nothing is known of it.
   Pose T_now_later() const { return motion_.T_now_later(); }
 
-  // The next scan comes after so many times the usual time between two. Before all that asks for
-  // it.
-  void Expect(double scans) { scans_ = scans; }
+  // The next scan comes after so many times the usual time between two, and after those that were
+  // expected and not tracked, for want of a map. Before all that asks for it.
+  void Expect(double scans) {
+    untracked_ += scans;
+    scans_ = untracked_;
+  }
   // Where the next scan is expected.
   Pose T_world_expected() const { return Next().T_world_sensor(); }
 
@@ -298,6 +301,7 @@ class PlaceTracker {
   bool is_told_ = false;                        // where it is at the first scan, and how surely
   StartHint hint_;                              // where it is not
   double scans_ = 1.0;                          // from the last scan to the next
+  double untracked_ = 0.0;                      // of these, expected so far
   bool has_stood_ = false;                      // in a pause before the scan at hand
   double usual_fit_ = 0.0;                      // of good results, exponentially forgotten
   int lost_ = 0;                                // scans in a row

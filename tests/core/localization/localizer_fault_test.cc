@@ -105,6 +105,30 @@ TEST_F(LocalizerFaultTest, BlindItIsLostGoesOnAsItDidAndIsFoundThere) {
   EXPECT_LT(ErrorOf(found.T_world_sensor, moved).horizontal_m, 0.06);
 }
 
+// Scans that fail for want of tiles are time that has passed.
+TEST_F(LocalizerFaultTest, WhileTheTilesFailItGoesOnAsItDid) {
+  LocalizerOptions options = QuickOptions();
+  options.tracker.map.margin_m = 0.0;  // asks for tiles with every scan
+  localizer_ = Localizer(StreetMap().profile(), source_.Function(), options);
+  localizer_.Start(OnStreet(-10.0));
+  for (int i = 0; i < 4; ++i) {
+    At(OnStreet(-10.0 + 1.2 * i));
+  }
+  source_.failure = Status(StatusCode::kUnavailable, "a cable");
+  for (int i = 0; i < 3; ++i) {
+    const auto failed = localizer_.Localize(LeveledScan(), Eigen::Quaterniond::Identity());
+    ASSERT_FALSE(failed.has_value());
+    EXPECT_EQ(failed.error().code(), StatusCode::kUnavailable);
+  }
+  source_.failure = Status();
+  const Pose expected = OnStreet(-10.0 + 1.2 * 7);
+  EXPECT_LT(ErrorOf(Blind().T_world_sensor, expected).horizontal_m, 0.15);
+  const Pose next = OnStreet(-10.0 + 1.2 * 8);
+  const LocalizationResult found = At(next);
+  EXPECT_EQ(found.health, LocalizationHealth::kGood);
+  EXPECT_LT(ErrorOf(found.T_world_sensor, next).horizontal_m, 0.06);
+}
+
 TEST_F(LocalizerFaultTest, AWrongMapIsNotBelieved) {
   source_.tiles = WrongTiles();
   localizer_.Start(OnStreet(0.0));
