@@ -1,19 +1,29 @@
 #include "client/onboard/held_map.h"
 
-#include <cstdint>
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "core/localization/places/place_index.h"
 
 namespace atlas {
 namespace {
 
-std::shared_ptr<const PlaceIndex> PlacesOf(const MapAround& map, const MapProfile& profile) {
+std::vector<std::shared_ptr<const Tile>> FinestOf(const MapAround& map) {
+  std::vector<std::shared_ptr<const Tile>> finest;
+  std::copy_if(map.tiles.begin(), map.tiles.end(), std::back_inserter(finest),
+               [](const auto& tile) { return tile->id.level == 0; });
+  return finest;
+}
+
+std::shared_ptr<const PlaceIndex> PlacesOf(const std::vector<std::shared_ptr<const Tile>>& tiles,
+                                           const MapProfile& profile) {
   auto places = std::make_shared<PlaceIndex>(profile);
-  for (const auto& tile : map.tiles) {
-    if (tile->id.level == 0) places->Add(*tile);
+  for (const auto& tile : tiles) {
+    places->Add(*tile);
   }
   places->Finish();
   return places;
@@ -23,10 +33,14 @@ std::shared_ptr<const PlaceIndex> PlacesOf(const MapAround& map, const MapProfil
 struct Made {
   std::shared_ptr<const Relocalizer> relocalizer;
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
-  std::uint64_t finest_places = 0;
+  std::vector<std::weak_ptr<const Tile>> tiles;  // a changed one is another
 
   bool IsFor(const Eigen::Vector2d& place, double radius_m) const {
     return relocalizer != nullptr && (place - center).norm() < 0.5 * radius_m;
+  }
+  bool IsOf(const std::vector<std::shared_ptr<const Tile>>& finest) const {
+    return std::equal(tiles.begin(), tiles.end(), finest.begin(), finest.end(),
+                      [](const auto& made, const auto& tile) { return made.lock() == tile; });
   }
 };
 
@@ -56,10 +70,11 @@ RelocalizerSource RelocalizerOf(AtlasView& view,
     const Eigen::Vector2d center = is_made ? made.center : place;
     const auto map = view.Around(center, radius_m, options);
     if (!map) return Error(map.error());
-    if (!is_made || map->finest_places > made.finest_places) {
-      made = {nullptr, center, map->finest_places};
-      if (map->finest_places > 0) {
-        made.relocalizer = std::make_shared<const Relocalizer>(profile, PlacesOf(*map, profile),
+    const std::vector<std::shared_ptr<const Tile>> finest = FinestOf(*map);
+    if (!is_made || !made.IsOf(finest)) {
+      made = {nullptr, center, {finest.begin(), finest.end()}};
+      if (!finest.empty()) {
+        made.relocalizer = std::make_shared<const Relocalizer>(profile, PlacesOf(finest, profile),
                                                                TilesOf(view, options), relocalizer);
       }
     }

@@ -25,8 +25,9 @@ TilesAround TilesOf(AtlasView& view, const AroundOptions& options, OnMap on_map 
 
 // Where a vehicle that is lost is looked for: in `radius_m` around where it was last, which
 // `last_place` tells, as far as the finest tiles there are held or come within `options`. Made when
-// it is first needed, and again when more of them came, or that is elsewhere by half the radius.
-// No relocalizer where no such tile is held. Fails as TilesOf(). `view` outlives it.
+// it is first needed, and again when one of them came, changed or went, or that is elsewhere by
+// half the radius. No relocalizer where no such tile is held. Fails as TilesOf(). `view` outlives
+// it.
 RelocalizerSource RelocalizerOf(AtlasView& view,
                                 const MapProfile& profile,
                                 std::function<Eigen::Vector2d()> last_place,

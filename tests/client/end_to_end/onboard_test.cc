@@ -1,5 +1,6 @@
 // A vehicle that localizes and plans in what the real daemon sends it, and in what it holds of
 // that.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <vector>
@@ -181,6 +182,12 @@ TEST_F(OnboardTest, NobodyIsLookedForWhereNothingIsHeld) {
   ASSERT_TRUE(made) << made.error().message();
   EXPECT_NE(*made, nullptr);
   EXPECT_EQ(*source(), *made) << "made once";
+  const std::vector<TileId> held = store.TilesIn(DiscArea{{0.0, 0.0}, 50.0}, 0);
+  const auto finest =
+      std::find_if(held.begin(), held.end(), [](const TileId& id) { return id.level == 0; });
+  ASSERT_NE(finest, held.end());
+  store.Remove(*finest);
+  EXPECT_NE(*source(), *made) << "one went";
 }
 
 // ... and around where it was last, not around the world's origin.
