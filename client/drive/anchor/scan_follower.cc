@@ -111,11 +111,13 @@ Result<bool> ScanFollower::IsMapped(const Pose& T_map_sensor, double slack_m) co
   constexpr double kBeside_m = 2.0;
   constexpr double kNear_m = 1.5;
   constexpr double kNextDeck_m = 3.0;
+  constexpr double kMostSlack_m = 10.0;
   const Eigen::Vector3d& p = T_map_sensor.translation();
   const double ground_z_m = p.z() - mount_m_;
   const double near_m = std::min(kNear_m + slack_m, kNextDeck_m);
   std::vector<double> offsets_m{0.0, -kBeside_m, kBeside_m};
-  for (double m = 2.0 * kBeside_m; m < kBeside_m + slack_m; m += kBeside_m) {
+  for (double m = 2.0 * kBeside_m; m < kBeside_m + std::min(slack_m, kMostSlack_m);
+       m += kBeside_m) {
     offsets_m.insert(offsets_m.end(), {-m, m});
   }
   for (const double dx_m : offsets_m) {
