@@ -116,9 +116,11 @@ std::vector<std::size_t> LargestAgreement(std::span<const FoundScan> found,
 }
 
 FrameOffset OffsetFrom(const LevelTransform& T_map_drive, const FoundScan& scan) {
-  return {
-      scan.T_map_sensor.translation() - T_map_drive.ToPose() * scan.T_drive_sensor.translation(),
-      Wrapped(YawBetween(scan.T_map_sensor, scan.T_drive_sensor) - T_map_drive.yaw_rad)};
+  const Pose T_map_expected = T_map_drive.ToPose() * scan.T_drive_sensor;
+  const Eigen::AngleAxisd turn(T_map_expected.linear().transpose() * scan.T_map_sensor.linear());
+  return {scan.T_map_sensor.translation() - T_map_expected.translation(),
+          Wrapped(YawBetween(scan.T_map_sensor, scan.T_drive_sensor) - T_map_drive.yaw_rad),
+          std::abs(Wrapped(turn.angle()))};
 }
 
 LevelTransform FitTransform(std::span<const FoundScan> found) {

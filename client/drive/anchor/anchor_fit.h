@@ -48,6 +48,7 @@ std::vector<std::size_t> LargestAgreement(std::span<const FoundScan> found,
 struct FrameOffset {
   Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
   double yaw_rad = 0.0;
+  double turn_rad = 0.0;  // about any axis: what is tilted otherwise, too
 };
 FrameOffset OffsetFrom(const LevelTransform& T_map_drive, const FoundScan& scan);
 

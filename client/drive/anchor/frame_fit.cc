@@ -59,33 +59,40 @@ FrameFit MeasureFrame(std::span<const FollowedScan> scans, const LevelTransform&
     in_a_row = 0;
     const FrameOffset offset = OffsetFrom(T_map_drive, followed.scan);
     squares_m2.push_back(offset.place_m.squaredNorm());
-    squares_rad2.push_back(offset.yaw_rad * offset.yaw_rad);
+    squares_rad2.push_back(offset.turn_rad * offset.turn_rad);
   }
   const Means metres = MeansOf(squares_m2);
   const Means turns = MeansOf(squares_rad2);
   fit.rms_m = metres.all;
   fit.worst_rms_m = metres.worst;
-  fit.rms_yaw_rad = turns.all;
-  fit.worst_rms_yaw_rad = turns.worst;
+  fit.rms_rad = turns.all;
+  fit.worst_rms_rad = turns.worst;
   return fit;
 }
 
 std::string WhyBeyond(const FrameFit& fit, const FrameLimits& limits) {
-  if (fit.rms_m > limits.rms_m) {
-    return StrCat("bent against the map: ", InThousandths(fit.rms_m),
-                  " m RMS from one transform, expected at most ", limits.rms_m, " m");
+  if (fit.rms_m > limits.rms_m || fit.rms_rad > limits.rms_rad) {
+    return StrCat("bent against the map: ", InThousandths(fit.rms_m), " m and ",
+                  InThousandths(Degrees(fit.rms_rad)),
+                  " deg RMS from one transform, expected at most ", limits.rms_m, " m and ",
+                  InThousandths(Degrees(limits.rms_rad)), " deg");
   }
-  if (fit.worst_rms_m > limits.worst_rms_m || fit.worst_rms_yaw_rad > limits.worst_rms_yaw_rad) {
+  if (fit.worst_rms_m > limits.worst_rms_m || fit.worst_rms_rad > limits.worst_rms_rad) {
     return StrCat("bent against the map where it is off the most: ", InThousandths(fit.worst_rms_m),
-                  " m and ", InThousandths(Degrees(fit.worst_rms_yaw_rad)),
+                  " m and ", InThousandths(Degrees(fit.worst_rms_rad)),
                   " deg RMS from one transform, expected at most ", limits.worst_rms_m, " m and ",
-                  InThousandths(Degrees(limits.worst_rms_yaw_rad)), " deg");
+                  InThousandths(Degrees(limits.worst_rms_rad)), " deg");
   }
   if (fit.longest_astray > limits.longest_astray) {
     return StrCat("astray: ", fit.longest_astray,
                   " scans in a row do not fit the map where one transform puts them, expected at "
                   "most ",
                   limits.longest_astray);
+  }
+  if (fit.astray > 1 + fit.tracked / limits.found_per_astray) {
+    return StrCat("astray: ", fit.astray, " scans do not fit the map where one transform puts ",
+                  "them, and ", fit.tracked, " do, expected at most ",
+                  1 + fit.tracked / limits.found_per_astray);
   }
   return {};
 }

@@ -22,20 +22,22 @@ struct FrameFit {
   std::size_t tracked = 0;         // scans that were found
   std::size_t astray = 0;          // and that were not,
   std::size_t longest_astray = 0;  // so many in a row
-  // Of where they were found, from where the transform puts them: all, and the ten in a row that
-  // are off the most.
+  // Of where and how they were found, from where the transform puts them: all, and the ten in a row
+  // that are off the most. Turned about any axis: what is tilted otherwise makes other keyframes.
   double rms_m = 0.0;
   double worst_rms_m = 0.0;
-  double rms_yaw_rad = 0.0;
-  double worst_rms_yaw_rad = 0.0;
+  double rms_rad = 0.0;
+  double worst_rms_rad = 0.0;
 };
 
 // More is not to be live in the map: it would be blurred there, or doubled.
 struct FrameLimits {
   double rms_m = 0.0;
+  double rms_rad = 0.0;
   double worst_rms_m = 0.0;
-  double worst_rms_yaw_rad = 0.0;
+  double worst_rms_rad = 0.0;
   std::size_t longest_astray = 0;
+  std::size_t found_per_astray = 1;  // one more than one for each so many that were found
 };
 
 // `scans` in the order of the drive.

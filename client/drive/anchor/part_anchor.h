@@ -49,11 +49,23 @@ struct AnchorOptions {
   // A drive whose own poses are bent more than that is for a merge, not for a transform: live, it
   // would blur the map, or double it. All of it: recorded ones that are well known lie 0.09 m off,
   // odometry that drifts by 1 % and 0.5 degrees in 100 m is 0.23 m and more off after 74 m. And
-  // where it is off the most: those lie up to 0.13 m and 0.2 degrees off there, and one scan in a
-  // row is lost, at the end of the map.
-  FrameLimits limits{0.12, 0.18, 0.4 * std::numbers::pi / 180.0, 2};
+  // where it is off the most: those lie up to 0.13 m and 0.2 degrees off there, and one of 35
+  // scans is lost, at the end of the map.
+  FrameLimits limits{.rms_m = 0.12,
+                     .rms_rad = 0.25 * std::numbers::pi / 180.0,
+                     .worst_rms_m = 0.18,
+                     .worst_rms_rad = 0.4 * std::numbers::pi / 180.0,
+                     .longest_astray = 1,
+                     .found_per_astray = 30};
   // What comes to a session that is there may be the worst part of a drive that was accepted.
-  FrameLimits limits_of_rest{0.21, 0.21, 0.45 * std::numbers::pi / 180.0, 2};
+  FrameLimits limits_of_rest{.rms_m = 0.21,
+                             .rms_rad = 0.45 * std::numbers::pi / 180.0,
+                             .worst_rms_m = 0.21,
+                             .worst_rms_rad = 0.45 * std::numbers::pi / 180.0,
+                             .longest_astray = 1,
+                             .found_per_astray = 30};
+  // It was looked at by the run that began it, and is not looked at again.
+  bool is_rest_accepted = false;
   // Of the scans that were found so many may lie elsewhere by the transform in the end: more are a
   // part of the drive that does.
   std::size_t max_off = 1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/base/str_cat.h"
@@ -12,6 +13,7 @@ namespace {
 
 constexpr double kRange_m = 100.0;
 constexpr std::size_t kLastScans = 10;  // that say how the drive lies here
+constexpr double kNextDeck_m = 3.0;     // is no nearer
 
 }  // namespace
 
@@ -72,7 +74,8 @@ Status ScanFollower::Follow(PartScans scans,
   std::vector<FoundScan> last;
   for (const std::size_t i : order) {
     const Pose expected = T_here * scans[i]->T_world_sensor;
-    const double slack_m = options_.drift * std::abs(way_m[i] - last_m);
+    const double since_m = std::abs(way_m[i] - last_m);
+    const double slack_m = options_.drift * since_m;
     const Result<LocatedScan> located = LocateNear(*scans[i], expected);
     if (!located) return located.error();
     const bool is_good = located->health == LocalizationHealth::kGood;
@@ -87,10 +90,11 @@ Status ScanFollower::Follow(PartScans scans,
       last_m = way_m[i];
       continue;
     }
-    if (is_near) continue;
-    const Result<bool> is_mapped = is_good ? true : IsMapped(expected, slack_m);
-    if (!is_mapped) return is_mapped.error();
-    if (*is_mapped) followed.push_back({i, false, 0.0, {}});
+    const Result<bool> is_astray = is_good   ? true
+                                   : is_near ? IsOffGround(expected)
+                                             : IsMapped(expected, slack_m);
+    if (!is_astray) return is_astray.error();
+    if (*is_astray) followed.push_back({i, false, 0.0, {}});
   }
   return {};
 }
@@ -106,11 +110,24 @@ Result<LocatedScan> ScanFollower::LocateNear(const DriveScan& scan, const Pose& 
   return located;
 }
 
+// Whether the map has ground there that a vehicle with such a sensor would hover over, or be below.
+// Walls hold a scan in plan at any height.
+Result<bool> ScanFollower::IsOffGround(const Pose& T_map_sensor) const {
+  constexpr double kStands_m = 0.5;
+  const Eigen::Vector3d& p = T_map_sensor.translation();
+  const auto layers = view_->LayersAt(p.head<2>());
+  if (!layers) return Error(layers.error());
+  double off_m = std::numeric_limits<double>::infinity();
+  for (const TileLayer& layer : *layers) {
+    off_m = std::min(off_m, std::abs(1e-3 * layer.altitude_mm - (p.z() - mount_m_)));
+  }
+  return off_m > kStands_m && off_m < kNextDeck_m;
+}
+
 // Whether the map has ground below a sensor there, or beside it, which may be `slack_m` farther.
 Result<bool> ScanFollower::IsMapped(const Pose& T_map_sensor, double slack_m) const {
   constexpr double kBeside_m = 2.0;
   constexpr double kNear_m = 1.5;
-  constexpr double kNextDeck_m = 3.0;
   constexpr double kMostSlack_m = 10.0;
   const Eigen::Vector3d& p = T_map_sensor.translation();
   const double ground_z_m = p.z() - mount_m_;

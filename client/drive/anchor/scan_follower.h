@@ -43,7 +43,8 @@ class ScanFollower {
 
   // From `seed` to the end and to the beginning, where `T_map_drive` puts the first ones and the
   // last ones that were found put the next. In the drive's order; left out are those whose place is
-  // not mapped, as far as that is known, and those that are weak where they are expected. Errors
+  // not mapped, as far as that is known, and those that are weak where they are expected, on the
+  // ground. Errors
   // are those of the scans and of the view.
   Result<std::vector<FollowedScan>> Follow(PartScans scans,
                                            std::size_t seed,
@@ -56,6 +57,7 @@ class ScanFollower {
                 const LevelTransform& T_map_drive,
                 std::vector<FollowedScan>& followed);
   Result<LocatedScan> LocateNear(const DriveScan& scan, const Pose& T_map_sensor);
+  Result<bool> IsOffGround(const Pose& T_map_sensor) const;
   Result<bool> IsMapped(const Pose& T_map_sensor, double slack_m) const;
   bool IsNear(const Pose& found, const Pose& expected, double slack_m) const;
 

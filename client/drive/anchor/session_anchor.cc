@@ -91,6 +91,8 @@ Result<std::optional<Begun>> Resumed(const AnchoredDrive& drive,
 constexpr std::string_view kOtherName =
     "; --session gives what is not there yet another name, and atlas-merge run aligns it where it "
     "is staged";
+constexpr std::string_view kOrResume =
+    "; --resume ends what an earlier run accepted and did not end";
 
 // Of one that is there already.
 Status CheckPrior(const SessionScans& session,
@@ -128,24 +130,26 @@ class Map {
       if (!begun.scans.contains(scan->number)) scans.push_back(scan);
     }
     if (scans.empty()) return {};
-    const auto refused = [&](const std::string& why) -> Status {
-      return {StatusCode::kConflict, StrCat("session ", session.key, why, kOtherName)};
+    const auto refused = [&](const std::string& why, std::string_view or_else = "") -> Status {
+      return {StatusCode::kConflict, StrCat("session ", session.key, why, kOtherName, or_else)};
     };
     if (begun.bent_m > kOneFrame_m) {
       return refused(StrCat(" was corrected since it was begun: its keyframes lie up to ",
                             std::round(begun.bent_m * 1e3) / 1e3,
                             " m from where one frame puts them"));
     }
+    if (options_.is_rest_accepted) return {};
     ATLAS_RETURN_IF_ERROR(Read());
     const auto misfit = anchoring_->Measure(scans, *begun.anchor.part.T_map_drive);
     if (!misfit) return misfit.error();
     if (misfit->astray > misfit->tracked) {
       return refused(StrCat(": of what is new of the drive ", misfit->astray,
                             " scans do not fit the map where the session's frame puts them, and ",
-                            misfit->tracked, " do"));
+                            misfit->tracked, " do"),
+                     kOrResume);
     }
     const std::string bent = WhyBeyond(*misfit, options_.limits_of_rest);
-    if (!bent.empty()) return refused(StrCat(": what is new of the drive is ", bent));
+    if (!bent.empty()) return refused(StrCat(": what is new of the drive is ", bent), kOrResume);
     return {};
   }
 

@@ -38,9 +38,9 @@ boost::json::array AnchorsJson(const std::vector<SessionAnchor>& anchors) {
       json["contradicting"] = part.fit.astray;
       json["contradicting_in_a_row"] = part.fit.longest_astray;
       json["rms_m"] = Rounded(part.fit.rms_m, 4);
-      json["rms_deg"] = Rounded(kDegrees * part.fit.rms_yaw_rad, 4);
+      json["rms_deg"] = Rounded(kDegrees * part.fit.rms_rad, 4);
       json["worst_rms_m"] = Rounded(part.fit.worst_rms_m, 4);
-      json["worst_rms_deg"] = Rounded(kDegrees * part.fit.worst_rms_yaw_rad, 4);
+      json["worst_rms_deg"] = Rounded(kDegrees * part.fit.worst_rms_rad, 4);
       if (anchor.is_anchored()) {
         json["begins"] = {Rounded(part.begin_m.x(), 3), Rounded(part.begin_m.y(), 3),
                           Rounded(part.begin_m.z(), 3)};
@@ -65,7 +65,7 @@ std::string AnchorText(const SessionAnchor& anchor) {
                 FixedText(part.begin_m.y(), 1), ", ", FixedText(part.begin_m.z(), 1), ") m; ",
                 part.agreeing, " of ", part.found, " scans agree, ", part.fit.tracked,
                 " tracked to ", FixedText(part.fit.rms_m, 3), " m and ",
-                FixedText(kDegrees * part.fit.rms_yaw_rad, 3), " deg RMS");
+                FixedText(kDegrees * part.fit.rms_rad, 3), " deg RMS");
 }
 
 Status CheckAnchored(const std::vector<SessionAnchor>& anchors) {

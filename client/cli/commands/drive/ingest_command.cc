@@ -106,6 +106,9 @@ class IngestCommand : public Command {
     arguments.Optional("--prior-radius", "M", prior_radius_m_, "How far off that is at most");
     arguments.Optional("--prior-height", "Z,M", prior_height_m_,
                        "With --anchor: the sensor's height there, and how far off that is at most");
+    arguments.Flag("--resume", is_resumed_,
+                   "With --anchor: an earlier run accepted the drive and did not end; what is new "
+                   "of its sessions is not looked at again");
     arguments.Optional("--positions", "FILE", positions_,
                        "Where the sensor was at scans, by GNSS, in the atlas's frame: lines SCAN X "
                        "Y Z RADIUS, metres");
@@ -189,11 +192,13 @@ class IngestCommand : public Command {
       return {StatusCode::kInvalidArgument, "--prior and --prior-radius need each other"};
     }
     if (!is_anchored_) {
-      return prior_m_ || prior_height_m_
-                 ? Status(StatusCode::kInvalidArgument, "--prior and --prior-height need --anchor")
+      return prior_m_ || prior_height_m_ || is_resumed_
+                 ? Status(StatusCode::kInvalidArgument,
+                          "--prior, --prior-height and --resume need --anchor")
                  : Status();
     }
-    PlacePrior& prior = options_.anchor.emplace().prior;
+    options_.anchor.emplace().is_rest_accepted = is_resumed_;
+    PlacePrior& prior = options_.anchor->prior;
     if (prior_m_) {
       prior.center = *prior_m_;
       prior.radius_m = *prior_radius_m_;
@@ -226,6 +231,7 @@ class IngestCommand : public Command {
   std::optional<std::string> session_;
   std::string deskew_ = "off";
   bool is_anchored_ = false;
+  bool is_resumed_ = false;
   std::optional<Eigen::Vector2d> prior_m_;
   std::optional<double> prior_radius_m_;
   std::optional<Eigen::Vector2d> prior_height_m_;

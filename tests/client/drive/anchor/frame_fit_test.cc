@@ -11,7 +11,12 @@ namespace atlas {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr FrameLimits kLimits{0.12, 0.18, 0.4 * kDegree, 2};
+constexpr FrameLimits kLimits{.rms_m = 0.12,
+                              .rms_rad = 0.25 * kDegree,
+                              .worst_rms_m = 0.18,
+                              .worst_rms_rad = 0.4 * kDegree,
+                              .longest_astray = 1,
+                              .found_per_astray = 30};
 
 LevelTransform Somewhere() {
   return {40.0 * kDegree, {100.0, -50.0, 3.0}};
@@ -58,7 +63,7 @@ TEST(FrameFitTest, ARightOneIsOffByNothing) {
   EXPECT_EQ(fit.tracked, 100U);
   EXPECT_EQ(fit.astray, 0U);
   EXPECT_LT(fit.worst_rms_m, 1e-9);
-  EXPECT_LT(fit.worst_rms_yaw_rad, 1e-9);
+  EXPECT_LT(fit.worst_rms_rad, 1e-9);
   EXPECT_EQ(WhyBeyond(fit, kLimits), "");
   EXPECT_EQ(Measured({}).tracked, 0U);
 }
@@ -75,8 +80,23 @@ TEST(FrameFitTest, AStretchThatIsOffIsNotLostInTheWhole) {
 }
 
 TEST(FrameFitTest, AStretchThatIsTurnedIsNotEither) {
-  const FrameFit fit = Measured(Off(50, 60, 0.0, 1.0));
-  EXPECT_NEAR(fit.worst_rms_yaw_rad, 1.0 * kDegree, 1e-9);
+  const FrameFit fit = Measured(Off(50, 60, 0.0, 0.7));
+  EXPECT_NEAR(fit.worst_rms_rad, 0.7 * kDegree, 1e-9);
+  EXPECT_LT(fit.rms_rad, kLimits.rms_rad);
+  EXPECT_NE(WhyBeyond(fit, kLimits).find("off the most"), std::string::npos);
+}
+
+// A keyframe is made of how the drive says that its sensor was tilted.
+TEST(FrameFitTest, WhatIsTiltedOtherwiseIsNot) {
+  std::vector<FollowedScan> scans = Right();
+  for (FollowedScan& scan : scans) {
+    Pose& T_drive_sensor = scan.scan.T_drive_sensor;
+    T_drive_sensor.linear() =
+        T_drive_sensor.linear() * Eigen::AngleAxisd(1.6 * kDegree, Eigen::Vector3d::UnitX());
+  }
+  const FrameFit fit = Measured(scans);
+  EXPECT_LT(fit.rms_m, 1e-9);
+  EXPECT_NEAR(fit.rms_rad, 1.6 * kDegree, 1e-6);
   EXPECT_NE(WhyBeyond(fit, kLimits), "");
 }
 
@@ -86,13 +106,18 @@ TEST(FrameFitTest, FewerThanAStretchAreOne) {
   EXPECT_NEAR(Measured(scans).worst_rms_m, 0.3, 1e-9);
 }
 
-TEST(FrameFitTest, ScansAstrayInARowAreAPartElsewhere) {
-  EXPECT_EQ(WhyBeyond(Measured(Astray(0, 100, 3)), kLimits), "") << "one in three, nowhere two";
-  EXPECT_EQ(WhyBeyond(Measured(Astray(98, 100)), kLimits), "");
-  const FrameFit fit = Measured(Astray(97, 100));
-  EXPECT_EQ(fit.astray, 3U);
-  EXPECT_EQ(fit.longest_astray, 3U);
-  EXPECT_NE(WhyBeyond(fit, kLimits).find("3 scans in a row"), std::string::npos);
+TEST(FrameFitTest, TwoAstrayInARowAreAPartElsewhere) {
+  EXPECT_EQ(WhyBeyond(Measured(Astray(99, 100)), kLimits), "");
+  const FrameFit fit = Measured(Astray(98, 100));
+  EXPECT_EQ(fit.astray, 2U);
+  EXPECT_EQ(fit.longest_astray, 2U);
+  EXPECT_NE(WhyBeyond(fit, kLimits).find("2 scans in a row"), std::string::npos);
+}
+
+TEST(FrameFitTest, AndSoAreManyAlone) {
+  EXPECT_EQ(WhyBeyond(Measured(Astray(0, 100, 30)), kLimits), "") << "four of a hundred";
+  EXPECT_NE(WhyBeyond(Measured(Astray(0, 100, 20)), kLimits).find("5 scans do not fit"),
+            std::string::npos);
 }
 
 }  // namespace
