@@ -6,9 +6,9 @@
 #include <set>
 #include <span>
 
+#include "client/drive/drive_motion.h"
 #include "client/drive/drive_survey.h"
 #include "client/drive/impossible_steps.h"
-#include "client/drive/scan_motion.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
@@ -60,7 +60,7 @@ Status CheckMayUpload(const AtlasIdentity& atlas, const std::string& vehicle) {
 class Ingest {
  public:
   Ingest(const DriveFolder& drive, const IngestOptions& options)
-      : drive_(drive), options_(options) {
+      : drive_(drive), options_(options), motion_(drive) {
     for (const DriveScan& scan : drive.scans) {
       poses_.push_back(scan.T_world_sensor);
     }
@@ -226,7 +226,7 @@ class Ingest {
   Bytes BuildBlob(const PointCloud& cloud, std::size_t index) {
     const CpuTimer timer;
     std::optional<Pose> T_now_later;
-    if (report_.deskewing.is_deskewed) T_now_later = MotionDuring(drive_, index);
+    if (report_.deskewing.is_deskewed) T_now_later = motion_.During(index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
     const GridAttitude attitude{SplitYaw(R_world_sensor).R_level_sensor,
                                 GridYaw(drive_.scans[index].number)};
@@ -242,6 +242,7 @@ class Ingest {
 
   const DriveFolder& drive_;
   const IngestOptions& options_;
+  const DriveMotion motion_;
   std::vector<Pose> poses_;  // of all scans
   // Where the scans of an anchored session go.
   struct Frame {

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "client/drive/scan_motion.h"
+#include "client/drive/drive_motion.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/scan/scan_reader.h"
@@ -21,13 +21,15 @@ struct Window {
 };
 
 // The fastest ones, none over another.
-std::vector<Window> FastWindows(const DriveFolder& drive, const SkewOptions& options) {
+std::vector<Window> FastWindows(const DriveFolder& drive,
+                                const DriveMotion& motion,
+                                const SkewOptions& options) {
   std::vector<Window> all;
   for (std::size_t begin = 0; begin + options.window_scans <= drive.scans.size(); ++begin) {
     Window window{begin, 1e9};
     for (std::size_t i = begin; i < begin + options.window_scans; ++i) {
       const bool is_next = i == begin || drive.scans[i].number == drive.scans[i - 1].number + 1;
-      const double motion_m = MotionDuring(drive, i).translation().norm();
+      const double motion_m = motion.During(i).translation().norm();
       window.motion_m = std::min(window.motion_m, is_next ? motion_m : 0.0);
     }
     if (window.motion_m >= options.min_motion_m) all.push_back(window);
@@ -75,7 +77,8 @@ Result<DriveSkew> FindSkew(const DriveFolder& drive,
   DriveSkew skew;
   std::size_t as_they_are = 0;
   std::size_t deskewed = 0;
-  for (const Window& window : FastWindows(drive, options)) {
+  const DriveMotion motion(drive);
+  for (const Window& window : FastWindows(drive, motion, options)) {
     Structure raw(options);
     Structure undone(options);
     for (std::size_t i = window.begin; i < window.begin + options.window_scans; ++i) {
@@ -88,7 +91,7 @@ Result<DriveSkew> FindSkew(const DriveFolder& drive,
       raw.Add(SegmentScan(*cloud, survey.layout, survey.ring_step, R_level_sensor, {}),
               T_world_level);
       undone.Add(SegmentScan(*cloud, survey.layout, survey.ring_step, R_level_sensor, {},
-                             MotionDuring(drive, i)),
+                             motion.During(i)),
                  T_world_level);
     }
     as_they_are += raw.voxels();

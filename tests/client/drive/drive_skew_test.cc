@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "client/drive/scan_motion.h"
+#include "client/drive/drive_motion.h"
 #include "core/simulation/drive_writer.h"
 
 namespace atlas {
@@ -46,7 +46,7 @@ class DriveSkewTest : public ::testing::Test {
     fs::copy(from, to, fs::copy_options::recursive);
     const DriveFolder drive = OpenDriveFolder(from).value();
     for (std::size_t i = 0; i < drive.scans.size(); ++i) {
-      const Pose motion = MotionDuring(drive, i);
+      const Pose motion = DriveMotion(drive).During(i);
       const Eigen::AngleAxisd turn(motion.linear());
       std::ifstream in(drive.scans[i].scan, std::ios::binary);
       std::ofstream out(to / "velodyne" / drive.scans[i].scan.filename(), std::ios::binary);

@@ -1,0 +1,58 @@
+#include "client/drive/drive_motion.h"
+
+#include <vector>
+
+#include "client/drive/drive_selection.h"
+#include "core/localization/scan_clock.h"
+
+namespace atlas {
+namespace {
+
+std::optional<double> Interval_s(const DriveScan& a, const DriveScan& b) {
+  if (b.number != a.number + 1 || !a.time_s || !b.time_s || *b.time_s <= *a.time_s) {
+    return std::nullopt;
+  }
+  return *b.time_s - *a.time_s;
+}
+
+// So much of a motion, at an even pace.
+Pose ShareOf(const Pose& motion, double share) {
+  const Eigen::AngleAxisd turn(motion.linear());
+  Pose part = Pose::Identity();
+  part.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  part.translation() = share * motion.translation();
+  return part;
+}
+
+}  // namespace
+
+DriveMotion::DriveMotion(const DriveFolder& drive) : drive_(drive) {
+  std::vector<double> intervals_s;
+  for (std::size_t i = 1; i < drive.scans.size(); ++i) {
+    if (const auto interval_s = Interval_s(drive.scans[i - 1], drive.scans[i])) {
+      intervals_s.push_back(*interval_s);
+    }
+  }
+  if (!intervals_s.empty()) usual_s_ = UsualInterval_s(intervals_s);
+}
+
+std::optional<Pose> DriveMotion::Between(std::size_t from, std::size_t to) const {
+  constexpr double kMissing = 1.5;  // else times only jitter
+  const DriveScan& a = drive_.scans[from];
+  const DriveScan& b = drive_.scans[to];
+  const Pose T_a_b = a.T_world_sensor.inverse() * b.T_world_sensor;
+  const bool is_neighbour = b.number == a.number + 1;
+  if (!is_neighbour || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
+  const auto interval_s = Interval_s(a, b);
+  const bool is_longer = usual_s_ && interval_s && *interval_s > kMissing * *usual_s_;
+  return is_longer ? ShareOf(T_a_b, *usual_s_ / *interval_s) : T_a_b;
+}
+
+Pose DriveMotion::During(std::size_t index) const {
+  std::optional<Pose> found;
+  if (index + 1 < drive_.scans.size()) found = Between(index, index + 1);
+  if (!found && index > 0) found = Between(index - 1, index);
+  return found.value_or(Pose::Identity());
+}
+
+}  // namespace atlas
