@@ -17,7 +17,7 @@ USAGE = {
         ["DRIVE", "--range", "-1:3"], ["DRIVE", "--shuffle", "-1"], ["DRIVE", "--shuffle", "x"],
         ["DRIVE", "--batch", "0"], ["DRIVE", "--batch", "-1"], ["DRIVE", "--sensor-height", "0"],
         ["DRIVE", "--sensor-height", "-1.7"], ["DRIVE", "--sensor-height", "100"],
-        ["DRIVE", "--prior-height", "1,1"], ["DRIVE", "--anchor", "--prior-height", "1"],
+        ["DRIVE", "--prior-height", "1,1"], ["DRIVE", "--resume"], ["DRIVE", "--anchor", "--prior-height", "1"],
         ["DRIVE", "--anchor", "--prior-height", "1,0"], ["DRIVE", "--anchor", "--prior-height", "x,1"],
         ["DRIVE", "--deskew", "maybe"], ["DRIVE", "--start", "today"],
         ["DRIVE", "--every", "1", "--every", "2"],

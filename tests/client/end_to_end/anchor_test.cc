@@ -21,6 +21,7 @@ struct Bend {
   std::size_t begin = 0;
   std::size_t end = 0;
   Eigen::Vector3d step_m = Eigen::Vector3d::Zero();
+  double roll_deg = 0.0;
 };
 
 class AnchorTest : public VehicleTest {
@@ -46,7 +47,11 @@ class AnchorTest : public VehicleTest {
     for (std::size_t i = 0; i < drive.scans.size(); ++i) {
       part += i > 0 && IsJump(drive.scans[i - 1], drive.scans[i]) ? 1U : 0U;
       Pose pose = T_moved_world.at(part).ToPose() * drive.scans[i].T_world_sensor;
-      if (i >= bend.begin && i < bend.end) pose.translation() += bend.step_m;
+      if (i >= bend.begin && i < bend.end) {
+        pose.translation() += bend.step_m;
+        pose.linear() *=
+            Eigen::AngleAxisd(bend.roll_deg * kDegree, Eigen::Vector3d::UnitX()).toRotationMatrix();
+      }
       for (; line <= drive.scans[i].number; ++line) {  // those between have no scan
         for (const double number : PoseToRowMajor(pose)) {
           poses << number << ' ';
@@ -257,6 +262,11 @@ TEST_F(AnchorTest, ADriveWhosePosesDriftIsForAMerge) {
   }
   EXPECT_EQ(Digest(daemon), begun);
   EXPECT_EQ(Connect(daemon).ListKeyframes({"vehicle", "grows"})->size(), 12U);
+  // Unless somebody says that it was accepted.
+  const CommandRun resumed =
+      Anchor(daemon, drifting, {"--range", "0:16", "--session", "grows", "--resume"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(Connect(daemon).ListKeyframes({"vehicle", "grows"})->size(), 16U);
 }
 
 // However well the rest of it fits: live, that part would double what is there.
@@ -270,6 +280,9 @@ TEST_F(AnchorTest, ADriveOfWhichAPartIsOffStaysOut) {
       {"begin", {0, 6, {0.8, 0.8, 0.0}}},
       {"high", {scans / 2, scans / 2 + 12, {0.0, 0.0, 0.6}}},
       {"near", {scans - 12, scans, {0.25, 0.25, 0.0}}},
+      {"hovering", {scans / 2, scans / 2 + 8, {0.0, 0.0, 2.2}}},
+      {"short", {scans / 2, scans / 2 + 3, {1.2, 1.2, 0.0}}},
+      {"rolled", {0, scans, {0.0, 0.0, 0.0}, 1.6}},
   };
   for (const auto& [name, bend] : bends) {
     const fs::path drive = shared_root / ("bent_" + name);
