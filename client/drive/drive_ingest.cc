@@ -91,8 +91,11 @@ class Ingest {
   // Keyframes stay what they are: only where they go is another matter.
   Status Anchor(AtlasClient& client) {
     if (!options_.anchor) return {};
-    auto anchors =
-        AnchorSessions({drive_, survey_, options_.start_s}, sessions_, *options_.anchor, client);
+    const auto motion = [this](const DriveScan& scan) {
+      return MotionOf(static_cast<std::size_t>(&scan - drive_.scans.data()));
+    };
+    auto anchors = AnchorSessions({drive_, survey_, options_.start_s, motion}, sessions_,
+                                  *options_.anchor, client);
     if (!anchors) return anchors.error();
     report_.anchors = *std::move(anchors);
     for (const SessionAnchor& anchor : report_.anchors) {
@@ -225,14 +228,18 @@ class Ingest {
 
   Bytes BuildBlob(const PointCloud& cloud, std::size_t index) {
     const CpuTimer timer;
-    std::optional<Pose> T_now_later;
-    if (report_.deskewing.is_deskewed) T_now_later = motion_.During(index);
     const Eigen::Quaterniond R_world_sensor(drive_.scans[index].T_world_sensor.linear());
     const GridAttitude attitude{SplitYaw(R_world_sensor).R_level_sensor,
                                 GridYaw(drive_.scans[index].number)};
-    Bytes blob = EncodeKeyframe(builder_->Build(cloud, attitude, TrailUntil(index), T_now_later));
+    Bytes blob =
+        EncodeKeyframe(builder_->Build(cloud, attitude, TrailUntil(index), MotionOf(index)));
     report_.frontend_s += timer.elapsed_s();
     return blob;
+  }
+
+  // During a scan that is to be deskewed.
+  std::optional<Pose> MotionOf(std::size_t index) const {
+    return report_.deskewing.is_deskewed ? std::optional(motion_.During(index)) : std::nullopt;
   }
 
   // Of the whole drive, whichever scans are selected: a scan's keyframe is always the same.

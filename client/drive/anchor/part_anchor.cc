@@ -10,8 +10,6 @@
 #include "client/drive/place_reader.h"
 #include "client/drive/tiles_around.h"
 #include "core/base/str_cat.h"
-#include "core/keyframe/keyframe_builder.h"
-#include "core/scan/scan_reader.h"
 
 namespace atlas {
 namespace {
@@ -76,15 +74,17 @@ Status AnchorOptions::Validate() const {
 }
 
 PartAnchoring::PartAnchoring(const DriveSurvey& survey,
+                             const ScanSource& source,
                              MapView& view,
                              std::shared_ptr<const PlaceIndex> places,
                              const AnchorOptions& options)
-    : survey_(survey),
+    : source_(source),
       options_(options),
       relocalizer_(view.profile(), std::move(places), TilesOf(view), OptionsOfRelocalizer()),
-      follower_(survey, view, options.follow) {}
+      follower_(survey, source, view, options.follow) {}
 
 Result<PartAnchoring> PartAnchoring::Create(const DriveSurvey& survey,
+                                            const MotionDuringScan& motion,
                                             MapView& view,
                                             const AnchorOptions& options) {
   if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
@@ -95,14 +95,14 @@ Result<PartAnchoring> PartAnchoring::Create(const DriveSurvey& survey,
                  "anchor: the atlas has no map to find the drive in; the first drive is ingested "
                  "without --anchor, and its frame becomes the atlas's");
   }
-  return PartAnchoring(survey, view, *std::move(places), options);
+  return PartAnchoring(survey, ScanSource(survey, motion), view, *std::move(places), options);
 }
 
 Status PartAnchoring::Probe(PartScans scans, std::size_t index, Probes& probes) const {
   if (!probes.probed.insert(index).second) return {};
   const DriveScan& scan = *scans[index];
-  const Result<PointCloud> cloud = ReadScan(scan.scan);
-  if (!cloud) return cloud.error();
+  const Result<LeveledScan> leveled = source_.Read(scan);
+  if (!leveled) return leveled.error();
   // Wherever the drive begins, this scan is as far from there as in the drive's own frame.
   const Eigen::Vector3d way =
       scan.T_world_sensor.translation() - scans.front()->T_world_sensor.translation();
@@ -111,11 +111,8 @@ Status PartAnchoring::Probe(PartScans scans, std::size_t index, Probes& probes) 
   prior.radius_m += way.head<2>().norm() + drift_m;
   prior.z_m += way.z();
   prior.height_m += drift_m;
-  const Eigen::Quaterniond R_level_sensor =
-      SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear())).R_level_sensor;
-  const LeveledScan leveled =
-      SegmentScan(*cloud, survey_.layout, survey_.ring_step, R_level_sensor, {});
-  const auto found = relocalizer_.Find(leveled, R_level_sensor, prior);
+  const Eigen::Quaterniond R_level_sensor = LevelOf(scan);
+  const auto found = relocalizer_.Find(*leveled, R_level_sensor, prior);
   if (!found) return found.error().WithContext(StrCat("scan ", scan.number));
   for (const RelocalizedPlace& place : found->places) {
     const bool is_believed = found->T_world_sensor && &place == &found->places.front();

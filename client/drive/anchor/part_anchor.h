@@ -14,6 +14,7 @@
 #include "client/drive/anchor/anchor_guess.h"
 #include "client/drive/anchor/frame_fit.h"
 #include "client/drive/anchor/scan_follower.h"
+#include "client/drive/anchor/scan_source.h"
 #include "client/drive/drive_survey.h"
 #include "client/map/map_view.h"
 #include "core/base/status.h"
@@ -89,6 +90,7 @@ class PartAnchoring {
   // Reads the whole map; `view` outlives it. kNotFound: the map has no place to be at. Else fails
   // as the view does.
   static Result<PartAnchoring> Create(const DriveSurvey& survey,
+                                      const MotionDuringScan& motion,
                                       MapView& view,
                                       const AnchorOptions& options);
 
@@ -103,6 +105,7 @@ class PartAnchoring {
   struct Candidate;
 
   PartAnchoring(const DriveSurvey& survey,
+                const ScanSource& source,
                 MapView& view,
                 std::shared_ptr<const PlaceIndex> places,
                 const AnchorOptions& options);
@@ -119,7 +122,7 @@ class PartAnchoring {
               const PlacePrior& prior,
               PartAnchor& anchor) const;
 
-  DriveSurvey survey_;
+  ScanSource source_;
   AnchorOptions options_;
   Relocalizer relocalizer_;
   ScanFollower follower_;

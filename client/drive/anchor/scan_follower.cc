@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "client/drive/tiles_around.h"
 #include "core/base/str_cat.h"
-#include "core/scan/scan_reader.h"
 
 namespace atlas {
 namespace {
@@ -14,6 +14,12 @@ namespace {
 constexpr double kRange_m = 100.0;
 constexpr std::size_t kLastScans = 10;  // that say how the drive lies here
 constexpr double kNextDeck_m = 3.0;     // is no nearer
+
+LocalizerOptions OptionsOfLocalizer() {
+  LocalizerOptions options;
+  options.features.max_range_m = static_cast<float>(kRange_m);
+  return options;
+}
 
 }  // namespace
 
@@ -38,11 +44,16 @@ std::vector<std::size_t> SpreadAlong(const std::vector<double>& way_m,
   return spread;
 }
 
-ScanFollower::ScanFollower(const DriveSurvey& survey, MapView& view, const FollowOptions& options)
+ScanFollower::ScanFollower(const DriveSurvey& survey,
+                           const ScanSource& source,
+                           MapView& view,
+                           const FollowOptions& options)
     : options_(options),
       mount_m_(survey.mount.height_m),
+      source_(source),
       view_(&view),
-      localizer_(MakeAtlasLocalizer(survey, kRange_m, view)) {}
+      localizer_(std::make_unique<Localizer>(view.profile(), TilesOf(view), OptionsOfLocalizer())) {
+}
 
 Result<std::vector<FollowedScan>> ScanFollower::Follow(PartScans scans,
                                                        std::size_t seed,
@@ -76,14 +87,14 @@ Status ScanFollower::Follow(PartScans scans,
     const Pose expected = T_here * scans[i]->T_world_sensor;
     const double since_m = std::abs(way_m[i] - last_m);
     const double slack_m = options_.drift * since_m;
-    const Result<LocatedScan> located = LocateNear(*scans[i], expected);
+    const Result<LocalizationResult> located = LocateNear(*scans[i], expected);
     if (!located) return located.error();
     const bool is_good = located->health == LocalizationHealth::kGood;
     const bool is_near = located->health != LocalizationHealth::kLost &&
                          IsNear(located->T_world_sensor, expected, slack_m);
     if (is_good && is_near) {
       const FoundScan found{scans[i]->T_world_sensor, located->T_world_sensor};
-      followed.push_back({i, true, located->fit, found});
+      followed.push_back({i, true, located->registration.fit, found});
       last.push_back(found);
       if (last.size() > kLastScans) last.erase(last.begin());
       T_here = FitTransform(last).ToPose();
@@ -99,13 +110,13 @@ Status ScanFollower::Follow(PartScans scans,
   return {};
 }
 
-Result<LocatedScan> ScanFollower::LocateNear(const DriveScan& scan, const Pose& T_map_sensor) {
+Result<LocalizationResult> ScanFollower::LocateNear(const DriveScan& scan,
+                                                    const Pose& T_map_sensor) {
   constexpr StartHint kFollowed{0.5, 0.05};  // the scans before it tell where it is
-  const Result<PointCloud> cloud = ReadScan(scan.scan);
-  if (!cloud) return Error(cloud.error());
+  const Result<LeveledScan> leveled = source_.Read(scan);
+  if (!leveled) return Error(leveled.error());
   localizer_->Start(T_map_sensor, kFollowed);
-  const auto level = SplitYaw(Eigen::Quaterniond(scan.T_world_sensor.linear())).R_level_sensor;
-  auto located = localizer_->Locate(*cloud, level, 1.0);
+  auto located = localizer_->Localize(*leveled, LevelOf(scan));
   if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
   return located;
 }

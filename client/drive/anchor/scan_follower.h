@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "client/drive/anchor/frame_fit.h"
+#include "client/drive/anchor/scan_source.h"
 #include "client/drive/drive_survey.h"
-#include "client/drive/scan_localizer.h"
 #include "client/map/map_view.h"
 #include "core/base/status.h"
+#include "core/localization/localizer.h"
 #include "core/scan/drive_folder.h"
 
 namespace atlas {
@@ -39,7 +40,10 @@ struct FollowOptions {
 class ScanFollower {
  public:
   // `view` outlives it.
-  ScanFollower(const DriveSurvey& survey, MapView& view, const FollowOptions& options);
+  ScanFollower(const DriveSurvey& survey,
+               const ScanSource& source,
+               MapView& view,
+               const FollowOptions& options);
 
   // From `seed` to the end and to the beginning, where `T_map_drive` puts the first ones and the
   // last ones that were found put the next. In the drive's order; left out are those whose place is
@@ -56,15 +60,16 @@ class ScanFollower {
                 const std::vector<std::size_t>& order,
                 const LevelTransform& T_map_drive,
                 std::vector<FollowedScan>& followed);
-  Result<LocatedScan> LocateNear(const DriveScan& scan, const Pose& T_map_sensor);
+  Result<LocalizationResult> LocateNear(const DriveScan& scan, const Pose& T_map_sensor);
   Result<bool> IsOffGround(const Pose& T_map_sensor) const;
   Result<bool> IsMapped(const Pose& T_map_sensor, double slack_m) const;
   bool IsNear(const Pose& found, const Pose& expected, double slack_m) const;
 
   FollowOptions options_;
   double mount_m_;  // of the sensor, above the ground
+  ScanSource source_;
   MapView* view_;
-  std::unique_ptr<ScanLocalizer> localizer_;
+  std::unique_ptr<Localizer> localizer_;
 };
 
 }  // namespace atlas

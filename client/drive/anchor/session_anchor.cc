@@ -112,8 +112,8 @@ Status CheckPrior(const SessionScans& session,
 // The whole map, read when it is needed first.
 class Map {
  public:
-  Map(const DriveSurvey& survey, const AnchorOptions& options, AtlasClient& client)
-      : survey_(survey), options_(options), client_(client), source_(client), view_(source_) {}
+  Map(const AnchoredDrive& drive, const AnchorOptions& options, AtlasClient& client)
+      : drive_(drive), options_(options), client_(client), source_(client), view_(source_) {}
 
   Result<SessionAnchor> Anchor(const SessionScans& session) {
     if (Status status = Read(); !status.ok()) return Error(std::move(status));
@@ -159,13 +159,13 @@ class Map {
     // What is not fused in time, damaged tiles among it, is left out.
     const auto fused = client_.WaitUntilFused(kPatience);
     if (!fused && fused.error().code() != StatusCode::kTimeout) return fused.error();
-    auto anchoring = PartAnchoring::Create(survey_, view_, options_);
+    auto anchoring = PartAnchoring::Create(drive_.survey, drive_.motion, view_, options_);
     if (!anchoring) return anchoring.error();
     anchoring_.emplace(*std::move(anchoring));
     return {};
   }
 
-  const DriveSurvey& survey_;
+  const AnchoredDrive& drive_;
   const AnchorOptions& options_;
   AtlasClient& client_;
   DaemonSource source_;
@@ -182,7 +182,7 @@ Result<std::vector<SessionAnchor>> AnchorSessions(const AnchoredDrive& drive,
   if (sessions.empty()) return std::vector<SessionAnchor>();
   const auto stored = client.ListSessions(sessions.front().key.vehicle);
   if (!stored) return Error(stored.error());
-  Map map(drive.survey, options, client);
+  Map map(drive, options, client);
   std::vector<SessionAnchor> anchors;
   for (const SessionScans& session : sessions) {
     const auto known = std::find_if(stored->begin(), stored->end(),

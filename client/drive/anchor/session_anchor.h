@@ -15,7 +15,8 @@ namespace atlas {
 struct AnchoredDrive {
   const DriveFolder& drive;
   const DriveSurvey& survey;
-  double start_s = 0.0;  // added to the scans' times
+  double start_s = 0.0;          // added to the scans' times
+  MotionDuringScan motion = {};  // as its keyframes are deskewed; may be empty
 };
 
 // A part of the drive, and its scans in their order, not empty.

@@ -294,6 +294,20 @@ TEST_F(AnchorTest, ADriveOfWhichAPartIsOffStaysOut) {
   }
 }
 
+// Scans are matched as keyframes are made of them. These are not skewed, so that it spoils both.
+TEST_F(AnchorTest, WhatIsDeskewedIsMatchedDeskewed) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  Map(daemon, shared_root / "street");
+  const auto off_m = [&](const std::string& deskew) {
+    const CommandRun run = Anchor(daemon, shared_root / "moved",
+                                  {"--staged", "--deskew", deskew, "--session", deskew});
+    return AnchorOf(run).at("rms_m").to_number<double>();
+  };
+  EXPECT_LT(off_m("off"), 0.02);
+  EXPECT_LT(off_m("auto"), 0.02);
+  EXPECT_GT(off_m("on"), 0.04);
+}
+
 // A merge bends it; the daemon would take the next scan for an impossible step.
 TEST_F(AnchorTest, ASessionThatWasCorrectedIsNotGoneOnWith) {
   const DaemonProcess daemon(NewData(), kSmall);
