@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "client/drive/drive_selection.h"
+#include "core/geometry/motion_share.h"
 #include "core/localization/scan_clock.h"
 
 namespace atlas {
@@ -13,15 +14,6 @@ std::optional<double> Interval_s(const DriveScan& a, const DriveScan& b) {
     return std::nullopt;
   }
   return *b.time_s - *a.time_s;
-}
-
-// So much of a motion, at an even pace.
-Pose ShareOf(const Pose& motion, double share) {
-  const Eigen::AngleAxisd turn(motion.linear());
-  Pose part = Pose::Identity();
-  part.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
-  part.translation() = share * motion.translation();
-  return part;
 }
 
 }  // namespace

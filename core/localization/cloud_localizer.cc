@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/geometry/motion_share.h"
 #include "core/keyframe/keyframe_builder.h"
 
 namespace atlas {
@@ -35,13 +36,7 @@ std::optional<Pose> CloudLocalizer::DuringRevolution() const {
   if (!options_.revolutions) {
     return std::nullopt;
   }
-  const Pose T_now_later = localizer_.T_now_later();
-  const Eigen::AngleAxisd turn(T_now_later.linear());
-  Pose during = Pose::Identity();
-  during.linear() =
-      Eigen::AngleAxisd(turn.angle() / *options_.revolutions, turn.axis()).toRotationMatrix();
-  during.translation() = T_now_later.translation() / *options_.revolutions;
-  return during;
+  return ShareOf(localizer_.T_now_later(), 1.0 / *options_.revolutions);
 }
 
 }  // namespace atlas

@@ -38,10 +38,6 @@ double Degrees(double rad) {
   return rad * 180.0 / std::numbers::pi;
 }
 
-double InThousandths(double value) {
-  return std::round(value * 1e3) / 1e3;
-}
-
 }  // namespace
 
 FrameFit MeasureFrame(std::span<const FollowedScan> scans, const LevelTransform& T_map_drive) {

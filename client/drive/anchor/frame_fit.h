@@ -2,6 +2,7 @@
 // that lie worst, for a drive that fits nearly everywhere is as wrong as any where it does not.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -10,11 +11,11 @@
 
 namespace atlas {
 
-// A scan whose place is mapped, by the transform.
+// A scan of a drive, where the drive and the map have it.
 struct FollowedScan {
   std::size_t index = 0;  // in the drive
   bool is_found = false;  // else it is lost there, or elsewhere
-  double fit = 0.0;       // to the map, if it is found: LocatedScan
+  double fit = 0.0;       // to the map, if it is found, as of RegistrationResult
   FoundScan scan;
 };
 
@@ -37,7 +38,7 @@ struct FrameLimits {
   double worst_rms_m = 0.0;
   double worst_rms_rad = 0.0;
   std::size_t longest_astray = 0;
-  std::size_t found_per_astray = 1;  // one more than one for each so many that were found
+  std::size_t found_per_astray = 1;  // astray may be one, and one more for so many that are found
 };
 
 // `scans` in the order of the drive.
@@ -45,5 +46,10 @@ FrameFit MeasureFrame(std::span<const FollowedScan> scans, const LevelTransform&
 
 // What exceeds the limits, for people; empty: nothing does.
 std::string WhyBeyond(const FrameFit& fit, const FrameLimits& limits);
+
+// As errors tell it.
+inline double InThousandths(double value) {
+  return std::round(value * 1e3) / 1e3;
+}
 
 }  // namespace atlas

@@ -43,11 +43,6 @@ std::vector<std::size_t> Scattered(const std::vector<std::size_t>& spread) {
 constexpr std::string_view kForMerge =
     "; if its own poses drift, atlas-merge run aligns sessions that are staged";
 
-// For people.
-double InThousandths(double value) {
-  return std::round(value * 1e3) / 1e3;
-}
-
 }  // namespace
 
 // Scans that were looked for in the whole map.

@@ -48,8 +48,7 @@ class ScanFollower {
   // From `seed` to the end and to the beginning, where `T_map_drive` puts the first ones and the
   // last ones that were found put the next. In the drive's order; left out are those whose place is
   // not mapped, as far as that is known, and those that are weak where they are expected, on the
-  // ground. Errors
-  // are those of the scans and of the view.
+  // ground. Errors are those of the scans and of the view.
   Result<std::vector<FollowedScan>> Follow(PartScans scans,
                                            std::size_t seed,
                                            const LevelTransform& T_map_drive);

@@ -135,8 +135,7 @@ class Map {
     };
     if (begun.bent_m > kOneFrame_m) {
       return refused(StrCat(" was corrected since it was begun: its keyframes lie up to ",
-                            std::round(begun.bent_m * 1e3) / 1e3,
-                            " m from where one frame puts them"));
+                            InThousandths(begun.bent_m), " m from where one frame puts them"));
     }
     if (options_.is_rest_accepted) return {};
     ATLAS_RETURN_IF_ERROR(Read());
