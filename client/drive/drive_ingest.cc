@@ -60,7 +60,7 @@ Status CheckMayUpload(const AtlasIdentity& atlas, const std::string& vehicle) {
 class Ingest {
  public:
   Ingest(const DriveFolder& drive, const IngestOptions& options)
-      : drive_(drive), options_(options), motion_(drive) {
+      : drive_(drive), options_(options), motion_(drive, options.deskew.revolution_s) {
     for (const DriveScan& scan : drive.scans) {
       poses_.push_back(scan.T_world_sensor);
     }
@@ -68,12 +68,13 @@ class Ingest {
 
   Status Prepare(const MapProfile& profile) {
     ATLAS_RETURN_IF_ERROR(options_.Validate());
+    ATLAS_RETURN_IF_ERROR(options_.deskew.Validate(drive_));
     ATLAS_RETURN_IF_ERROR(Select());
     ATLAS_RETURN_IF_ERROR(CheckScans());
     Result<DriveSurvey> survey = SurveyDrive(drive_, SurveyOptionsFor(options_));
     if (!survey) return survey.error();
     survey_ = *std::move(survey);
-    const auto deskewing = DecideDeskewing(options_.deskewing, drive_, survey_);
+    const auto deskewing = DecideDeskewing(options_.deskew.deskewing, drive_, survey_, motion_);
     if (!deskewing) return deskewing.error();
     report_.deskewing = *deskewing;
     KeyframeBuilderOptions builder_options;
@@ -94,8 +95,8 @@ class Ingest {
     const auto motion = [this](const DriveScan& scan) {
       return MotionOf(static_cast<std::size_t>(&scan - drive_.scans.data()));
     };
-    auto anchors = AnchorSessions({drive_, survey_, options_.start_s, motion}, sessions_,
-                                  *options_.anchor, client);
+    auto anchors = AnchorSessions({drive_, survey_, options_.start_s, motion, options_.positions},
+                                  sessions_, *options_.anchor, client);
     if (!anchors) return anchors.error();
     report_.anchors = *std::move(anchors);
     for (const SessionAnchor& anchor : report_.anchors) {
@@ -271,6 +272,7 @@ class Ingest {
 Status IngestOptions::Validate() const {
   ATLAS_RETURN_IF_ERROR(session.Validate());
   ATLAS_RETURN_IF_ERROR(SurveyOptionsFor(*this).Validate());
+  ATLAS_RETURN_IF_ERROR(deskew.Validate());
   if (anchor) ATLAS_RETURN_IF_ERROR(anchor->Validate());
   if (!(selection.every_m >= 0.0)) {
     return {StatusCode::kInvalidArgument,

@@ -26,7 +26,7 @@ struct IngestOptions {
   std::optional<std::uint32_t> rings;
   double max_range_m = 20.0;
   std::optional<double> sensor_height_m;
-  Deskewing deskewing = Deskewing::kOff;  // by the drive's own motion
+  DeskewOptions deskew;    // by the drive's own motion
   bool is_staged = false;  // its sessions stay out of the map until somebody publishes them
   // The drive has a frame of its own, and is found in the atlas first. A part that is not, is
   // uploaded staged, in its own frame. None: its frame is the atlas's.

@@ -1,5 +1,6 @@
 #include "client/drive/drive_localization.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -178,18 +179,22 @@ SurveyOptions SurveyOptionsFor(const DriveLocalizationOptions& options) {
 }
 
 // From one scan that is used to the next.
-double RevolutionsBetween(ScanParity parity) {
-  return parity == ScanParity::kAll ? 1.0 : 2.0;
+double RevolutionsBetween(const DriveFolder& drive, const DriveLocalizationOptions& options) {
+  const auto& revolution_s = options.deskew.revolution_s;
+  if (!revolution_s) return options.selection.parity == ScanParity::kAll ? 1.0 : 2.0;
+  const auto interval_s = UsualIntervalOf(drive, SelectScans(drive, options.selection));
+  return std::max(1.0, interval_s.value_or(*revolution_s) / *revolution_s);
 }
 
-Result<std::unique_ptr<ScanLocalizer>> MakeLocalizer(const DriveSurvey& survey,
+Result<std::unique_ptr<ScanLocalizer>> MakeLocalizer(const DriveFolder& drive,
+                                                     const DriveSurvey& survey,
                                                      const DriveLocalizationOptions& options,
                                                      bool is_deskewed,
                                                      MapView& view) {
   if (options.mode == LocalizationMode::kPaper) {
     return MakePaperLocalizer(survey, options.range_m(), view);
   }
-  const double revolutions = RevolutionsBetween(options.selection.parity);
+  const double revolutions = RevolutionsBetween(drive, options);
   return MakeAtlasLocalizer(survey, options.range_m(), view,
                             is_deskewed ? std::optional(revolutions) : std::nullopt,
                             ListenerOf(options.monitor));
@@ -203,7 +208,8 @@ Status DriveLocalizationOptions::Validate() const {
     return {StatusCode::kInvalidArgument,
             StrCat("maximum range ", range_m(), " m: expected 1 to 200")};
   }
-  if (deskewing != Deskewing::kOff && (shots || mode == LocalizationMode::kPaper)) {
+  ATLAS_RETURN_IF_ERROR(deskew.Validate());
+  if (deskew.deskewing != Deskewing::kOff && (shots || mode == LocalizationMode::kPaper)) {
     return {StatusCode::kInvalidArgument,
             "deskewing goes by the motion of the scans before: not of single shots, nor in mode "
             "paper"};
@@ -241,14 +247,16 @@ Result<DriveLocalizationReport> LocalizeDrive(
     MapView& view,
     const std::function<void(const LocalizedScan&)>& on_scan) {
   if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
+  if (Status status = options.deskew.Validate(drive); !status.ok()) return Error(std::move(status));
   const SurveyOptions survey_options = SurveyOptionsFor(options);
   const Result<DriveSurvey> survey = options.mode == LocalizationMode::kPaper
                                          ? SurveyDrive(drive, survey_options)
                                          : SurveySensor(drive, survey_options);
   if (!survey) return Error(survey.error());
-  const auto deskewing = DecideDeskewing(options.deskewing, drive, *survey);
+  const auto deskewing = DecideDeskewing(options.deskew.deskewing, drive, *survey,
+                                         DriveMotion(drive, options.deskew.revolution_s));
   if (!deskewing) return Error(deskewing.error());
-  const auto localizer = MakeLocalizer(*survey, options, deskewing->is_deskewed, view);
+  const auto localizer = MakeLocalizer(drive, *survey, options, deskewing->is_deskewed, view);
   if (!localizer) return Error(localizer.error());
   auto report = LocalizeDrive(drive, options, **localizer, on_scan);
   if (report) report->deskewing = *deskewing;

@@ -41,9 +41,9 @@ struct DriveLocalizationOptions {
   LocalizationMode mode = LocalizationMode::kAtlas;
   SelectionOptions selection;
   std::optional<std::uint32_t> rings;
-  std::optional<double> max_range_m;      // 100 m; the paper's: 40 m
-  Deskewing deskewing = Deskewing::kOff;  // by the predicted motion: not for single shots
-  std::optional<Shots> shots;             // tracking, if not given
+  std::optional<double> max_range_m;  // 100 m; the paper's: 40 m
+  DeskewOptions deskew;               // by the predicted motion: not for single shots
+  std::optional<Shots> shots;         // tracking, if not given
   std::uint64_t seed = 0;
   bool is_restarted = true;        // tracking is told where it is after a jump
   std::optional<ToldStart> start;  // else it is told without an error, and has it for a hint

@@ -18,14 +18,16 @@ std::optional<double> Interval_s(const DriveScan& a, const DriveScan& b) {
 
 }  // namespace
 
-DriveMotion::DriveMotion(const DriveFolder& drive) : drive_(drive) {
+DriveMotion::DriveMotion(const DriveFolder& drive, std::optional<double> revolution_s)
+    : drive_(drive), revolution_s_(revolution_s) {
+  if (revolution_s_) return;
   std::vector<double> intervals_s;
   for (std::size_t i = 1; i < drive.scans.size(); ++i) {
     if (const auto interval_s = Interval_s(drive.scans[i - 1], drive.scans[i])) {
       intervals_s.push_back(*interval_s);
     }
   }
-  if (!intervals_s.empty()) usual_s_ = UsualInterval_s(intervals_s);
+  if (!intervals_s.empty()) revolution_s_ = UsualInterval_s(intervals_s);
 }
 
 std::optional<Pose> DriveMotion::Between(std::size_t from, std::size_t to) const {
@@ -36,8 +38,8 @@ std::optional<Pose> DriveMotion::Between(std::size_t from, std::size_t to) const
   const bool is_neighbour = b.number == a.number + 1;
   if (!is_neighbour || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
   const auto interval_s = Interval_s(a, b);
-  const bool is_longer = usual_s_ && interval_s && *interval_s > kMissing * *usual_s_;
-  return is_longer ? ShareOf(T_a_b, *usual_s_ / *interval_s) : T_a_b;
+  const bool is_longer = revolution_s_ && interval_s && *interval_s > kMissing * *revolution_s_;
+  return is_longer ? ShareOf(T_a_b, *revolution_s_ / *interval_s) : T_a_b;
 }
 
 Pose DriveMotion::During(std::size_t index) const {

@@ -7,7 +7,6 @@
 #include <set>
 #include <vector>
 
-#include "client/drive/drive_motion.h"
 #include "core/base/str_cat.h"
 #include "core/keyframe/keyframe_builder.h"
 #include "core/scan/scan_reader.h"
@@ -71,13 +70,38 @@ class Structure {
 
 }  // namespace
 
+Status DeskewOptions::Validate() const {
+  if (!revolution_s) return {};
+  if (deskewing == Deskewing::kOff) {
+    return {StatusCode::kInvalidArgument,
+            "a revolution (--revolution) is for deskewing (--deskew)"};
+  }
+  if (!(*revolution_s >= 0.01 && *revolution_s <= 2.0)) {
+    return {StatusCode::kInvalidArgument,
+            StrCat("a revolution of ", *revolution_s, " s: expected 0.01 to 2")};
+  }
+  return {};
+}
+
+Status DeskewOptions::Validate(const DriveFolder& drive) const {
+  ATLAS_RETURN_IF_ERROR(Validate());
+  const bool is_timed = std::all_of(drive.scans.begin(), drive.scans.end(),
+                                    [](const DriveScan& scan) { return scan.time_s.has_value(); });
+  if (revolution_s && !is_timed) {
+    return {StatusCode::kInvalidArgument,
+            StrCat(drive.path.string(),
+                   ": what share of the way a revolution takes (--revolution) needs times.txt")};
+  }
+  return {};
+}
+
 Result<DriveSkew> FindSkew(const DriveFolder& drive,
                            const DriveSurvey& survey,
+                           const DriveMotion& motion,
                            const SkewOptions& options) {
   DriveSkew skew;
   std::size_t as_they_are = 0;
   std::size_t deskewed = 0;
-  const DriveMotion motion(drive);
   for (const Window& window : FastWindows(drive, motion, options)) {
     Structure raw(options);
     Structure undone(options);
@@ -110,9 +134,10 @@ Result<DriveSkew> FindSkew(const DriveFolder& drive,
 
 Result<DeskewDecision> DecideDeskewing(Deskewing deskewing,
                                        const DriveFolder& drive,
-                                       const DriveSurvey& survey) {
+                                       const DriveSurvey& survey,
+                                       const DriveMotion& motion) {
   if (deskewing != Deskewing::kAuto) return DeskewDecision{deskewing == Deskewing::kOn};
-  const auto skew = FindSkew(drive, survey);
+  const auto skew = FindSkew(drive, survey, motion);
   if (!skew) return Error(skew.error());
   return DeskewDecision{skew->is_skewed, *skew};
 }

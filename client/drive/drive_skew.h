@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "client/drive/drive_motion.h"
 #include "client/drive/drive_survey.h"
 #include "core/base/status.h"
 #include "core/scan/drive_folder.h"
@@ -14,6 +15,17 @@
 namespace atlas {
 
 enum class Deskewing { kOff, kOn, kAuto };  // auto: where a drive is found to be skewed
+
+struct DeskewOptions {
+  Deskewing deskewing = Deskewing::kOff;
+  // The sensor turns once in so long. Not known: as long as two scans are apart as a rule.
+  std::optional<double> revolution_s = {};
+
+  // kInvalidArgument naming the first option out of range.
+  Status Validate() const;
+  // Too: with a revolution times are needed.
+  Status Validate(const DriveFolder& drive) const;
+};
 
 struct SkewOptions {
   std::size_t windows = 8;  // of consecutive scans, the fastest ones
@@ -25,7 +37,7 @@ struct SkewOptions {
   // Deskewed, the structure of skewed scans takes so much fewer voxels, and not in one window alone
   // (docs/results.md).
   double min_sharper = 0.01;
-  double min_agreeing = 0.8;  // of the windows
+  double min_agreeing = 0.75;  // of the windows
 };
 
 struct DriveSkew {
@@ -38,15 +50,18 @@ struct DriveSkew {
 // A function of the folder alone, not of which scans are used. Fails on a scan that cannot be read.
 Result<DriveSkew> FindSkew(const DriveFolder& drive,
                            const DriveSurvey& survey,
+                           const DriveMotion& motion,
                            const SkewOptions& options = {});
 
 struct DeskewDecision {
   bool is_deskewed = false;
   std::optional<DriveSkew> skew = {};  // what it was decided by, where that was asked for
 };
+// `motion` of the drive.
 Result<DeskewDecision> DecideDeskewing(Deskewing deskewing,
                                        const DriveFolder& drive,
-                                       const DriveSurvey& survey);
+                                       const DriveSurvey& survey,
+                                       const DriveMotion& motion);
 // "on", "off", "auto".
 Result<Deskewing> ParseDeskewing(const std::string& text);
 

@@ -17,8 +17,9 @@ struct CloudLocalizerOptions {
   LocalizerOptions localizer;
   int ring_step = 1;  // use every ring_step-th channel from the lowest
   // How many revolutions the sensor makes from one scan to the next: scans are deskewed by the
-  // predicted motion. None: they are taken as they are, which is right for those that are
-  // deskewed.
+  // predicted motion, and places are less sure as that is: the first two scans of a vehicle that
+  // drives when it starts are some decimetres off. None: they are taken as they are, which is right
+  // for those that are deskewed.
   std::optional<double> revolutions;
 };
 
@@ -44,6 +45,7 @@ class CloudLocalizer {
 
  private:
   std::optional<Pose> DuringRevolution() const;
+  PoseCovariance Blur() const;
 
   SensorLayout layout_;
   CloudLocalizerOptions options_;

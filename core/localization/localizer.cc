@@ -5,9 +5,28 @@
 #include <numeric>
 #include <utility>
 
+#include "core/geometry/motion_share.h"
 #include "core/localization/place_score.h"
+#include "core/scan/deskew.h"
 
 namespace atlas {
+namespace {
+
+// During a revolution: less moves returns at 20 m by 5 cm at most.
+bool IsFelt(const Pose& motion) {
+  constexpr double kLeast_m = 0.05;
+  constexpr double kLeast_rad = 0.005;
+  return motion.translation().norm() > kLeast_m ||
+         Eigen::AngleAxisd(motion.linear()).angle() > kLeast_rad;
+}
+
+// How far is looked, and there was anything to see.
+double ReachOf(const LeveledScan& scan, float max_range_m) {
+  const auto furthest = std::max_element(scan.range_m.begin(), scan.range_m.end());
+  return furthest == scan.range_m.end() ? 0.0F : std::min(*furthest, max_range_m);
+}
+
+}  // namespace
 
 Localizer::Localizer(const MapProfile& profile,
                      TilesAround tiles,
@@ -34,23 +53,67 @@ void Localizer::Start(const Pose& T_world_sensor, const StartKnowledge& known) {
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
                                                const Eigen::Quaterniond& R_level_sensor,
                                                double scans) {
-  const ScanFeatures& features = features_.Extract(scan);
+  if (Status status = Expect(scan, R_level_sensor, scans); !status.ok()) {
+    return Error(std::move(status));
+  }
+  return Find(scan, R_level_sensor);
+}
+
+Result<LocalizationResult> Localizer::LocalizeDeskewed(LeveledScan& scan,
+                                                       const Eigen::Quaterniond& R_level_sensor,
+                                                       double scans,
+                                                       double revolutions) {
+  if (Status status = Expect(scan, R_level_sensor, scans); !status.ok()) {
+    return Error(std::move(status));
+  }
+  Sharpen(scan, R_level_sensor, revolutions);
+  return Find(scan, R_level_sensor);
+}
+
+void Localizer::Sharpen(LeveledScan& scan,
+                        const Eigen::Quaterniond& R_level_sensor,
+                        double revolutions) {
+  constexpr int kTimes = 3;
+  PlaceTracker& tracker = places_.front().tracker;
+  Pose taken = tracker.T_now_later();
+  auto seen = tracker.MotionSeen(features_.Extract(scan));
+  for (int time = 0; seen && time < kTimes; ++time) {
+    const Pose rest = ShareOf(taken.inverse() * seen->T_now_later, 1.0 / revolutions);
+    if (!IsFelt(rest)) return;
+    deskewed_ = scan;
+    Deskew(deskewed_, R_level_sensor, rest);
+    const auto better = tracker.MotionSeen(features_.Extract(deskewed_));
+    if (!better || better->fit <= seen->fit) return;
+    std::swap(scan, deskewed_);
+    taken = seen->T_now_later;
+    seen = better;
+  }
+}
+
+Status Localizer::Expect(const LeveledScan& scan,
+                         const Eigen::Quaterniond& R_level_sensor,
+                         double scans) {
   for (SupposedPlace& place : places_) place.tracker.Expect(scans);
   std::vector<SupposedPlace> found;
   if (IsLookedFor()) {
     auto looked = Look(scan, R_level_sensor);
-    if (!looked) return Error(looked.error());
+    if (!looked) return looked.error();
     found = *std::move(looked);
   }
   for (std::vector<SupposedPlace>* places : {&places_, &found}) {
     for (SupposedPlace& place : *places) {
-      if (Status status = place.tracker.Prepare(); !status.ok()) return Error(std::move(status));
+      ATLAS_RETURN_IF_ERROR(place.tracker.Prepare());
     }
   }
   std::move(found.begin(), found.end(), std::back_inserter(places_));
-  Follow(features, R_level_sensor);
+  return {};
+}
+
+LocalizationResult Localizer::Find(const LeveledScan& scan,
+                                   const Eigen::Quaterniond& R_level_sensor) {
+  Follow(features_.Extract(scan), R_level_sensor);
   LocalizationResult result = places_.front().result;
-  const double reach_m = options_.features.max_range_m;
+  const double reach_m = ReachOf(scan, options_.features.max_range_m);
   if (reach_m < options_.min_good_reach_m && result.health == LocalizationHealth::kGood) {
     result.health = LocalizationHealth::kWeak;
   }

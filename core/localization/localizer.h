@@ -26,9 +26,9 @@ struct LocalizerOptions {
   FeatureOptions features;
   PlaceTrackerOptions tracker;
 
-  // Whose features reach no further than this is weak at best: decks and straight roads look alike
-  // then. Of two simulated drives 40 of 216 scans (10 m) and 34 of 242 (15 m) fitted well where
-  // they were not, from 20 m on none.
+  // Whose features, or whose scan, reach no further than this is weak at best: decks and straight
+  // roads look alike then. Of two simulated drives 40 of 216 scans (10 m) and 34 of 242 (15 m)
+  // fitted well where they were not, from 20 m on none.
   double min_good_reach_m = 20.0;
 
   // Lost or in doubt for so many scans, or adrift this far, it is looked for in the whole map, and
@@ -76,6 +76,8 @@ class Localizer {
   // How the sensor is taken to move from one scan to the next, in its own frame: what scans are to
   // be deskewed by. Identity as long as nothing is known of it.
   Pose T_now_later() const { return places_.front().tracker.T_now_later(); }
+  // How uncertain that is: of (x, y, z, yaw), along the world's axes.
+  PoseCovariance MotionCovariance() const { return places_.front().tracker.MotionCovariance(); }
 
   // Requires Start(). `scan` is levelled by `R_level_sensor` and comes `scans` times the usual time
   // after the last one: some may be missing (ScanClock). Errors are those of the tiles' and the
@@ -83,6 +85,13 @@ class Localizer {
   Result<LocalizationResult> Localize(const LeveledScan& scan,
                                       const Eigen::Quaterniond& R_level_sensor,
                                       double scans = 1.0);
+  // Of a scan that was deskewed by T_now_later() over `revolutions`, of which the sensor makes so
+  // many from one scan to the next: `scan` is deskewed again by the motion that it shows, as often
+  // as it fits the better so.
+  Result<LocalizationResult> LocalizeDeskewed(LeveledScan& scan,
+                                              const Eigen::Quaterniond& R_level_sensor,
+                                              double scans,
+                                              double revolutions);
 
  private:
   // Where it may be.
@@ -96,6 +105,9 @@ class Localizer {
   };
 
   PlaceTracker NewTracker() const;
+  Status Expect(const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor, double scans);
+  void Sharpen(LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor, double revolutions);
+  LocalizationResult Find(const LeveledScan& scan, const Eigen::Quaterniond& R_level_sensor);
   bool IsLookedFor() const;
   // Places in the whole map where the scan may have been taken.
   Result<std::vector<SupposedPlace>> Look(const LeveledScan& scan,
@@ -123,6 +135,7 @@ class Localizer {
   TilesAround tiles_;
   LocalizerOptions options_;
   FeatureExtractor features_;
+  LeveledScan deskewed_;  // kept for its memory
   RelocalizerSource relocalizer_;
   // The first is the one that is told of: where it was tracked to. Others are while it is astray.
   std::vector<SupposedPlace> places_;

@@ -78,8 +78,8 @@ Pose MotionModel::T_now_later() const {
   return T_now_later;
 }
 
-PoseCovariance MotionModel::StepCovariance() const {
-  const Eigen::Matrix4d by_motion = PlaceByMotion(last_, since_);
+PoseCovariance MotionModel::CovarianceOfStep(const Pose& from, double scans) const {
+  const Eigen::Matrix4d by_motion = PlaceByMotion(from, scans);
   return by_motion * covariance_.bottomRightCorner<4, 4>() * by_motion.transpose();
 }
 

@@ -68,9 +68,11 @@ class MotionModel {
     return PoseDifference(last_, T_world_sensor);
   }
   // How uncertain that step is, by what is known of the motion.
-  PoseCovariance StepCovariance() const;
+  PoseCovariance StepCovariance() const { return CovarianceOfStep(last_, since_); }
   // From one scan to the next, as it is known: identity while nothing is.
   Pose T_now_later() const;
+  // How uncertain that is: of (x, y, z, yaw) of it, along the world's axes.
+  PoseCovariance MotionCovariance() const { return CovarianceOfStep(pose_, 1.0); }
   PoseCovariance covariance() const { return covariance_.topLeftCorner<4, 4>(); }
 
  private:
@@ -78,6 +80,7 @@ class MotionModel {
 
   // What a change of the motion makes of the place so many scans later.
   Eigen::Matrix4d PlaceByMotion(const Pose& from, double scans) const;
+  PoseCovariance CovarianceOfStep(const Pose& from, double scans) const;
 
   MotionOptions options_;
   Pose pose_ = Pose::Identity();

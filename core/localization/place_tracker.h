@@ -158,6 +158,7 @@ class PlaceTracker {
   // How the sensor is taken to move from one scan to the next, in its own frame. Identity as long
   // as nothing is known of it.
   Pose T_now_later() const { return motion_.T_now_later(); }
+  PoseCovariance MotionCovariance() const { return motion_.MotionCovariance(); }
 
   // The next scan comes after so many times the usual time between two, and after those that were
   // expected and not tracked, for want of a map. Before all that asks for it.
@@ -171,6 +172,13 @@ class PlaceTracker {
   // Has the map that the next scan needs. Errors are those of the tiles' source; nothing has
   // changed then.
   Status Prepare();
+  // As the scan at hand shows it, found near where it is expected, T_now_later(); none, where
+  // nothing was known before or it is not found. Requires what Track() does, and changes nothing.
+  struct SeenMotion {
+    Pose T_now_later = Pose::Identity();
+    double fit = 0.0;
+  };
+  std::optional<SeenMotion> MotionSeen(const ScanFeatures& scan);
   // Requires Start() or Suppose(), and Prepare() for each scan. `features` are those of a scan
   // levelled by `R_level_sensor`.
   LocalizationResult Track(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor);
@@ -315,6 +323,7 @@ class PlaceTracker {
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;
+  ScanFeatures thinned_;
 };
 
 }  // namespace atlas

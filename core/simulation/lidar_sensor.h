@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <numbers>
 #include <string_view>
 #include <vector>
 
@@ -19,6 +20,10 @@ struct LidarSensor {
   double range_sigma_m = 0.02;
 
   std::size_t rings() const { return elevations_rad.size(); }
+  double azimuth_rad(std::size_t column) const {
+    constexpr double kTurn = 2.0 * std::numbers::pi;
+    return kTurn * (static_cast<double>(column) + 0.5) / static_cast<double>(columns);
+  }
 };
 
 LidarSensor Vlp16Sensor();

@@ -2,7 +2,6 @@
 #include "core/simulation/scan_caster.h"
 
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "core/base/hash_random.h"
@@ -16,6 +15,24 @@ struct LabelledHit {
   float incidence = 0.0F;
 };
 
+// The sensor while it casts a column.
+struct Origin {
+  Eigen::Matrix3f R_world_sensor;
+  Eigen::Vector3d p_world;
+  Eigen::Vector3f p_traffic;  // in the traffic's own frame
+};
+
+std::vector<Origin> OriginsOf(std::span<const Pose> T_world_sensor, const CastableMesh& traffic) {
+  std::vector<Origin> origins;
+  origins.reserve(T_world_sensor.size());
+  for (const Pose& pose : T_world_sensor) {
+    const Eigen::Vector3d& p_world = pose.translation();
+    origins.push_back(
+        {pose.linear().cast<float>(), p_world, (p_world - traffic.origin_m).cast<float>()});
+  }
+  return origins;
+}
+
 LabelledHit Describe(const WorldHit& hit) {
   const TriangleEdges edges = EdgesOf(hit.part->mesh, hit.hit.triangle);
   const Eigen::Vector3f normal = edges.edge1.cross(edges.edge2).normalized();
@@ -28,8 +45,7 @@ ScanCaster::ScanCaster(LidarSensor sensor) : sensor_(std::move(sensor)) {
   directions_.reserve(sensor_.rings() * sensor_.columns);
   for (const double elevation_rad : sensor_.elevations_rad) {
     for (std::size_t column = 0; column < sensor_.columns; ++column) {
-      const double azimuth_rad = 2.0 * std::numbers::pi * (static_cast<double>(column) + 0.5) /
-                                 static_cast<double>(sensor_.columns);
+      const double azimuth_rad = sensor_.azimuth_rad(column);
       directions_.emplace_back(Eigen::Vector3d(std::cos(elevation_rad) * std::cos(azimuth_rad),
                                                std::cos(elevation_rad) * std::sin(azimuth_rad),
                                                std::sin(elevation_rad))
@@ -40,19 +56,18 @@ ScanCaster::ScanCaster(LidarSensor sensor) : sensor_(std::move(sensor)) {
 
 SimulatedScan ScanCaster::Cast(const WorldParts& still,
                                const CastableMesh& traffic,
-                               const Pose& T_world_sensor,
+                               std::span<const Pose> T_world_sensor,
                                const ScanNoise& noise) const {
   SimulatedScan scan;
   scan.points.reserve(directions_.size());
   scan.labels.reserve(directions_.size());
-  const Eigen::Matrix3f rotation = T_world_sensor.linear().cast<float>();
-  const Eigen::Vector3d& origin_m = T_world_sensor.translation();
-  const Eigen::Vector3f in_traffic = (origin_m - traffic.origin_m).cast<float>();
+  const std::vector<Origin> origins = OriginsOf(T_world_sensor, traffic);
   const auto max_range_m = static_cast<float>(sensor_.max_range_m);
   for (std::size_t i = 0; i < directions_.size(); ++i) {
-    const Eigen::Vector3f direction = rotation * directions_[i];
-    WorldHit nearest = CastWorld(still, origin_m, direction, max_range_m);
-    const MeshRay ray{in_traffic, direction};
+    const Origin& origin = origins[origins.size() == 1 ? 0 : i % sensor_.columns];
+    const Eigen::Vector3f direction = origin.R_world_sensor * directions_[i];
+    WorldHit nearest = CastWorld(still, origin.p_world, direction, max_range_m);
+    const MeshRay ray{origin.p_traffic, direction};
     const MeshHit moving = traffic.bvh.Cast(ray, nearest.hit.distance_m);
     if (moving.is_hit()) {
       nearest = {moving, &traffic, ray};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/geometry/pose.h"
@@ -22,8 +23,8 @@ struct SimulatedPoint {
 // Ring after ring, the lowest first, azimuth increasing from 0 to 2 pi within each; rays without a
 // return are left out.
 struct SimulatedScan {
-  std::vector<SimulatedPoint> points;
-  std::vector<std::uint32_t> labels;  // truth_label.h, one a point
+  std::vector<SimulatedPoint> points;  // each in the sensor's frame as it was cast
+  std::vector<std::uint32_t> labels;   // truth_label.h, one a point
 };
 
 struct ScanNoise {
@@ -36,10 +37,11 @@ class ScanCaster {
  public:
   explicit ScanCaster(LidarSensor sensor);
 
-  // Everything in `traffic` stands still during the scan.
+  // Where the sensor is during the scan: one pose for all of it, or one a column. Everything in
+  // `traffic` stands still. Requires 1 or sensor().columns poses.
   SimulatedScan Cast(const WorldParts& still,
                      const CastableMesh& traffic,
-                     const Pose& T_world_sensor,
+                     std::span<const Pose> T_world_sensor,
                      const ScanNoise& noise) const;
 
   const LidarSensor& sensor() const { return sensor_; }

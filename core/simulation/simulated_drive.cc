@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "core/base/hash_random.h"
 #include "core/base/str_cat.h"
+#include "core/geometry/motion_share.h"
 #include "core/simulation/surface_pose.h"
 
 namespace atlas {
@@ -47,6 +49,11 @@ Status ValidateDrive(const DriveOptions& options) {
   if (!IsWithin(options.scan_interval_s, 0.001, 60.0)) {
     return Status(StatusCode::kInvalidArgument,
                   StrCat("scan interval ", options.scan_interval_s, " s, expected 0.001 to 60"));
+  }
+  if (!IsWithin(options.revolution_s, 0.0, options.scan_interval_s)) {
+    return Status(StatusCode::kInvalidArgument,
+                  StrCat("a revolution of ", options.revolution_s, " s: expected 0 to ",
+                         options.scan_interval_s, ", the time between scans"));
   }
   return ValidateSensor(options.sensor);
 }
@@ -165,8 +172,43 @@ void SimulatedDrive::AddConvoy(const std::vector<DrivePath>& legs, double left_m
   }
 }
 
+// None where another leg lies between.
+std::optional<Pose> SimulatedDrive::Moved(std::size_t from, std::size_t to, double seconds) const {
+  const Stop& a = stops_[from];
+  const Stop& b = stops_[to];
+  if (a.moment.leg != b.moment.leg) return std::nullopt;
+  const Pose motion = a.moment.T_world_sensor.inverse() * b.moment.T_world_sensor;
+  return ShareOf(motion, seconds / (b.time_s - a.time_s));
+}
+
+Pose SimulatedDrive::SensorPoseAfter(std::size_t i, double seconds) const {
+  const bool has_next = i + 1 < scans();
+  std::optional<Pose> moved;
+  if (has_next && seconds >= 0.0) moved = Moved(i, i + 1, seconds);
+  if (!moved && i > 0) moved = Moved(i, i - 1, seconds);
+  if (!moved && has_next) moved = Moved(i, i + 1, seconds);
+  return sensor_pose(i) * moved.value_or(Pose::Identity());
+}
+
+std::vector<Pose> SimulatedDrive::PosesDuring(std::size_t i) const {
+  if (options_.revolution_s == 0.0) return {sensor_pose(i)};
+  std::vector<Pose> poses;
+  for (std::size_t column = 0; column < options_.sensor.columns; ++column) {
+    const double turned = 0.5 * options_.sensor.azimuth_rad(column) / std::numbers::pi;
+    poses.push_back(SensorPoseAfter(i, -(turned - std::round(turned)) * options_.revolution_s));
+  }
+  return poses;
+}
+
+// As far as it may drive on during a scan, too.
 WorldParts SimulatedDrive::PartsAround(std::size_t i) const {
-  return still_->Around(sensor_pose(i).translation(), options_.sensor.max_range_m);
+  const double driven_m =
+      std::max(DrivenIn(i, -0.5 * options_.revolution_s), DrivenIn(i, 0.5 * options_.revolution_s));
+  return still_->Around(sensor_pose(i).translation(), options_.sensor.max_range_m + driven_m);
+}
+
+double SimulatedDrive::DrivenIn(std::size_t i, double seconds) const {
+  return (SensorPoseAfter(i, seconds).translation() - sensor_pose(i).translation()).norm();
 }
 
 // Of the middles of things that a ray may hit.
@@ -178,11 +220,11 @@ SimulatedScan SimulatedDrive::Scan(std::size_t i) const {
   const WorldParts parts = PartsAround(i);
   const Eigen::Vector3d origin = parts.empty() ? sensor_pose(i).translation() : parts[0]->origin_m;
   const CastableMesh traffic = traffic_->MeshAround(stops_[i].moment, TrafficRadius(), origin);
-  return caster_.Cast(parts, traffic, sensor_pose(i), {options_.seed, i});
+  return caster_.Cast(parts, traffic, PosesDuring(i), {options_.seed, i});
 }
 
 SimulatedScan SimulatedDrive::StillScan(std::size_t i, const ScanCaster& caster) const {
-  return caster.Cast(PartsAround(i), {}, sensor_pose(i), {options_.seed, i});
+  return caster.Cast(PartsAround(i), {}, {&sensor_pose(i), 1}, {options_.seed, i});
 }
 
 }  // namespace atlas

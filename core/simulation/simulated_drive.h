@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,10 @@ struct DriveOptions {
   double spacing_m = 1.25;             // between scans, in plan, along the middle of the leg
   double sensor_height_m = 1.8;        // straight above the surface
   double scan_interval_s = 0.25;       // with the spacing: 18 km/h
+  // How long the sensor takes to turn once, clockwise seen from above, while the vehicle drives on:
+  // it looks ahead at the scan's pose, and a return at azimuth a, in (-pi, pi], is measured -a / 2
+  // pi of that after it (core/scan/deskew.h). 0: all of a scan is seen at once.
+  double revolution_s = 0.0;
 };
 
 // What a drive along a trajectory meets. Legs are the pieces of the trajectory, for traffic alone.
@@ -67,6 +72,9 @@ class SimulatedDrive {
   double length_m() const { return length_m_; }  // sum over legs
   // T_world_sensor of scan i. Requires i < scans().
   const Pose& sensor_pose(std::size_t i) const { return stops_[i].moment.T_world_sensor; }
+  // So much later, earlier below 0, on the way to the next scan or from the last one at an even
+  // pace; where the leg ends, as fast as there.
+  Pose SensorPoseAfter(std::size_t i, double seconds) const;
   double time_s(std::size_t i) const { return options_.start_s + stops_[i].time_s; }
   SimulatedScan Scan(std::size_t i) const;
   // What is there all the time, cast by another sensor: no traffic, no cars of this drive.
@@ -91,6 +99,9 @@ class SimulatedDrive {
   Status AddLeg(const DrivePath& path, std::size_t leg, double left_m);
   void AddStop(const DriveMoment& moment);
   void AddConvoy(const std::vector<DrivePath>& legs, double left_m);
+  std::vector<Pose> PosesDuring(std::size_t i) const;
+  std::optional<Pose> Moved(std::size_t from, std::size_t to, double seconds) const;
+  double DrivenIn(std::size_t i, double seconds) const;
   WorldParts PartsAround(std::size_t i) const;
   double TrafficRadius() const;
 

@@ -323,6 +323,70 @@ def told(bin_dir):
     assert alone[0]["wrong"] > 20, "else there is nothing to tell"
     assert alone[1]["wrong"] <= 1 and alone[1]["right"] >= alone[0]["right"]
     assert anchored.returncode == 3 and states == ["staged"]
+    assert started_in_the_middle(bin_dir) == 0
+
+
+def started_in_the_middle(bin_dir):
+    """Scans called good elsewhere, of a vehicle that starts off the map: in an aisle, and in a turn."""
+    elsewhere = 0
+    with tempfile.TemporaryDirectory() as work:
+        atlas = one_deck_mapped(bin_dir, work, 4)
+        for start in (66, 84):
+            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/from{start}", "--seed", "4",
+                            "--range", f"{start}:{start + 70}"], check=True, stdout=subprocess.DEVNULL)
+            done = atlas.call("localize", f"{work}/from{start}", "--no-restart", "--prior-height", 0.3,
+                              "--prior-radius", 0.3).stdout.splitlines()
+            scans = [json.loads(line) for line in done[:-1]]
+            good, wrong = good_and_wrong(scans)
+            print(f"started off the map at scan {start}: {good} of {len(scans)} scans good, {wrong} of them elsewhere; "
+                  f"the last one {scans[-1]['error_m']} m off")
+            elsewhere += wrong
+        assert atlas.stop() == 0
+    return elsewhere
+
+
+def raised_copy(folder, work, scans, up_m):
+    """The drive, of which these scans' poses are so much higher."""
+    copy = pathlib.Path(work) / f"{folder.name}_raised_{scans.start}_{up_m}"
+    copy.mkdir()
+    for name in ("velodyne", "times.txt"):
+        (copy / name).symlink_to((folder / name).resolve())
+    lines = []
+    for scan, line in enumerate((folder / "poses.txt").read_text().splitlines()):
+        numbers = line.split()
+        numbers[11] = repr(float(numbers[11]) + (up_m if scan in scans else 0.0))
+        lines.append(" ".join(numbers) + "\n")
+    (copy / "poses.txt").write_text("".join(lines))
+    return copy
+
+
+def decks(bin_dir):
+    """A drive through a garage of which a part is one deck too high, where each of its scans fits, too; and positions,
+    that say on which deck it was."""
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        for seed in (0, 4):
+            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed),
+                            "--gnss", "0.5"], check=True, stdout=subprocess.DEVNULL)
+        atlas.run("ingest", f"{work}/0")
+        atlas.run("wait")
+        drive_4 = pathlib.Path(work) / "4"
+        for part, up_m in ((range(76, 96), 3.2), (range(12), -3.2)):
+            done = atlas.call("ingest", raised_copy(drive_4, work, part, up_m), "--anchor")
+            print(f"scans {part} {up_m} m higher: {json.loads(done.stdout)['anchors'][0]}")
+            assert done.returncode == 3
+        # On one deck alone scans do not tell which; positions do, and are not to be believed blindly.
+        some = (drive_4, "--anchor", "--staged", "--range", "66:108")
+        (pathlib.Path(work) / "elsewhere.txt").write_text("66 100 100 100 1\n")
+        known = {}
+        for name, positions in {"none": (), "right": ("--positions", drive_4 / "positions.txt"),
+                                "wrong": ("--positions", f"{work}/elsewhere.txt")}.items():
+            done = atlas.call("ingest", *some, *positions, "--session", name)
+            known[name] = json.loads(done.stdout)["anchors"][0]
+            print(f"one deck, positions {name}: {done.returncode}, {known[name]}")
+        assert atlas.stop() == 0
+    assert known["right"]["anchored"] and known["right"]["off_positions_m"] < 1.0
+    assert not known["wrong"]["anchored"]
 
 
 def ground(bin_dir):
@@ -483,7 +547,7 @@ def main():
             finally:
                 assert atlas.stop() == 0
     else:
-        {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped, "told": told,
+        {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped, "told": told, "decks": decks,
          "segmentation": segmentation, "order": order, "ground": ground, "street": street}[name](bin_dir)
 
 

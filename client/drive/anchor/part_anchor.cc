@@ -40,6 +40,25 @@ std::vector<std::size_t> Scattered(const std::vector<std::size_t>& spread) {
   return scattered;
 }
 
+std::vector<FoundScan> ScansOf(const std::vector<AnchorGuess>& guesses) {
+  std::vector<FoundScan> scans;
+  for (const AnchorGuess& guess : guesses) {
+    scans.push_back(guess.scan);
+  }
+  return scans;
+}
+
+// Where they put the drive's ends.
+bool AreBeside(const LevelTransform& a, const LevelTransform& b, PartScans scans) {
+  constexpr double kBeside_m = 1.0;
+  const Pose T_b_a = b.ToPose().inverse() * a.ToPose();
+  const auto is_moved = [&](const DriveScan* scan) {
+    const Eigen::Vector3d& p = scan->T_world_sensor.translation();
+    return (T_b_a * p - p).norm() >= kBeside_m;
+  };
+  return !is_moved(scans.front()) && !is_moved(scans.back());
+}
+
 constexpr std::string_view kForMerge =
     "; if its own poses drift, atlas-merge run aligns sessions that are staged";
 
@@ -70,16 +89,19 @@ Status AnchorOptions::Validate() const {
 
 PartAnchoring::PartAnchoring(const DriveSurvey& survey,
                              const ScanSource& source,
+                             KnownPlaces positions,
                              MapView& view,
                              std::shared_ptr<const PlaceIndex> places,
                              const AnchorOptions& options)
     : source_(source),
+      positions_(std::move(positions)),
       options_(options),
       relocalizer_(view.profile(), std::move(places), TilesOf(view), OptionsOfRelocalizer()),
       follower_(survey, source, view, options.follow) {}
 
 Result<PartAnchoring> PartAnchoring::Create(const DriveSurvey& survey,
                                             const MotionDuringScan& motion,
+                                            const KnownPlaces& positions,
                                             MapView& view,
                                             const AnchorOptions& options) {
   if (Status status = options.Validate(); !status.ok()) return Error(std::move(status));
@@ -90,14 +112,17 @@ Result<PartAnchoring> PartAnchoring::Create(const DriveSurvey& survey,
                  "anchor: the atlas has no map to find the drive in; the first drive is ingested "
                  "without --anchor, and its frame becomes the atlas's");
   }
-  return PartAnchoring(survey, ScanSource(survey, motion), view, *std::move(places), options);
+  return PartAnchoring(survey, ScanSource(survey, motion), positions, view, *std::move(places),
+                       options);
 }
 
-Status PartAnchoring::Probe(PartScans scans, std::size_t index, Probes& probes) const {
-  if (!probes.probed.insert(index).second) return {};
+PlacePrior PartAnchoring::PriorOfScan(PartScans scans,
+                                      std::size_t index,
+                                      const Probes& probes) const {
   const DriveScan& scan = *scans[index];
-  const Result<LeveledScan> leveled = source_.Read(scan);
-  if (!leveled) return leveled.error();
+  if (const auto place = positions_.find(scan.number); place != positions_.end()) {
+    return PriorOf(place->second);
+  }
   // Wherever the drive begins, this scan is as far from there as in the drive's own frame.
   const Eigen::Vector3d way =
       scan.T_world_sensor.translation() - scans.front()->T_world_sensor.translation();
@@ -106,8 +131,16 @@ Status PartAnchoring::Probe(PartScans scans, std::size_t index, Probes& probes) 
   prior.radius_m += way.head<2>().norm() + drift_m;
   prior.z_m += way.z();
   prior.height_m += drift_m;
+  return prior;
+}
+
+Status PartAnchoring::Probe(PartScans scans, std::size_t index, Probes& probes) const {
+  if (!probes.probed.insert(index).second) return {};
+  const DriveScan& scan = *scans[index];
+  const Result<LeveledScan> leveled = source_.Read(scan);
+  if (!leveled) return leveled.error();
   const Eigen::Quaterniond R_level_sensor = LevelOf(scan);
-  const auto found = relocalizer_.Find(*leveled, R_level_sensor, prior);
+  const auto found = relocalizer_.Find(*leveled, R_level_sensor, PriorOfScan(scans, index, probes));
   if (!found) return found.error().WithContext(StrCat("scan ", scan.number));
   for (const RelocalizedPlace& place : found->places) {
     const bool is_believed = found->T_world_sensor && &place == &found->places.front();
@@ -147,13 +180,10 @@ bool PartAnchoring::IsClear(const Probes& probes) const {
          AgreeingOf(believed, options_.agreement).size() == believed.size();
 }
 
-Status PartAnchoring::Track(PartScans scans, Candidate& candidate) {
-  std::vector<FoundScan> found;
-  for (const AnchorGuess& guess : candidate.guesses) {
-    found.push_back(guess.scan);
-  }
+Status PartAnchoring::Track(PartScans scans, bool is_best, Candidate& candidate) {
+  std::vector<FoundScan> found = ScansOf(candidate.guesses);
   const std::size_t seed = candidate.guesses[candidate.guesses.size() / 2].index;
-  const auto followed = follower_.Follow(scans, seed, FitTransform(found));
+  const auto followed = follower_.Follow(scans, seed, FitTransform(found), is_best);
   if (!followed) return followed.error();
   found.clear();
   for (const FollowedScan& scan : *followed) {
@@ -166,7 +196,7 @@ Status PartAnchoring::Track(PartScans scans, Candidate& candidate) {
 }
 
 Result<FrameFit> PartAnchoring::Measure(PartScans scans, const LevelTransform& T_map_drive) {
-  const auto followed = follower_.Follow(scans, 0, T_map_drive);
+  const auto followed = follower_.Follow(scans, 0, T_map_drive, true);
   if (!followed) return Error(followed.error());
   return MeasureFrame(*followed, T_map_drive);
 }
@@ -178,7 +208,9 @@ Result<PartAnchor> PartAnchoring::Find(PartScans scans, bool is_first_part) {
   std::vector<Candidate> candidates;
   for (auto& guesses : CandidatesOf(probes.guesses, options_.agreement, options_.min_agreeing,
                                     options_.candidates)) {
-    candidates.emplace_back().guesses = std::move(guesses);
+    const bool is_off =
+        !WhyOff(FitPositions(scans, positions_, FitTransform(ScansOf(guesses)))).empty();
+    if (candidates.empty() || !is_off) candidates.emplace_back().guesses = std::move(guesses);
   }
   PartAnchor anchor;
   anchor.probed = probes.probed.size();
@@ -196,12 +228,12 @@ Result<PartAnchor> PartAnchoring::Find(PartScans scans, bool is_first_part) {
     return anchor;
   }
   for (Candidate& candidate : candidates) {
-    if (Status status = Track(scans, candidate); !status.ok()) {
+    const bool is_best = &candidate == &candidates.front();
+    if (Status status = Track(scans, is_best, candidate); !status.ok()) {
       return Error(std::move(status));
     }
   }
-  Settle(candidates, BelievedOf(probes.guesses), scans.front()->T_world_sensor, probes.prior,
-         anchor);
+  Settle(scans, candidates, probes, anchor);
   return anchor;
 }
 
@@ -209,17 +241,25 @@ bool PartAnchoring::IsBelieved(std::size_t agreeing, std::size_t elsewhere) cons
   return agreeing >= options_.min_agreeing && agreeing >= options_.min_ratio * elsewhere;
 }
 
-void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
-                           const std::vector<AnchorGuess>& believed,
-                           const Pose& first,
-                           const PlacePrior& prior,
+void PartAnchoring::Settle(PartScans scans,
+                           const std::vector<Candidate>& candidates,
+                           const Probes& probes,
                            PartAnchor& anchor) const {
   const Candidate& best = candidates.front();
-  const Eigen::Vector3d begin_m = best.T_map_drive.ToPose() * first.translation();
+  const Eigen::Vector3d begin_m =
+      best.T_map_drive.ToPose() * scans.front()->T_world_sensor.translation();
+  const std::vector<AnchorGuess> believed = BelievedOf(probes.guesses);
   anchor.fit = best.fit;
+  anchor.position_fit = FitPositions(scans, positions_, best.T_map_drive);
+  const std::string off_positions = WhyOff(anchor.position_fit);
   double elsewhere = 0.0;
-  for (std::size_t i = 1; i < candidates.size(); ++i) {
-    elsewhere = std::max(elsewhere, candidates[i].support);
+  for (const Candidate& other : candidates) {
+    // Beside each other they are one place, of which the better one is the right one.
+    const bool is_worse_here =
+        AreBeside(other.T_map_drive, best.T_map_drive, scans) && other.support < best.support;
+    if (&other != &best && !is_worse_here) {
+      elsewhere = std::max(elsewhere, other.support);
+    }
   }
   const auto off = static_cast<std::size_t>(
       std::count_if(believed.begin(), believed.end(), [&](const AnchorGuess& guess) {
@@ -243,7 +283,9 @@ void PartAnchoring::Settle(const std::vector<Candidate>& candidates,
         StrCat("the drive fits the map in two places: where its scans were found ",
                InThousandths(best.support / elsewhere),
                " times as well as elsewhere, expected at least ", options_.min_margin, " times");
-  } else if (!BeginsWithin(begin_m, prior, options_)) {
+  } else if (!off_positions.empty()) {
+    anchor.why_not = off_positions;
+  } else if (!BeginsWithin(begin_m, probes.prior, options_)) {
     anchor.why_not = StrCat("the drive is found, but begins at (", InThousandths(begin_m.x()), ", ",
                             InThousandths(begin_m.y()), ", ", InThousandths(begin_m.z()),
                             ") m, further from the prior than that is said to be off");

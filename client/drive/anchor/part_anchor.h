@@ -13,6 +13,7 @@
 #include "client/drive/anchor/anchor_fit.h"
 #include "client/drive/anchor/anchor_guess.h"
 #include "client/drive/anchor/frame_fit.h"
+#include "client/drive/anchor/position_fit.h"
 #include "client/drive/anchor/scan_follower.h"
 #include "client/drive/anchor/scan_source.h"
 #include "client/drive/drive_survey.h"
@@ -81,6 +82,7 @@ struct PartAnchor {
   std::size_t found = 0;                      // that were found,
   std::size_t agreeing = 0;                   // and that agree
   FrameFit fit;                               // of scans along the way
+  PositionFit position_fit;                   // of all that have a position
   Eigen::Vector3d begin_m = Eigen::Vector3d::Zero();  // the first scan, in the map, if it is known
   std::string why_not;                                // for people
 };
@@ -91,10 +93,13 @@ class PartAnchoring {
   // as the view does.
   static Result<PartAnchoring> Create(const DriveSurvey& survey,
                                       const MotionDuringScan& motion,
+                                      const KnownPlaces& positions,
                                       MapView& view,
                                       const AnchorOptions& options);
 
-  // The prior is of the part that begins the drive. Errors are those of the scans and of the view.
+  // The prior is of the part that begins the drive. Scans that have a position are looked for
+  // around that, and in the middle they have to lie there. Errors are those of the scans and of the
+  // view.
   Result<PartAnchor> Find(PartScans scans, bool is_first_part);
   // How scans that are to lie in the map by `T_map_drive` fit it around where that puts them. Fails
   // as Find().
@@ -106,6 +111,7 @@ class PartAnchoring {
 
   PartAnchoring(const DriveSurvey& survey,
                 const ScanSource& source,
+                KnownPlaces positions,
                 MapView& view,
                 std::shared_ptr<const PlaceIndex> places,
                 const AnchorOptions& options);
@@ -113,16 +119,16 @@ class PartAnchoring {
   Status Probe(PartScans scans, std::size_t index, Probes& probes) const;
   Status ProbeAll(PartScans scans, Probes& probes) const;
   bool IsClear(const Probes& probes) const;
-  Status Track(PartScans scans, Candidate& candidate);
+  Status Track(PartScans scans, bool is_best, Candidate& candidate);
   bool IsBelieved(std::size_t agreeing, std::size_t elsewhere) const;
-  // `first`: the first scan in the drive; `prior`: of where it is in the map.
-  void Settle(const std::vector<Candidate>& candidates,
-              const std::vector<AnchorGuess>& believed,
-              const Pose& first,
-              const PlacePrior& prior,
+  PlacePrior PriorOfScan(PartScans scans, std::size_t index, const Probes& probes) const;
+  void Settle(PartScans scans,
+              const std::vector<Candidate>& candidates,
+              const Probes& probes,
               PartAnchor& anchor) const;
 
   ScanSource source_;
+  KnownPlaces positions_;
   AnchorOptions options_;
   Relocalizer relocalizer_;
   ScanFollower follower_;

@@ -52,26 +52,33 @@ ScanFollower::ScanFollower(const DriveSurvey& survey,
       mount_m_(survey.mount.height_m),
       source_(source),
       view_(&view),
-      localizer_(std::make_unique<Localizer>(view.profile(), TilesOf(view), OptionsOfLocalizer())) {
-}
+      localizer_(view.profile(), TilesOf(view), OptionsOfLocalizer()),
+      tracker_(view.profile(), TilesOf(view), OptionsOfLocalizer()) {}
 
 Result<std::vector<FollowedScan>> ScanFollower::Follow(PartScans scans,
                                                        std::size_t seed,
-                                                       const LevelTransform& T_map_drive) {
+                                                       const LevelTransform& T_map_drive,
+                                                       bool is_led) {
   const std::vector<double> way_m = WaysOf(scans);
   std::vector<std::size_t> forwards;
   std::vector<std::size_t> backwards;
   for (const std::size_t i : SpreadAlong(way_m, way_m.size(), options_.spacing_m)) {
-    (i >= seed ? forwards : backwards).push_back(i);
+    if (i != seed) (i > seed ? forwards : backwards).push_back(i);
   }
   std::reverse(backwards.begin(), backwards.end());
   std::vector<FollowedScan> followed;
-  for (const auto& order : {backwards, forwards}) {
-    Status status = Follow(scans, way_m, order, T_map_drive, followed);
+  for (auto* order : {&backwards, &forwards}) {
+    order->insert(order->begin(), seed);
+    Status status = Follow(scans, way_m, *order, T_map_drive, is_led, followed);
     if (!status.ok()) return Error(std::move(status));
   }
-  std::sort(followed.begin(), followed.end(),
-            [](const FollowedScan& a, const FollowedScan& b) { return a.index < b.index; });
+  std::stable_sort(followed.begin(), followed.end(),
+                   [](const FollowedScan& a, const FollowedScan& b) { return a.index < b.index; });
+  // The seed was looked at twice.
+  const auto end =
+      std::unique(followed.begin(), followed.end(),
+                  [](const FollowedScan& a, const FollowedScan& b) { return a.index == b.index; });
+  followed.erase(end, followed.end());
   return followed;
 }
 
@@ -79,46 +86,65 @@ Status ScanFollower::Follow(PartScans scans,
                             const std::vector<double>& way_m,
                             const std::vector<std::size_t>& order,
                             const LevelTransform& T_map_drive,
+                            bool is_led,
                             std::vector<FollowedScan>& followed) {
   Pose T_here = T_map_drive.ToPose();
-  double last_m = order.empty() ? 0.0 : way_m[order.front()];
+  double last_m = way_m[order.front()];
+  double driven_m = last_m;
   std::vector<FoundScan> last;
+  tracker_.Begin();
   for (const std::size_t i : order) {
-    const Pose expected = T_here * scans[i]->T_world_sensor;
-    const double since_m = std::abs(way_m[i] - last_m);
-    const double slack_m = options_.drift * since_m;
-    const Result<LocalizationResult> located = LocateNear(*scans[i], expected);
-    if (!located) return located.error();
-    const bool is_good = located->health == LocalizationHealth::kGood;
-    const bool is_near = located->health != LocalizationHealth::kLost &&
-                         IsNear(located->T_world_sensor, expected, slack_m);
-    if (is_good && is_near) {
-      const FoundScan found{scans[i]->T_world_sensor, located->T_world_sensor};
-      followed.push_back({i, true, located->registration.fit, found});
+    const double step_m = std::abs(way_m[i] - driven_m);
+    const Expected expected{T_here * scans[i]->T_world_sensor,
+                            options_.drift * std::abs(way_m[i] - last_m),
+                            is_led ? std::optional(step_m) : std::nullopt};
+    const auto looked = LookAt(*scans[i], expected);
+    if (!looked) return looked.error().WithContext(StrCat("scan ", scans[i]->number));
+    driven_m = way_m[i];
+    if (looked->is_found) {
+      const FoundScan found{scans[i]->T_world_sensor, looked->T_map_sensor};
+      followed.push_back({i, true, looked->fit, found});
       last.push_back(found);
       if (last.size() > kLastScans) last.erase(last.begin());
       T_here = FitTransform(last).ToPose();
       last_m = way_m[i];
-      continue;
+    } else if (looked->is_astray) {
+      followed.push_back({i, false, 0.0, {}});
     }
-    const Result<bool> is_astray = is_good   ? true
-                                   : is_near ? IsOffGround(expected)
-                                             : IsMapped(expected, slack_m);
-    if (!is_astray) return is_astray.error();
-    if (*is_astray) followed.push_back({i, false, 0.0, {}});
   }
   return {};
 }
 
-Result<LocalizationResult> ScanFollower::LocateNear(const DriveScan& scan,
-                                                    const Pose& T_map_sensor) {
-  constexpr StartHint kFollowed{0.5, 0.05};  // the scans before it tell where it is
+Result<ScanFollower::Looked> ScanFollower::LookAt(const DriveScan& scan, const Expected& expected) {
+  constexpr StartHint kExpected{0.5, 0.05};  // the scans before it tell where it is
   const Result<LeveledScan> leveled = source_.Read(scan);
   if (!leveled) return Error(leveled.error());
-  localizer_->Start(T_map_sensor, kFollowed);
-  auto located = localizer_->Localize(*leveled, LevelOf(scan));
-  if (!located) return Error(located.error().WithContext(StrCat("scan ", scan.number)));
-  return located;
+  const Eigen::Quaterniond R_level_sensor = LevelOf(scan);
+  localizer_.Start(expected.T_map_sensor, kExpected);
+  const auto located = localizer_.Localize(*leveled, R_level_sensor);
+  if (!located) return Error(located.error());
+  bool is_led_elsewhere = false;
+  if (expected.step_m) {
+    const auto led =
+        tracker_.Track(*leveled, R_level_sensor, expected.T_map_sensor, *expected.step_m);
+    if (!led) return Error(led.error());
+    is_led_elsewhere =
+        led->health == LocalizationHealth::kGood && !IsNear(led->T_world_sensor, expected);
+  }
+  const bool is_good = located->health == LocalizationHealth::kGood;
+  const bool is_near =
+      located->health != LocalizationHealth::kLost && IsNear(located->T_world_sensor, expected);
+  Looked looked;
+  looked.is_found = is_good && is_near && !is_led_elsewhere;
+  looked.T_map_sensor = located->T_world_sensor;
+  looked.fit = located->registration.fit;
+  if (looked.is_found) return looked;
+  const Result<bool> is_astray = is_good || is_led_elsewhere ? true
+                                 : is_near                   ? IsOffGround(expected.T_map_sensor)
+                                                             : IsMapped(expected);
+  if (!is_astray) return Error(is_astray.error());
+  looked.is_astray = *is_astray;
+  return looked;
 }
 
 // Whether the map has ground there that a vehicle with such a sensor would hover over, or be below.
@@ -136,11 +162,12 @@ Result<bool> ScanFollower::IsOffGround(const Pose& T_map_sensor) const {
 }
 
 // Whether the map has ground below a sensor there, or beside it, which may be `slack_m` farther.
-Result<bool> ScanFollower::IsMapped(const Pose& T_map_sensor, double slack_m) const {
+Result<bool> ScanFollower::IsMapped(const Expected& expected) const {
   constexpr double kBeside_m = 2.0;
   constexpr double kNear_m = 1.5;
   constexpr double kMostSlack_m = 10.0;
-  const Eigen::Vector3d& p = T_map_sensor.translation();
+  const double slack_m = expected.slack_m;
+  const Eigen::Vector3d& p = expected.T_map_sensor.translation();
   const double ground_z_m = p.z() - mount_m_;
   const double near_m = std::min(kNear_m + slack_m, kNextDeck_m);
   std::vector<double> offsets_m{0.0, -kBeside_m, kBeside_m};
@@ -161,10 +188,11 @@ Result<bool> ScanFollower::IsMapped(const Pose& T_map_sensor, double slack_m) co
   return false;
 }
 
-bool ScanFollower::IsNear(const Pose& found, const Pose& expected, double slack_m) const {
-  const Eigen::AngleAxisd turned(found.linear().transpose() * expected.linear());
-  return (found.translation() - expected.translation()).norm() <=
-             options_.max_surprise_m + slack_m &&
+bool ScanFollower::IsNear(const Pose& found, const Expected& expected) const {
+  const Pose& T_map_sensor = expected.T_map_sensor;
+  const Eigen::AngleAxisd turned(found.linear().transpose() * T_map_sensor.linear());
+  return (found.translation() - T_map_sensor.translation()).norm() <=
+             options_.max_surprise_m + expected.slack_m &&
          turned.angle() <= options_.max_surprise_rad;
 }
 

@@ -3,13 +3,14 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "client/drive/anchor/frame_fit.h"
 #include "client/drive/anchor/scan_source.h"
+#include "client/drive/anchor/scan_tracker.h"
 #include "client/drive/drive_survey.h"
 #include "client/map/map_view.h"
 #include "core/base/status.h"
@@ -46,29 +47,45 @@ class ScanFollower {
                const FollowOptions& options);
 
   // From `seed` to the end and to the beginning, where `T_map_drive` puts the first ones and the
-  // last ones that were found put the next. In the drive's order; left out are those whose place is
-  // not mapped, as far as that is known, and those that are weak where they are expected, on the
+  // last ones that were found put the next. `is_led`: astray are those, too, that fit there, but to
+  // which the scans before them do not lead. In the drive's order; left out are those whose place
+  // is not mapped, as far as that is known, and those that are weak where they are expected, on the
   // ground. Errors are those of the scans and of the view.
   Result<std::vector<FollowedScan>> Follow(PartScans scans,
                                            std::size_t seed,
-                                           const LevelTransform& T_map_drive);
+                                           const LevelTransform& T_map_drive,
+                                           bool is_led);
 
  private:
+  struct Expected {
+    Pose T_map_sensor;
+    double slack_m = 0.0;          // that it may be farther off
+    std::optional<double> step_m;  // from the last scan, if these lead to it
+  };
+  struct Looked {
+    bool is_found = false;
+    bool is_astray = false;
+    Pose T_map_sensor = Pose::Identity();
+    double fit = 0.0;
+  };
+
   Status Follow(PartScans scans,
                 const std::vector<double>& way_m,
                 const std::vector<std::size_t>& order,
                 const LevelTransform& T_map_drive,
+                bool is_led,
                 std::vector<FollowedScan>& followed);
-  Result<LocalizationResult> LocateNear(const DriveScan& scan, const Pose& T_map_sensor);
+  Result<Looked> LookAt(const DriveScan& scan, const Expected& expected);
   Result<bool> IsOffGround(const Pose& T_map_sensor) const;
-  Result<bool> IsMapped(const Pose& T_map_sensor, double slack_m) const;
-  bool IsNear(const Pose& found, const Pose& expected, double slack_m) const;
+  Result<bool> IsMapped(const Expected& expected) const;
+  bool IsNear(const Pose& found, const Expected& expected) const;
 
   FollowOptions options_;
   double mount_m_;  // of the sensor, above the ground
   ScanSource source_;
   MapView* view_;
-  std::unique_ptr<Localizer> localizer_;
+  Localizer localizer_;
+  ScanTracker tracker_;
 };
 
 }  // namespace atlas

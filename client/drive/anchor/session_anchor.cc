@@ -158,7 +158,8 @@ class Map {
     // What is not fused in time, damaged tiles among it, is left out.
     const auto fused = client_.WaitUntilFused(kPatience);
     if (!fused && fused.error().code() != StatusCode::kTimeout) return fused.error();
-    auto anchoring = PartAnchoring::Create(drive_.survey, drive_.motion, view_, options_);
+    auto anchoring =
+        PartAnchoring::Create(drive_.survey, drive_.motion, drive_.positions, view_, options_);
     if (!anchoring) return anchoring.error();
     anchoring_.emplace(*std::move(anchoring));
     return {};

@@ -17,6 +17,7 @@ struct AnchoredDrive {
   const DriveSurvey& survey;
   double start_s = 0.0;          // added to the scans' times
   MotionDuringScan motion = {};  // as its keyframes are deskewed; may be empty
+  KnownPlaces positions = {};    // of its scans, in the atlas's frame
 };
 
 // A part of the drive, and its scans in their order, not empty.

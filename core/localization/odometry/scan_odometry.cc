@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "core/base/fast_floor.h"
 #include "core/localization/icp/point_index.h"
 #include "core/localization/normal_equations.h"
 
@@ -21,6 +22,38 @@ float RobustWeight(float residual, float reach) {
   const float ratio = residual / (kScale * reach);
   const float denominator = 1.0F + ratio * ratio;
   return 1.0F / (denominator * denominator);
+}
+
+// What stands upright: a ceiling or a floor is seen along rings around the sensor, which move as it
+// does, and fit best where it stands still.
+std::vector<Eigen::Vector3f> Upright(const std::vector<Eigen::Vector3f>& columns) {
+  constexpr float kCell_m = 0.5F;
+  constexpr float kLeast_m = 0.4F;  // from its lowest return to its highest
+  struct Placed {
+    std::pair<int, int> cell;
+    std::size_t index;
+  };
+  std::vector<Placed> placed;
+  placed.reserve(columns.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    placed.push_back(
+        {{FastFloor(columns[i].x() / kCell_m), FastFloor(columns[i].y() / kCell_m)}, i});
+  }
+  std::stable_sort(placed.begin(), placed.end(),
+                   [](const Placed& a, const Placed& b) { return a.cell < b.cell; });
+  std::vector<Eigen::Vector3f> upright;
+  for (auto begin = placed.begin(); begin != placed.end();) {
+    const auto end = std::find_if(begin, placed.end(),
+                                  [&](const Placed& other) { return other.cell != begin->cell; });
+    const auto [low, high] = std::minmax_element(begin, end, [&](const Placed& a, const Placed& b) {
+      return columns[a.index].z() < columns[b.index].z();
+    });
+    if (columns[high->index].z() - columns[low->index].z() >= kLeast_m) {
+      for (; begin != end; ++begin) upright.push_back(columns[begin->index]);
+    }
+    begin = end;
+  }
+  return upright;
 }
 
 // What a cloud is around one of its points.
@@ -74,9 +107,10 @@ class ScanFit {
           const ScanFeatures& features,
           const Eigen::Vector3d& origin,
           const ScanOdometryOptions& options)
-      : features_(features),
-        options_(options),
-        columns_(recent.Columns(origin), 0.8F),
+      : options_(options),
+        scan_columns_(Upright(features.columns)),
+        scan_ground_(features.ground),
+        columns_(Upright(recent.Columns(origin)), 0.8F),
         ground_(recent.Ground(origin), 2.5F) {}
 
   // Of the features that are near: how many, and the sum of their robust weights.
@@ -100,10 +134,10 @@ class ScanFit {
     Evidence evidence;
     const Eigen::Matrix3f R = pose.linear().cast<float>();
     const Eigen::Vector3f t = pose.translation().cast<float>();
-    for (const Eigen::Vector3f& p : features_.columns) {
+    for (const Eigen::Vector3f& p : scan_columns_) {
       Add(p, AddColumn(R * p, t, reach_m, evidence.equations), evidence.columns);
     }
-    for (const Eigen::Vector3f& p : features_.ground) {
+    for (const Eigen::Vector3f& p : scan_ground_) {
       Add(p, AddGround(R * p, t, reach_m, evidence.equations), evidence.ground);
     }
     return evidence;
@@ -179,8 +213,9 @@ class ScanFit {
     return robust;
   }
 
-  const ScanFeatures& features_;
   const ScanOdometryOptions& options_;
+  const std::vector<Eigen::Vector3f> scan_columns_;
+  const std::vector<Eigen::Vector3f>& scan_ground_;
   Cloud columns_;
   Cloud ground_;
 };
@@ -224,14 +259,18 @@ Pose Descend(ScanFit& scan, const Start& start, const ScanOdometryOptions& optio
   return pose;
 }
 
+Pose Turned(Pose pose, double angle_rad) {
+  pose.linear() =
+      Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix() * pose.linear();
+  return pose;
+}
+
 // As expected, then turned, the least first.
 std::vector<Start> TurnedStarts(const Pose& expected, const ScanOdometryOptions& options) {
   std::vector<Start> starts{{expected, expected}};
   for (int step = 1; step <= options.turns; ++step) {
     for (const double side : {-1.0, 1.0}) {
-      const Eigen::AngleAxisd turn(side * step * options.turn_rad, Eigen::Vector3d::UnitZ());
-      starts.push_back({expected, expected});
-      starts.back().pose.linear() = turn.toRotationMatrix() * expected.linear();
+      starts.push_back({Turned(expected, side * step * options.turn_rad), expected});
     }
   }
   return starts;
@@ -251,6 +290,54 @@ std::vector<Start> FannedStarts(const Pose& expected,
   return starts;
 }
 
+// ... and that may turn besides: those that fit best, for to try them all takes a second.
+std::vector<Start> FannedTurns(const std::vector<Start>& fanned,
+                               ScanFit& scan,
+                               const ScanOdometryOptions& options) {
+  struct Looked {
+    double fit;
+    Start start;
+  };
+  std::vector<Looked> looked;
+  for (const Start& start : fanned) {
+    for (const Start& turned : TurnedStarts(start.pose, options)) {
+      const Start free{turned.pose, turned.pose};
+      const double fit = scan.At(free.pose, options.coarse_reach_m).Fit(options.few_columns);
+      looked.push_back({fit, free});
+    }
+  }
+  std::stable_sort(looked.begin(), looked.end(),
+                   [](const Looked& a, const Looked& b) { return a.fit > b.fit; });
+  std::vector<Start> starts;
+  for (std::size_t i = 0; i < std::min(looked.size(), options.fanned_turns); ++i) {
+    starts.push_back(looked[i].start);
+  }
+  return starts;
+}
+
+// The best of where these lead.
+class BestMotion {
+ public:
+  BestMotion(ScanFit& scan, const ScanOdometryOptions& options) : scan_(scan), options_(options) {}
+
+  void Try(const Start& start) {
+    const Pose pose = Descend(scan_, start, options_);
+    const ScanFit::Evidence evidence = scan_.At(pose, options_.fine_reach_m);
+    if (const double fit = evidence.Fit(options_.few_columns); fit > motion_.fit) {
+      motion_.T_world_level = pose;
+      motion_.covariance = UncertaintyOf(evidence.equations, options_.information_share);
+      motion_.fit = fit;
+    }
+  }
+  bool is_sure() const { return motion_.fit >= options_.sure_fit; }
+  const ScanMotion& motion() const { return motion_; }
+
+ private:
+  ScanFit& scan_;
+  const ScanOdometryOptions& options_;
+  ScanMotion motion_;
+};
+
 }  // namespace
 
 ScanMotion MotionSince(const RecentScans& recent,
@@ -261,22 +348,23 @@ ScanMotion MotionSince(const RecentScans& recent,
   Pose here = expected.T_world_level;
   here.translation().setZero();
   ScanFit scan(recent, features, origin, options);
-  ScanMotion best;
+  BestMotion best(scan, options);
   const HorizontalSpread spread = SpreadOf(expected.covariance);
-  const bool is_fanned = spread.along_m > options.fan_sigma_m;
-  for (const Start& start :
-       is_fanned ? FannedStarts(here, spread, options) : TurnedStarts(here, options)) {
-    const Pose pose = Descend(scan, start, options);
-    const ScanFit::Evidence evidence = scan.At(pose, options.fine_reach_m);
-    if (const double fit = evidence.Fit(options.few_columns); fit > best.fit) {
-      best.T_world_level = pose;
-      best.covariance = UncertaintyOf(evidence.equations, options.information_share);
-      best.fit = fit;
+  if (spread.along_m > options.fan_sigma_m) {
+    const std::vector<Start> fanned = FannedStarts(here, spread, options);
+    for (const Start& start : fanned) best.Try(start);
+    if (!best.is_sure()) {
+      for (const Start& start : FannedTurns(fanned, scan, options)) best.Try(start);
     }
-    if (!is_fanned && best.fit >= options.sure_fit) break;
+  } else {
+    for (const Start& start : TurnedStarts(here, options)) {
+      best.Try(start);
+      if (best.is_sure()) break;
+    }
   }
-  best.T_world_level.translation() += origin;
-  return best;
+  ScanMotion motion = best.motion();
+  motion.T_world_level.translation() += origin;
+  return motion;
 }
 
 }  // namespace atlas

@@ -34,7 +34,8 @@ struct ScanOdometryOptions {
   double sure_fit = 0.5;
   int turns = 3;
   double turn_rad = 0.12;
-  float max_range_m = 25.0F;  // the fit is that of nearer features: further off much is new
+  std::size_t fanned_turns = 8;  // of all starts that are fanned and turned so many, the best ones
+  float max_range_m = 25.0F;     // the fit is that of nearer features: further off much is new
 
   // A scan that fits less was taken elsewhere: the vehicle was moved, or saw too little.
   double min_fit = 0.35;

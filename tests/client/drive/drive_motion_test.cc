@@ -42,6 +42,14 @@ TEST(DriveMotionTest, OfAGapItIsOneRevolution) {
   EXPECT_NEAR(MetresDuring(DriveOf({0, 1, 2, 5, 6}, false), 2), 3.0, 1e-9) << "nobody knows";
 }
 
+TEST(DriveMotionTest, WhoKnowsTheRevolutionIsBelieved) {
+  const DriveFolder drive = DriveOf({0, 4, 8, 12, 21});
+  EXPECT_NEAR(MetresDuring(drive, 0), 4.0, 1e-9);
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    EXPECT_NEAR(DriveMotion(drive, 0.1).During(i).translation().x(), 1.0, 1e-9) << i;
+  }
+}
+
 TEST(DriveMotionTest, ATurnIsSharedToo) {
   DriveFolder drive = DriveOf({0, 1, 2, 4, 5});
   for (DriveScan& scan : drive.scans) {

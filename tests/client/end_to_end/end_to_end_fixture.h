@@ -28,14 +28,16 @@ inline void WriteOverpass(const fs::path& folder) {
   ASSERT_TRUE(status.ok()) << status.message();
 }
 
-// A street of 230 m with a scan every 2.5 m; other seeds have other noise, and lanes.
+// A street of 230 m with a scan every 2.5 m and 0.25 s; other seeds have other noise, and lanes.
 inline void WriteStreet(const fs::path& folder,
                         std::uint64_t seed,
-                        const DriveWriteOptions& write = {}) {
+                        const DriveWriteOptions& write = {},
+                        double revolution_s = 0.0) {
   DriveOptions options;
   options.sensor = *LidarSensorByName("h350");
   options.seed = seed;
   options.spacing_m = 2.5;
+  options.revolution_s = revolution_s;
   const auto drive = SimulatedDrive::Create(MakeWorld(*WorldKindByName("street")).value(), options);
   ASSERT_TRUE(drive) << drive.error().message();
   const Status status = WriteDrive(*drive, folder, {}, write);

@@ -55,7 +55,8 @@ using testing::UprightPose;
 void ExpectNoAllocations(const testing::PaintedMap& map,
                          const testing::ShapeWorld& world,
                          const std::function<Pose(double)>& at,
-                         std::size_t warm) {
+                         std::size_t warm,
+                         bool is_deskewed = false) {
   std::vector<Pose> truths;
   std::vector<LeveledScan> scans;
   for (int i = 0; i < 24; ++i) {
@@ -66,8 +67,10 @@ void ExpectNoAllocations(const testing::PaintedMap& map,
   Localizer localizer(map.profile(), map.Source(), testing::QuickOptions());
   localizer.Start(truths.front());
   for (std::size_t i = 0; i < scans.size(); ++i) {
+    const Eigen::Quaterniond upright = Eigen::Quaterniond::Identity();
     const std::size_t before = allocations;
-    const auto result = localizer.Localize(scans[i], Eigen::Quaterniond::Identity());
+    const auto result = is_deskewed ? localizer.LocalizeDeskewed(scans[i], upright, 1.0, 1.0)
+                                    : localizer.Localize(scans[i], upright);
     const std::size_t during = allocations - before;
     ASSERT_TRUE(result);
     EXPECT_EQ(result->health, LocalizationHealth::kGood) << i;
@@ -84,6 +87,15 @@ TEST(AllocationTest, ALocalizerThatHasItsMapAllocatesNothing) {
         return UprightPose({x_m, 0.1, 1.8 + 0.01 * x_m}, 0.0);
       },
       10);
+}
+
+TEST(AllocationTest, NorDoesOneThatLooksForTheMotionFirst) {
+  ExpectNoAllocations(
+      testing::StreetMap(), testing::Street(),
+      [](double x_m) {
+        return UprightPose({x_m, 0.1, 1.8 + 0.01 * x_m}, 0.0);
+      },
+      10, true);
 }
 
 TEST(AllocationTest, NorDoesOneThatComparesDecks) {

@@ -38,6 +38,35 @@ Pose Motion(const Eigen::Vector3d& translation, double angle_rad, const Eigen::V
   return motion;
 }
 
+// A levelled scan is moved as its returns are in the sensor's own frame.
+TEST(DeskewTest, ALevelledScanMovesAsItsReturnsDo) {
+  const Eigen::Quaterniond R_level_sensor(
+      Eigen::AngleAxisd(0.2, Eigen::Vector3d(1.0, -0.5, 0.0).normalized()));
+  const Eigen::Matrix3f R = R_level_sensor.cast<float>().toRotationMatrix();
+  const Pose motion = Motion({1.2, 0.1, -0.05}, 0.2, {0.1, 0.0, 1.0});
+  const std::vector<Eigen::Vector3f> points = {
+      {9.0F, 2.0F, -1.0F}, {-4.0F, 7.0F, 0.5F}, {-6.0F, -3.0F, 2.0F}, {0.5F, -12.0F, -1.5F}};
+  LeveledScan scan;
+  for (const Eigen::Vector3f& p : points) {
+    const Eigen::Vector3f level = R * p;
+    scan.x.push_back(level.x());
+    scan.y.push_back(level.y());
+    scan.z.push_back(level.z());
+  }
+  scan.range_m.resize(points.size());
+  scan.azimuth_rad.resize(points.size());
+  Deskew(scan, R_level_sensor, motion);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f right = R * Deskewed(points[i], motion);
+    EXPECT_NEAR(scan.x[i], right.x(), 1e-4) << i;
+    EXPECT_NEAR(scan.y[i], right.y(), 1e-4) << i;
+    EXPECT_NEAR(scan.z[i], right.z(), 1e-4) << i;
+    EXPECT_NEAR(scan.range_m[i], std::hypot(right.x(), right.y()), 1e-4) << i;
+    EXPECT_GE(scan.azimuth_rad[i], 0.0F) << i;
+    EXPECT_NEAR(std::tan(scan.azimuth_rad[i]), right.y() / right.x(), 1e-2) << i;
+  }
+}
+
 TEST(DeskewTest, AVehicleAtRestChangesNothing) {
   const Eigen::Vector3f point(3.0F, -20.0F, 1.5F);
   EXPECT_EQ(Deskewed(point, Pose::Identity()), point);

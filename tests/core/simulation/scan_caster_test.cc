@@ -28,7 +28,7 @@ WorldParts Room() {
 SimulatedScan ScanRoom(double sigma_m) {
   LidarSensor sensor = Vlp16Sensor();
   sensor.range_sigma_m = sigma_m;
-  return ScanCaster(sensor).Cast(Room(), {}, Pose::Identity(), {1, 0});
+  return ScanCaster(sensor).Cast(Room(), {}, {{Pose::Identity()}}, {1, 0});
 }
 
 TEST(ScanCasterTest, ExactSensorMeasuresWallAndFloorWhereTheyAre) {
@@ -101,7 +101,7 @@ TEST(ScanCasterTest, TrafficHidesWhatStandsBehindIt) {
   builder.Box({{5.0, -1.0, -1.8}, {6.0, 1.0, 3.0}}, kCarLabel);
   const CastableMesh traffic(builder.Take());
   const SimulatedScan scan =
-      ScanCaster(Vlp16Sensor()).Cast(Room(), traffic, Pose::Identity(), {1, 0});
+      ScanCaster(Vlp16Sensor()).Cast(Room(), traffic, {{Pose::Identity()}}, {1, 0});
   std::size_t moving = 0;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const SimulatedPoint& p = scan.points[i];
@@ -120,7 +120,7 @@ TEST(ScanCasterTest, PointsAreInTheSensorFrameOfATiltedPose) {
                    Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()))
                       .toRotationMatrix();
   pose.translation() = Eigen::Vector3d(-20.0, 3.0, 1.0);
-  const SimulatedScan scan = ScanCaster(sensor).Cast(Room(), {}, pose, {1, 0});
+  const SimulatedScan scan = ScanCaster(sensor).Cast(Room(), {}, {&pose, 1}, {1, 0});
   ASSERT_FALSE(scan.points.empty());
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const SimulatedPoint& p = scan.points[i];

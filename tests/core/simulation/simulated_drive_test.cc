@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -128,6 +129,59 @@ TEST(SimulatedDriveTest, GroundReturnsLieOnTheGround) {
   EXPECT_GT(road, 3000U);
 }
 
+// Towards a wall, a metre and 0.05 rad a scan, at an even pace.
+SimulatedDrive DriveTowardsAWall(double revolution_s) {
+  MeshBuilder builder;
+  builder.Quad({30.0, -300.0, -2.0}, {30.0, 300.0, -2.0}, {30.0, 300.0, 100.0},
+               {30.0, -300.0, 100.0}, TruthLabel(TruthClass::kBuilding));
+  TrajectoryWorld world;
+  world.still = std::make_shared<const MeshWorld>(builder.Take());
+  std::vector<DriveMoment> moments(8);
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    const auto driven = static_cast<double>(i);
+    moments[i].T_world_sensor.translation().x() = driven;
+    moments[i].T_world_sensor.linear() =
+        Eigen::AngleAxisd(0.05 * driven, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    moments[i].leg_time_s = 0.2 * driven;
+  }
+  DriveOptions options;
+  options.scan_interval_s = 0.2;
+  options.revolution_s = revolution_s;
+  options.sensor.range_sigma_m = 0.0;
+  return SimulatedDrive::Create(std::move(world), std::move(moments), options).value();
+}
+
+// Of the wall's returns, as if all had been seen from the scan's pose.
+double FurthestFromTheWall(const SimulatedDrive& drive, std::size_t i) {
+  double furthest_m = 0.0;
+  for (const SimulatedPoint& p : drive.Scan(i).points) {
+    const Eigen::Vector3d p_world = drive.sensor_pose(i) * Eigen::Vector3d(p.x, p.y, p.z);
+    furthest_m = std::max(furthest_m, std::abs(p_world.x() - 30.0));
+  }
+  return furthest_m;
+}
+
+TEST(SimulatedDriveTest, ATurningSensorCastsEachColumnFromWhereItIsThen) {
+  for (const double revolution_s : {0.2, 0.1}) {
+    const SimulatedDrive drive = DriveTowardsAWall(revolution_s);
+    for (const std::size_t i : {0U, 3U, 7U}) {
+      EXPECT_GT(FurthestFromTheWall(drive, i), 0.05) << i;
+      const SimulatedScan scan = drive.Scan(i);
+      ASSERT_GT(scan.points.size(), 5000U);
+      for (const SimulatedPoint& p : scan.points) {
+        // Clockwise: to the right, where azimuths are negative, it looks later.
+        const double later_s = -std::atan2(p.y, p.x) / (2.0 * std::numbers::pi) * revolution_s;
+        const double driven = static_cast<double>(i) + later_s / 0.2;
+        const double world_azimuth_rad = std::atan2(p.y, p.x) + 0.05 * driven;
+        const double x_then = drive.SensorPoseAfter(i, later_s).translation().x();
+        ASSERT_NEAR(x_then, driven, 0.02) << "an arc that is nearly straight";
+        ASSERT_NEAR(x_then + std::hypot(p.x, p.y) * std::cos(world_azimuth_rad), 30.0, 2e-3) << i;
+      }
+    }
+  }
+  EXPECT_LT(FurthestFromTheWall(DriveTowardsAWall(0.0), 3), 1e-3);
+}
+
 TEST(SimulatedDriveTest, RefusesOptionsOutOfRange) {
   const auto code = [](auto change) {
     DriveOptions options;
@@ -137,6 +191,8 @@ TEST(SimulatedDriveTest, RefusesOptionsOutOfRange) {
   };
   EXPECT_EQ(code([](DriveOptions& o) { o.spacing_m = 0.0; }), StatusCode::kInvalidArgument);
   EXPECT_EQ(code([](DriveOptions& o) { o.spacing_m = NAN; }), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code([](DriveOptions& o) { o.revolution_s = 0.3; }), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code([](DriveOptions& o) { o.revolution_s = NAN; }), StatusCode::kInvalidArgument);
   EXPECT_EQ(code([](DriveOptions& o) { o.sensor_height_m = -1.0; }), StatusCode::kInvalidArgument);
   EXPECT_EQ(code([](DriveOptions& o) { o.sensor.elevations_rad.clear(); }),
             StatusCode::kInvalidArgument);

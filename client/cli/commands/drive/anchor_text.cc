@@ -41,6 +41,10 @@ boost::json::array AnchorsJson(const std::vector<SessionAnchor>& anchors) {
       json["rms_deg"] = Rounded(kDegrees * part.fit.rms_rad, 4);
       json["worst_rms_m"] = Rounded(part.fit.worst_rms_m, 4);
       json["worst_rms_deg"] = Rounded(kDegrees * part.fit.worst_rms_rad, 4);
+      if (part.position_fit.positions > 0) {
+        json["positions"] = part.position_fit.positions;
+        json["off_positions_m"] = Rounded(part.position_fit.off_m.norm(), 3);
+      }
       if (anchor.is_anchored()) {
         json["begins"] = {Rounded(part.begin_m.x(), 3), Rounded(part.begin_m.y(), 3),
                           Rounded(part.begin_m.z(), 3)};

@@ -95,8 +95,8 @@ class IngestCommand : public Command {
     arguments.Optional("--batch", "N", batch_, "Keyframes on their way at a time [64]");
     arguments.Optional("--sensor-height", "M", options_.sensor_height_m,
                        "Above the ground [estimated]");
-    arguments.Choice("--deskew", {"on", "off", "auto"}, deskew_,
-                     "Undo the vehicle's motion during a scan; auto: where that makes it sharper");
+    drive_.DeclareDeskew(
+        arguments, "Undo the vehicle's motion during a scan; auto: where that makes it sharper");
     arguments.Flag("--staged", options_.is_staged,
                    "Keep it out of the map until `atlas session publish`");
     arguments.Flag(
@@ -176,9 +176,9 @@ class IngestCommand : public Command {
     options_.selection.parity = *parity;
     options_.selection.begin = range_.begin;
     options_.selection.end = range_.end;
-    const Result<Deskewing> deskewing = ParseDeskewing(deskew_);
-    if (!deskewing) return deskewing.error();
-    options_.deskewing = *deskewing;
+    const Result<DeskewOptions> deskew = drive_.deskew();
+    if (!deskew) return deskew.error();
+    options_.deskew = *deskew;
     options_.upload.max_in_flight = batch_;
     options_.now_s =
         std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -229,7 +229,6 @@ class IngestCommand : public Command {
   DriveFlags drive_;
   std::string vehicle_ = "vehicle";
   std::optional<std::string> session_;
-  std::string deskew_ = "off";
   bool is_anchored_ = false;
   bool is_resumed_ = false;
   std::optional<Eigen::Vector2d> prior_m_;

@@ -45,8 +45,8 @@ class LocalizeCommand : public Command {
                        "given and right to so much");
     arguments.Optional("--prior-height", "M", prior_height_m_,
                        "The same of the height: no other deck counts");
-    arguments.Choice(
-        "--deskew", {"on", "off", "auto"}, deskew_,
+    drive_.DeclareDeskew(
+        arguments,
         "Undo the predicted motion during a scan; auto: where drives are skewed; on: always, which "
         "spoils scans that are not");
     arguments.Choice("--mode", {"atlas", "paper"}, mode_,
@@ -87,9 +87,9 @@ class LocalizeCommand : public Command {
     options_.rings = drive_.rings();
     options_.mode = mode_ == "paper" ? LocalizationMode::kPaper : LocalizationMode::kAtlas;
     options_.selection.parity = *parity;
-    const Result<Deskewing> deskewing = ParseDeskewing(deskew_);
-    if (!deskewing) return deskewing.error();
-    options_.deskewing = *deskewing;
+    const Result<DeskewOptions> deskew = drive_.deskew();
+    if (!deskew) return deskew.error();
+    options_.deskew = *deskew;
     if (trials_ && !perturbation_) {
       return {StatusCode::kInvalidArgument, "--trials needs --perturb"};
     }
@@ -104,7 +104,8 @@ class LocalizeCommand : public Command {
               "--mode paper"};
     }
     ATLAS_RETURN_IF_ERROR(contradictions_.Check());
-    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" || deskew_ != "off")) {
+    if (relocalize_ && (perturbation_ || no_restart_ || mode_ != "atlas" ||
+                        options_.deskew.deskewing != Deskewing::kOff)) {
       return {StatusCode::kInvalidArgument,
               "--relocalize takes no start and no track: without --perturb, --no-restart, --mode "
               "paper and --deskew"};
@@ -234,7 +235,6 @@ class LocalizeCommand : public Command {
   TrackOutput track_;
   ContradictionOutput contradictions_;
   std::string mode_ = "atlas";
-  std::string deskew_ = "off";
   std::optional<Perturbation> perturbation_;
   std::optional<std::uint32_t> trials_;
   DriveLocalizationOptions options_;

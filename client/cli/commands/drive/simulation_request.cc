@@ -52,6 +52,10 @@ void SimulationRequest::Declare(ArgumentSet& arguments) {
                      "Sensor poses to drive along, 12 numbers a line as in poses.txt");
   arguments.Optional("--every", "M", every_m_,
                      "Least distance between scans along a trajectory [0: every pose]");
+  arguments.Optional(
+      "--revolution", "S", revolution_s_,
+      "The sensor turns once in so many seconds, clockwise, while the vehicle drives "
+      "on; it looks ahead at the scan's pose [0: all of a scan is seen at once]");
 }
 
 Result<SimulatedDrive> SimulationRequest::MakeDrive() const {
@@ -79,6 +83,7 @@ Result<DriveOptions> SimulationRequest::Options() const {
   if (has_traffic_) options.convoy = {kCarAhead, kCarBehind};
   options.start_s = kDay_s * static_cast<double>(parked_seed_);
   if (!trajectory_.empty()) options.scan_interval_s = TrajectoryOptions().interval_s;
+  options.revolution_s = revolution_s_;
   return options;
 }
 

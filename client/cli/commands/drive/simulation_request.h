@@ -32,6 +32,7 @@ class SimulationRequest {
   std::string world_;
   std::string sensor_ = "vlp16";
   std::string trajectory_;
+  double revolution_s_ = 0.0;
   double every_m_ = 0.0;
   std::uint64_t seed_ = 0;
   std::uint64_t parked_seed_ = 0;

@@ -99,6 +99,45 @@ TEST(ScanOdometryTest, AFirstStepIsFoundHoweverFastItIs) {
   }
 }
 
+// An aisle below a deck, with pillars on both sides: rings on the ceiling are around the sensor
+// wherever it is.
+ShapeWorld Aisle() {
+  ShapeWorld world;
+  world.patches.push_back({});
+  world.patches.push_back({.z_m = 3.0, .surface = testing::Surface::kCeiling});
+  for (const double side : {-1.0, 1.0}) {
+    world.boxes.push_back({{-60.0, 9.0 * side - 0.1, 0.0}, {60.0, 9.0 * side + 0.1, 3.0}});
+    for (const double x_m : {-17.0, -12.0, -6.5, -1.0, 5.0, 10.0, 16.0}) {
+      const Eigen::Vector3d foot(x_m + 0.7 * side, 3.5 * side, 0.0);
+      world.boxes.push_back(
+          {foot - Eigen::Vector3d(0.3, 0.3, 0.0), foot + Eigen::Vector3d(0.3, 0.3, 3.0)});
+    }
+  }
+  return world;
+}
+
+TEST(ScanOdometryTest, ACeilingDoesNotStandStill) {
+  const ScanOdometryOptions options;
+  const Pose first = UprightPose({-4.0, 0.0, 1.8}, 0.0);
+  RecentScans recent(options.scans);
+  recent.Add(Seen(Aisle(), first), first);
+  MotionModel motion{MotionOptions()};
+  motion.Start(first);
+  motion.Predict();
+  for (const double step_m : {0.7, 1.25, 2.0}) {
+    for (const double turn_rad : {-0.3, 0.0, 0.2}) {
+      const Pose truth = UprightPose(
+          first.translation() + Eigen::Vector3d(step_m, 0.5 * step_m * turn_rad, 0.0), turn_rad);
+      const ScanMotion moved =
+          MotionSince(recent, Seen(Aisle(), truth), {first, motion.StepCovariance()}, options);
+      EXPECT_GT(moved.fit, options.min_fit) << step_m << " " << turn_rad;
+      EXPECT_LT(ErrorOf(moved.T_world_level, truth).horizontal_m, 0.1) << step_m << " " << turn_rad;
+      EXPECT_LT(ErrorOf(moved.T_world_level, truth).angle_rad, kDegree)
+          << step_m << " " << turn_rad;
+    }
+  }
+}
+
 TEST(ScanOdometryTest, WhoWasMovedElsewhereFitsNothing) {
   const ScanOdometryOptions options;
   RecentScans recent(options.scans);
