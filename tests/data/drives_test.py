@@ -367,7 +367,7 @@ def decks(bin_dir):
         atlas = Atlas(bin_dir, work)
         for seed in (0, 4):
             subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed),
-                            "--gnss", "0.5"], check=True, stdout=subprocess.DEVNULL)
+                            "--gnss", "0.3"], check=True, stdout=subprocess.DEVNULL)
         atlas.run("ingest", f"{work}/0")
         atlas.run("wait")
         drive_4 = pathlib.Path(work) / "4"

@@ -208,9 +208,10 @@ Result<PartAnchor> PartAnchoring::Find(PartScans scans, bool is_first_part) {
   std::vector<Candidate> candidates;
   for (auto& guesses : CandidatesOf(probes.guesses, options_.agreement, options_.min_agreeing,
                                     options_.candidates)) {
-    const bool is_off =
-        !WhyOff(FitPositions(scans, positions_, FitTransform(ScansOf(guesses)))).empty();
-    if (candidates.empty() || !is_off) candidates.emplace_back().guesses = std::move(guesses);
+    // Places where the drive cannot be by its positions are no rivals.
+    if (candidates.empty() || LiesAtPositions(scans, FitTransform(ScansOf(guesses)))) {
+      candidates.emplace_back().guesses = std::move(guesses);
+    }
   }
   PartAnchor anchor;
   anchor.probed = probes.probed.size();
@@ -235,6 +236,10 @@ Result<PartAnchor> PartAnchoring::Find(PartScans scans, bool is_first_part) {
   }
   Settle(scans, candidates, probes, anchor);
   return anchor;
+}
+
+bool PartAnchoring::LiesAtPositions(PartScans scans, const LevelTransform& T_map_drive) const {
+  return WhyOff(FitPositions(scans, positions_, T_map_drive)).empty();
 }
 
 bool PartAnchoring::IsBelieved(std::size_t agreeing, std::size_t elsewhere) const {

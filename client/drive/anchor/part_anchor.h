@@ -120,6 +120,7 @@ class PartAnchoring {
   Status ProbeAll(PartScans scans, Probes& probes) const;
   bool IsClear(const Probes& probes) const;
   Status Track(PartScans scans, bool is_best, Candidate& candidate);
+  bool LiesAtPositions(PartScans scans, const LevelTransform& T_map_drive) const;
   bool IsBelieved(std::size_t agreeing, std::size_t elsewhere) const;
   PlacePrior PriorOfScan(PartScans scans, std::size_t index, const Probes& probes) const;
   void Settle(PartScans scans,

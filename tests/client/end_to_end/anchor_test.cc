@@ -1,7 +1,9 @@
 // `atlas ingest --anchor` with the real daemon: a drive with a frame of its own, in worlds whose
 // truth is exact.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <iomanip>
 #include <map>
@@ -109,7 +111,13 @@ TEST_F(AnchorTest, ADriveOfAnotherFrameGoesWhereItWasDriven) {
   const DaemonProcess daemon(NewData(), kSmall);
   Map(daemon, shared_root / "street");
   const fs::path positions = shared_root / "moved_positions.txt";
-  std::ofstream(positions) << "3 10 20 30 0.5\n";
+  const DriveFolder driven = OpenDriveFolder(shared_root / "other_lane").value();
+  const Eigen::Vector3d p = driven.scans.at(3).T_world_sensor.translation() * 1e3;
+  const std::array<std::int64_t, 3> place_mm{std::llround(p.x()) + 200, std::llround(p.y()) - 300,
+                                             std::llround(p.z())};
+  std::ofstream(positions) << "3 " << 1e-3 * static_cast<double>(place_mm[0]) << ' '
+                           << 1e-3 * static_cast<double>(place_mm[1]) << ' '
+                           << 1e-3 * static_cast<double>(place_mm[2]) << " 0.5\n";
   const CommandRun run = Anchor(daemon, shared_root / "moved", {"--positions", positions.string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto anchor = AnchorOf(run);
@@ -129,7 +137,21 @@ TEST_F(AnchorTest, ADriveOfAnotherFrameGoesWhereItWasDriven) {
                                                     return Status();
                                                   });
   ASSERT_TRUE(read) << read.error().message();
-  EXPECT_EQ(prior, (KnownPosition{10'000'000, 20'000'000, 30'000'000, 500}));
+  EXPECT_EQ(prior,
+            (KnownPosition{1'000 * place_mm[0], 1'000 * place_mm[1], 1'000 * place_mm[2], 500}));
+}
+
+TEST_F(AnchorTest, WhoseScansAreNotWhereItsPositionsAreStaysOut) {
+  const DaemonProcess daemon(NewData(), kSmall);
+  Map(daemon, shared_root / "street");
+  const std::string before = Digest(daemon);
+  const fs::path positions = shared_root / "wrong_positions.txt";
+  std::ofstream(positions) << "3 100 100 100 1\n";
+  const CommandRun run = Anchor(daemon, shared_root / "moved", {"--positions", positions.string()});
+  EXPECT_EQ(run.exit_code, static_cast<int>(ExitCode::kNotFound)) << run.out;
+  EXPECT_NE(run.err.find("beside its positions"), std::string::npos) << run.err;
+  EXPECT_EQ(StateOf(daemon, "continued"), "staged");
+  EXPECT_EQ(Digest(daemon), before);
 }
 
 TEST_F(AnchorTest, AnInterruptedOneGoesOnInTheFrameThatItBeganIn) {
