@@ -9,8 +9,12 @@
 namespace atlas {
 namespace {
 
+bool AreNumberedOn(const DriveScan& a, const DriveScan& b) {
+  return b.number == a.number + 1;
+}
+
 std::optional<double> Interval_s(const DriveScan& a, const DriveScan& b) {
-  if (b.number != a.number + 1 || !a.time_s || !b.time_s || *b.time_s <= *a.time_s) {
+  if (!a.time_s || !b.time_s || *b.time_s <= *a.time_s) {
     return std::nullopt;
   }
   return *b.time_s - *a.time_s;
@@ -23,7 +27,8 @@ DriveMotion::DriveMotion(const DriveFolder& drive, std::optional<double> revolut
   if (revolution_s_) return;
   std::vector<double> intervals_s;
   for (std::size_t i = 1; i < drive.scans.size(); ++i) {
-    if (const auto interval_s = Interval_s(drive.scans[i - 1], drive.scans[i])) {
+    const auto interval_s = Interval_s(drive.scans[i - 1], drive.scans[i]);
+    if (interval_s && AreNumberedOn(drive.scans[i - 1], drive.scans[i])) {
       intervals_s.push_back(*interval_s);
     }
   }
@@ -35,9 +40,10 @@ std::optional<Pose> DriveMotion::Between(std::size_t from, std::size_t to) const
   const DriveScan& a = drive_.scans[from];
   const DriveScan& b = drive_.scans[to];
   const Pose T_a_b = a.T_world_sensor.inverse() * b.T_world_sensor;
-  const bool is_neighbour = b.number == a.number + 1;
-  if (!is_neighbour || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
   const auto interval_s = Interval_s(a, b);
+  // Where numbers are missing times tell for how long.
+  const bool is_known = AreNumberedOn(a, b) || (interval_s && revolution_s_);
+  if (!is_known || T_a_b.translation().norm() > kSessionJump_m) return std::nullopt;
   const bool is_longer = revolution_s_ && interval_s && *interval_s > kMissing * *revolution_s_;
   return is_longer ? ShareOf(T_a_b, *revolution_s_ / *interval_s) : T_a_b;
 }

@@ -16,7 +16,8 @@ class DriveMotion {
   explicit DriveMotion(const DriveFolder& drive, std::optional<double> revolution_s = std::nullopt);
 
   // T_now_later from scan `index` to the one numbered next, or to it from the one before; a jump is
-  // no motion. Where times say that the two are further apart, in one revolution of the sensor.
+  // no motion, nor is a gap in the numbers where no times tell how long it is. Where times say that
+  // the two are further apart, in one revolution of the sensor.
   // Identity, as for a sensor that stands, where it has no neighbour.
   Pose During(std::size_t index) const;
 

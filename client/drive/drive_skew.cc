@@ -27,9 +27,7 @@ std::vector<Window> FastWindows(const DriveFolder& drive,
   for (std::size_t begin = 0; begin + options.window_scans <= drive.scans.size(); ++begin) {
     Window window{begin, 1e9};
     for (std::size_t i = begin; i < begin + options.window_scans; ++i) {
-      const bool is_next = i == begin || drive.scans[i].number == drive.scans[i - 1].number + 1;
-      const double motion_m = motion.During(i).translation().norm();
-      window.motion_m = std::min(window.motion_m, is_next ? motion_m : 0.0);
+      window.motion_m = std::min(window.motion_m, motion.During(i).translation().norm());
     }
     if (window.motion_m >= options.min_motion_m) all.push_back(window);
   }
@@ -85,12 +83,17 @@ Status DeskewOptions::Validate() const {
 
 Status DeskewOptions::Validate(const DriveFolder& drive) const {
   ATLAS_RETURN_IF_ERROR(Validate());
-  const bool is_timed = std::all_of(drive.scans.begin(), drive.scans.end(),
-                                    [](const DriveScan& scan) { return scan.time_s.has_value(); });
-  if (revolution_s && !is_timed) {
-    return {StatusCode::kInvalidArgument,
-            StrCat(drive.path.string(),
-                   ": what share of the way a revolution takes (--revolution) needs times.txt")};
+  if (!revolution_s) return {};
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    const std::optional<double>& time_s = drive.scans[i].time_s;
+    if (!time_s || (i > 0 && *time_s <= *drive.scans[i - 1].time_s)) {
+      return {StatusCode::kInvalidArgument,
+              StrCat(drive.path.string(),
+                     ": what share of the way a revolution takes (--revolution) needs times.txt, "
+                     "with times that rise: scan ",
+                     drive.scans[i].number,
+                     time_s ? " is not later than the one before" : " has none")};
+    }
   }
   return {};
 }

@@ -23,7 +23,7 @@ struct DeskewOptions {
 
   // kInvalidArgument naming the first option out of range.
   Status Validate() const;
-  // Too: with a revolution times are needed.
+  // Too: with a revolution times are needed, each later than the one before.
   Status Validate(const DriveFolder& drive) const;
 };
 

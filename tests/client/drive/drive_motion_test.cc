@@ -1,6 +1,7 @@
 // What a recorded drive's poses and times say of a revolution.
 #include "client/drive/drive_motion.h"
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -48,6 +49,25 @@ TEST(DriveMotionTest, WhoKnowsTheRevolutionIsBelieved) {
   for (std::size_t i = 0; i < drive.scans.size(); ++i) {
     EXPECT_NEAR(DriveMotion(drive, 0.1).During(i).translation().x(), 1.0, 1e-9) << i;
   }
+}
+
+// As where a drive keeps some of its scans' files, under the numbers that they had.
+TEST(DriveMotionTest, AGapInTheNumbersIsOneInTheTimes) {
+  DriveFolder drive = DriveOf({0, 1, 2, 5, 7, 8});
+  for (DriveScan& scan : drive.scans) {
+    scan.number = static_cast<std::uint32_t>(std::lround(scan.T_world_sensor.translation().x()));
+  }
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    EXPECT_NEAR(MetresDuring(drive, i), 1.0, 1e-9) << i;
+  }
+  drive.scans.erase(drive.scans.begin() + 1);  // no two follow each other now but the last ones
+  drive.scans.pop_back();
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    EXPECT_EQ(MetresDuring(drive, i), 0.0) << i << ": nobody knows";
+    EXPECT_NEAR(DriveMotion(drive, 0.1).During(i).translation().x(), 1.0, 1e-9) << i;
+  }
+  for (DriveScan& scan : drive.scans) scan.time_s.reset();
+  EXPECT_EQ(DriveMotion(drive, 0.1).During(1).translation().x(), 0.0) << "nor here";
 }
 
 TEST(DriveMotionTest, ATurnIsSharedToo) {
