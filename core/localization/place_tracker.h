@@ -99,6 +99,9 @@ struct PlaceTrackerOptions {
   double min_ground_mapped = 0.5;
   // Where less than this share is, weak places are checked by that motion, which is to agree.
   double edge_ground_mapped = 0.9;
+  // Of a place that is not in doubt other decks are compared from here on. Along drives through
+  // maps that go on 0.7 to 0.95 is mapped, at the edge of one of half a deck 0.65 to 0.46.
+  double compared_ground_mapped = 0.7;
   double same_step_m = 0.5;
   double same_step_rad = 0.05;
   // So far around where a place that is not confirmed has come to its own motion is looked for.

@@ -52,8 +52,15 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
     confirmation_.Miss();
   }
   const double up_m = result.registration.T_world_level.translation().z();
-  if (auto there = confirmation_.Weigh(map_.window(), features, result.registration, usual_fit_,
-                                       IsDoubtful(result.registration))) {
+  // At the edge of the map another deck, of which more was mapped, explains more of a scan.
+  const bool is_compared =
+      !confirmation_.is_confirmed() ||
+      GroundMapped(features, result.registration.T_world_level).value_or(1.0) >=
+          options_.compared_ground_mapped;
+  auto there = is_compared ? confirmation_.Weigh(map_.window(), features, result.registration,
+                                                 usual_fit_, IsDoubtful(result.registration))
+                           : std::nullopt;
+  if (there) {
     if (!IsReachable(there->T_world_level)) {
       result.health = LocalizationHealth::kLost;
       return;

@@ -299,6 +299,23 @@ def unmapped(bin_dir):
           f"the last one {scans[-1]['health']}, {scans[-1]['error_m']} m off")
     assert good >= 40 and wrong == 0
     assert scans[-1]["health"] == "lost" and scans[-1]["error_m"] < 1.0
+    half_a_deck_mapped(bin_dir)
+
+
+def half_a_deck_mapped(bin_dir):
+    """Where the map ends in the middle of a deck, more of the one above was mapped."""
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        for seed, scans in ((0, "80:130"), (1, "111:216")):
+            subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{seed}", "--seed", str(seed),
+                            "--range", scans], check=True, stdout=subprocess.DEVNULL)
+        atlas.run("ingest", f"{work}/0")
+        atlas.run("wait")
+        done = atlas.call("localize", f"{work}/1").stdout.splitlines()
+        assert atlas.stop() == 0
+    good, wrong = good_and_wrong([json.loads(line) for line in done[:-1]])
+    print(f"half a deck mapped: {good} of {len(done) - 1} scans good, {wrong} of them elsewhere")
+    assert good >= 35 and wrong == 0
 
 
 def told(bin_dir):
