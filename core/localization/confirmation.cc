@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/localization/feature_fit.h"
+
 namespace atlas {
 
 void Confirmation::Trust() {
@@ -86,7 +88,7 @@ void Confirmation::Count(bool is_good, bool is_usual) {
 
 bool Confirmation::IsAhead() const {
   return std::all_of(rivals_.begin(), rivals_.end(), [&](const Rival& rival) {
-    return is_new_ ? options_.lead.IsClear(rival.lead, rival.scans)
+    return is_new_ ? options_.lead.IsClear(rival.sure_lead, rival.scans)
                    : rival.margin() >= -options_.tracked_margin;
   });
 }
@@ -98,7 +100,13 @@ void Confirmation::Compare(const MapWindow& map,
   const double weight = DeckWeight(features, options_.many_columns);
   before_.swap(rivals_);
   rivals_.clear();
-  for (const double up_m : decks_.Find(map, features, here.T_world_level)) {
+  const std::vector<double>& ups_m = decks_.Find(map, features, here.T_world_level);
+  if (ups_m.empty()) {
+    return;
+  }
+  const FeatureFit fit(map, features, registration_.features);
+  fit.ColumnWeights(here.T_world_level, registration_.fine_radius_m, here_weights_);
+  for (const double up_m : ups_m) {
     Pose start = here.T_world_level;
     start.translation().z() += up_m;
     Rival rival;
@@ -113,9 +121,15 @@ void Confirmation::Compare(const MapWindow& map,
     });
     if (before != before_.end()) {
       rival.lead = before->lead;
+      rival.sure_lead = before->sure_lead;
       rival.scans = before->scans;
     }
-    rival.lead += weight * (score - PlaceScore(rival.registration, features));
+    const double lead = weight * (score - PlaceScore(rival.registration, features));
+    fit.ColumnWeights(rival.registration.T_world_level, registration_.fine_radius_m,
+                      rival_weights_);
+    const double common = CommonLead(here_weights_, rival_weights_, options_.many_columns);
+    rival.lead += std::max(lead, common);
+    rival.sure_lead += std::min(lead, common);
     ++rival.scans;
     rivals_.push_back(rival);
   }

@@ -105,7 +105,11 @@ class Confirmation {
   // Another deck, and what scans said of it.
   struct Rival {
     double up_m = 0.0;
-    double lead = 0.0;  // sum of how much better each scan fits here
+    // Sums of how much better each scan fits here, by all that the map knows of either place and by
+    // what it knows of both, whichever is more, and whichever is less: a deck that was mapped
+    // better explains more, whichever the vehicle is on.
+    double lead = 0.0;
+    double sure_lead = 0.0;
     int scans = 0;
     RegistrationResult registration;  // of the last scan
 
@@ -127,6 +131,8 @@ class Confirmation {
   DeckFinder decks_;
   std::vector<Rival> rivals_;
   std::vector<Rival> before_;  // rivals_ at the scan before; kept for its memory
+  std::vector<std::optional<float>> here_weights_;  // of the scan at hand; kept for their memory
+  std::vector<std::optional<float>> rival_weights_;
 };
 
 }  // namespace atlas

@@ -39,32 +39,54 @@ FeatureEvidence FeatureFit::OfGround(const Pose& T_world_level, const FeatureRea
   return evidence;
 }
 
+void FeatureFit::ColumnWeights(const Pose& T_world_level,
+                               float radius_m,
+                               std::vector<std::optional<float>>& weights) const {
+  weights.clear();
+  const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
+  const Eigen::Vector3f t = (T_world_level.translation() - map_.origin()).cast<float>();
+  for (const Eigen::Vector3f& column : features_.columns) {
+    const Eigen::Vector3f p = R * column + t;
+    const std::optional<OnLine> on = LineOf(p, t.head<2>(), radius_m);
+    weights.push_back(on               ? std::optional(on->robust)
+                      : map_.IsFree(p) ? std::optional(0.0F)
+                                       : std::nullopt);
+  }
+}
+
+std::optional<FeatureFit::OnLine> FeatureFit::LineOf(const Eigen::Vector3f& p,
+                                                     const Eigen::Vector2f& from,
+                                                     float radius_m) const {
+  const std::optional<ColumnLine> line = map_.NearestLine(p, radius_m);
+  if (!line || !line->CanBeSeenFrom(from)) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2f offset = p.head<2>() - line->center;
+  const Eigen::Vector2f& n = line->normal;
+  const Eigen::Vector2f residual = line->is_wall ? Eigen::Vector2f(n.dot(offset) * n) : offset;
+  return OnLine{*line, residual, RobustWeight(residual.norm(), kScale * radius_m)};
+}
+
 void FeatureFit::AddColumn(const Eigen::Vector3f& arm,
                            const Eigen::Vector3f& t,
                            float radius_m,
                            FeatureEvidence& evidence,
                            PlanarSums& sums) const {
   const Eigen::Vector3f p = arm + t;
-  std::optional<ColumnLine> line = map_.NearestLine(p, radius_m);
-  if (line && !line->CanBeSeenFrom(t.head<2>())) {
-    line.reset();
-  }
-  evidence.mapped_columns += line || map_.IsFree(p) ? 1 : 0;
-  if (!line) {
+  const std::optional<OnLine> on = LineOf(p, t.head<2>(), radius_m);
+  evidence.mapped_columns += on || map_.IsFree(p) ? 1 : 0;
+  if (!on) {
     return;
   }
-  const Eigen::Vector2f offset = p.head<2>() - line->center;
-  const Eigen::Vector2f& n = line->normal;
-  const Eigen::Vector2f residual = line->is_wall ? Eigen::Vector2f(n.dot(offset) * n) : offset;
-  const float robust = RobustWeight(residual.norm(), kScale * radius_m);
-  const float weight = robust / (options_.column_sigma_m * options_.column_sigma_m);
+  const Eigen::Vector2f& n = on->line.normal;
+  const float weight = on->robust / (options_.column_sigma_m * options_.column_sigma_m);
   ++evidence.columns;
-  evidence.column_fit += static_cast<double>(robust);
+  evidence.column_fit += static_cast<double>(on->robust);
   const PlanarMatrix metric =
-      line->is_wall
+      on->line.is_wall
           ? PlanarMatrix{weight * n.x() * n.x(), weight * n.x() * n.y(), weight * n.y() * n.y()}
           : PlanarMatrix{weight, 0.0F, weight};
-  sums.Add(arm, weight * residual, metric);
+  sums.Add(arm, weight * on->residual, metric);
 }
 
 void FeatureFit::AddGround(const Eigen::Vector3f& arm,

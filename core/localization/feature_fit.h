@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -49,8 +51,23 @@ class FeatureFit {
   FeatureEvidence At(const Pose& T_world_level, const FeatureReach& reach) const;
   // The ground's part of it.
   FeatureEvidence OfGround(const Pose& T_world_level, const FeatureReach& reach) const;
+  // The robust weight of each column, 0 where the map knows that nothing stands; none where it
+  // knows nothing.
+  void ColumnWeights(const Pose& T_world_level,
+                     float radius_m,
+                     std::vector<std::optional<float>>& weights) const;
 
  private:
+  struct OnLine {
+    ColumnLine line;
+    Eigen::Vector2f residual = Eigen::Vector2f::Zero();
+    float robust = 0.0F;
+  };
+
+  // Where a column at `p`, seen from there, stands.
+  std::optional<OnLine> LineOf(const Eigen::Vector3f& p,
+                               const Eigen::Vector2f& from,
+                               float radius_m) const;
   void AddColumn(const Eigen::Vector3f& arm,
                  const Eigen::Vector3f& t,
                  float radius_m,

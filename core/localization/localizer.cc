@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "core/geometry/motion_share.h"
@@ -36,7 +37,8 @@ Localizer::Localizer(const MapProfile& profile,
       tiles_(std::move(tiles)),
       options_(options),
       features_(options.features),
-      relocalizer_(std::move(relocalizer)) {
+      relocalizer_(std::move(relocalizer)),
+      own_motion_(options.tracker.motion, options.tracker.odometry) {
   places_.emplace_back(NewTracker());
 }
 
@@ -48,6 +50,8 @@ void Localizer::Start(const Pose& T_world_sensor, const StartKnowledge& known) {
   places_.erase(places_.begin() + 1, places_.end());
   places_.front().tracker.Start(T_world_sensor, known);
   astray_ = 0;
+  own_motion_.Forget();
+  scans_ = 0.0;
 }
 
 Result<LocalizationResult> Localizer::Localize(const LeveledScan& scan,
@@ -94,6 +98,7 @@ Status Localizer::Expect(const LeveledScan& scan,
                          const Eigen::Quaterniond& R_level_sensor,
                          double scans) {
   for (SupposedPlace& place : places_) place.tracker.Expect(scans);
+  scans_ += scans;
   std::vector<SupposedPlace> found;
   if (IsLookedFor()) {
     auto looked = Look(scan, R_level_sensor);
@@ -169,8 +174,9 @@ void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R
   if (places_.size() == 1) {
     places_.front().scores.clear();
   }
+  const std::optional<OwnStep> step = StepOf(features);
   for (SupposedPlace& place : places_) {
-    place.result = place.tracker.Track(features, R_level_sensor);
+    place.result = place.tracker.Track(features, R_level_sensor, step);
     if (places_.size() > 1) Note(PlaceScore(place.result.registration, features), place.scores);
     place.lost = place.result.health == LocalizationHealth::kLost ? place.lost + 1 : 0;
   }
@@ -181,6 +187,20 @@ void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R
   const bool is_astray = places_.size() > 1 || told.lost > 0 || !told.tracker.is_confirmed() ||
                          told.tracker.spread_m() > options_.adrift_m;
   astray_ = is_astray ? astray_ + 1 : 0;
+  if (!is_astray) {
+    own_motion_.Forget();
+  } else if (!step) {
+    own_motion_.Begin(features);
+  }
+}
+
+std::optional<OwnStep> Localizer::StepOf(const ScanFeatures& features) {
+  const double scans = std::exchange(scans_, 0.0);
+  const bool is_needed =
+      std::any_of(places_.begin(), places_.end(),
+                  [](const SupposedPlace& place) { return place.tracker.goes_along(); });
+  return is_needed && own_motion_.is_begun() ? std::optional(own_motion_.Next(features, scans))
+                                             : std::nullopt;
 }
 
 void Localizer::Note(double score, std::vector<double>& scores) const {
@@ -201,9 +221,19 @@ void Localizer::Join() {
       ++i;
       continue;
     }
-    if (LeadOver(places_[i], *same).sum > 0.0) std::swap(*same, places_[i]);
+    if (IsBetter(places_[i], *same)) std::swap(*same, places_[i]);
     places_.erase(places_.begin() + static_cast<std::ptrdiff_t>(i));
   }
+}
+
+// Both are at one place now, whatever they scored where they came from. One that is carried knows
+// where the vehicle cannot be.
+bool Localizer::IsBetter(const SupposedPlace& a, const SupposedPlace& b) {
+  const auto rank = [](const SupposedPlace& place) {
+    return std::tuple(place.tracker.is_confirmed(), place.tracker.is_carried(),
+                      place.scores.back());
+  };
+  return rank(a) > rank(b);
 }
 
 void Localizer::GiveUp() {
@@ -219,7 +249,8 @@ void Localizer::GiveUp() {
 }
 
 bool Localizer::IsGivenUp(const SupposedPlace& place) const {
-  if (place.lost > options_.most_lost) {
+  if (place.lost > options_.most_lost ||
+      !places_.front().tracker.IsReachable(place.result.T_world_sensor)) {
     return true;
   }
   return std::any_of(places_.begin(), places_.end(), [&](const SupposedPlace& other) {

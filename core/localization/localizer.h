@@ -14,6 +14,7 @@
 #include "core/base/status.h"
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
+#include "core/localization/odometry/own_motion.h"
 #include "core/localization/place_tracker.h"
 #include "core/localization/pose_prior.h"
 #include "core/localization/relocalizer.h"
@@ -115,8 +116,11 @@ class Localizer {
   bool IsFollowed(const Pose& T_world_sensor) const;
   void Follow(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor);
   void Note(double score, std::vector<double>& scores) const;
+  // The vehicle's step from the last scan, where a place that is not known needs it.
+  std::optional<OwnStep> StepOf(const ScanFeatures& features);
   // Of two that came to the same place one stays.
   void Join();
+  static bool IsBetter(const SupposedPlace& a, const SupposedPlace& b);
   // Those that are lost, far behind, or too many.
   void GiveUp();
   bool IsGivenUp(const SupposedPlace& place) const;
@@ -139,7 +143,9 @@ class Localizer {
   RelocalizerSource relocalizer_;
   // The first is the one that is told of: where it was tracked to. Others are while it is astray.
   std::vector<SupposedPlace> places_;
-  int astray_ = 0;  // scans in a row in which it was lost, in doubt, or adrift too far
+  int astray_ = 0;        // scans in a row in which it was lost, in doubt, or adrift too far
+  OwnMotion own_motion_;  // while it is
+  double scans_ = 0.0;    // that were expected since the last one was followed
 };
 
 }  // namespace atlas

@@ -59,10 +59,13 @@ class MotionModel {
   void ForgetMotion();
   // It is on another deck, so much higher; all else is as it was.
   void Raise(double up_m) { pose_.translation().z() += up_m; }
+  // Since it was last sure it strayed by so much in (x, y, z, yaw), more or less.
+  void TakeBack(const Eigen::Vector4d& strayed);
   // The IMU's tilt; the place and the heading stay.
   void SetTilt(const Eigen::Matrix3d& R_world_sensor);
 
   const Pose& T_world_sensor() const { return pose_; }
+  const Pose& last() const { return last_; }  // before Predict()
   // (x, y, z, yaw) from where it was before Predict() to there.
   Eigen::Vector4d LastStep(const Pose& T_world_sensor) const {
     return PoseDifference(last_, T_world_sensor);

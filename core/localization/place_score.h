@@ -1,6 +1,9 @@
 // How well a scan fits a place, as places are compared.
 #pragma once
 
+#include <optional>
+#include <span>
+
 #include "core/localization/registration.h"
 #include "core/localization/scan_features.h"
 
@@ -16,5 +19,11 @@ double DeckWeight(const ScanFeatures& features, double many_columns);
 // By which places are compared. A deck that was mapped better explains more; the right one is
 // contradicted less.
 double PlaceScore(const RegistrationResult& registration, const ScanFeatures& features);
+// How much better a scan fits one place than another by the columns of which the map knows
+// something at both (FeatureFit::ColumnWeights), on the scale of PlaceScore, and less the fewer
+// these are: near the edge of the map a place explains little of a scan, right as it may be.
+double CommonLead(std::span<const std::optional<float>> here,
+                  std::span<const std::optional<float>> there,
+                  double many_columns);
 
 }  // namespace atlas

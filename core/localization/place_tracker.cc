@@ -10,16 +10,6 @@
 namespace atlas {
 namespace {
 
-// T_world_sensor without its tilt but with `R_level_sensor`'s: what the IMU says about the vertical
-// replaces what was predicted.
-Pose LevelFrame(const Pose& T_world_sensor) {
-  Pose level = Pose::Identity();
-  const double yaw_rad = SplitYaw(Eigen::Quaterniond(T_world_sensor.linear())).yaw_rad;
-  level.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  level.translation() = T_world_sensor.translation();
-  return level;
-}
-
 Eigen::Matrix4d PoseInformation(const Eigen::Matrix<double, 6, 6>& information) {
   constexpr std::array<int, 4> kAxes{0, 1, 2, 5};
   return information(kAxes, kAxes);
@@ -56,6 +46,7 @@ void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known
   unheld_ = 0;
   without_map_ = 0;
   recent_.Clear();
+  strayed_.setZero();
   carried_ = 0;
 }
 
@@ -83,36 +74,37 @@ Status PlaceTracker::Prepare() {
 }
 
 LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
-                                       const Eigen::Quaterniond& R_level_sensor) {
+                                       const Eigen::Quaterniond& R_level_sensor,
+                                       const std::optional<OwnStep>& step) {
+  own_step_.reset();
   has_stood_ = HasStood(features);
   if (!has_stood_) {
     motion_ = Next();
   }
   untracked_ = 0.0;
+  if (step && goes_along()) {
+    GoAlong(*step);
+  }
   if (carried_ > 0) {
     ++carried_;
     if (!CarryOn(features)) {
       lost_ = std::exchange(carried_, 0);  // as anyone who is
     }
   }
-  LocalizationResult result;
+  const bool is_on_map = carried_ == 0 && lost_ == 0;
   Tracked tracked = Follow(features);
-  if (carried_ == 0 && lost_ == 0 && LeavesMap(tracked.place.registration, features)) {
+  if (is_on_map && LeavesMap(tracked.place.registration, features)) {
     carried_ = 1;
     tracked = Follow(features);
   }
-  result.registration = std::move(tracked.place.registration);
-  bool is_found = false;
-  if (IsDoubtful(result.registration) || IsAdrift() || IsVagueStart() || carried_ > 0) {
-    Searched searched = Search(features, result.registration);
-    is_found = searched.found.has_value();
-    if (is_found) {
-      result.registration = *std::move(searched.found);
-      tracked.rival.reset();
-    } else if (IsVagueStart() && searched.rival) {
-      tracked.rival = searched.rival;
-    }
+  Located located = Locate(features, std::move(tracked));
+  if (is_on_map && carried_ == 0 && Strays(located.registration, features)) {
+    carried_ = 1;
+    located = Locate(features, Follow(features));
   }
+  LocalizationResult result;
+  result.registration = std::move(located.registration);
+  const bool is_found = located.is_found;
   const Surprise surprise = SurpriseOf(result.registration, features, is_found);
   result.health = Judge(result.registration, features, surprise);
   Confirm(features, surprise, result);
@@ -125,17 +117,34 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   result.cover = cover.map;
   NoteCover(cover.map);
   if (result.health == LocalizationHealth::kGood &&
-      (tracked.rival || cover.map != MapCover::kFine)) {
+      (located.rival || cover.map != MapCover::kFine)) {
     result.health = LocalizationHealth::kWeak;
   }
-  Remember(result, Seen(result.registration, cover, tracked.rival), is_found);
+  // Of a first scan at the edge of the map no motion tells whether it is there.
+  const bool is_unchecked =
+      is_first_ && !IsMappedAround(features, result.registration.T_world_level);
+  Remember(result, Seen(result.registration, cover, located.rival), is_found);
   Keep(features, result, is_found);
   result.covariance = Covariance(result);
   const double up_m = std::sqrt(result.covariance(2, 2));
-  if (result.health == LocalizationHealth::kGood && up_m > options_.max_weak_up_m) {
+  if (result.health == LocalizationHealth::kGood &&
+      (up_m > options_.max_weak_up_m || is_unchecked)) {
     result.health = LocalizationHealth::kWeak;
   }
   return result;
+}
+
+PlaceTracker::Located PlaceTracker::Locate(const ScanFeatures& features, Tracked tracked) {
+  Located located{std::move(tracked.place.registration), tracked.rival, false};
+  if (!IsDoubtful(located.registration) && !IsAdrift() && !IsVagueStart() && carried_ == 0) {
+    return located;
+  }
+  Searched searched = Search(features, located.registration);
+  if (searched.found) {
+    return {*std::move(searched.found), std::nullopt, true};
+  }
+  if (IsVagueStart() && searched.rival) located.rival = searched.rival;
+  return located;
 }
 
 // Tiles that are on their way come to a vehicle that stands, too.
@@ -221,6 +230,7 @@ void PlaceTracker::Remember(const LocalizationResult& result,
   lost_ = 0;
 }
 
+// What the IMU says about the vertical replaces the tilt that was predicted.
 PosePrior PlaceTracker::PriorOf(const MotionModel& motion) {
   return {LevelFrame(motion.T_world_sensor()), motion.covariance()};
 }

@@ -16,6 +16,7 @@
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
 #include "core/localization/motion_model.h"
+#include "core/localization/odometry/own_motion.h"
 #include "core/localization/odometry/recent_scans.h"
 #include "core/localization/odometry/scan_odometry.h"
 #include "core/localization/places/place_index.h"
@@ -99,9 +100,15 @@ struct PlaceTrackerOptions {
   double min_ground_mapped = 0.5;
   // Where less than this share is, weak places are checked by that motion, which is to agree.
   double edge_ground_mapped = 0.9;
-  // Of a place that is not in doubt other decks are compared from here on. Along drives through
-  // maps that go on 0.7 to 0.95 is mapped, at the edge of one of half a deck 0.65 to 0.46.
-  double compared_ground_mapped = 0.7;
+  // Where less than this share is, a place moves as the vehicle does: where it came further than so
+  // from where its own motion leads, in all, the vehicle left the map. Nor do other decks count, of
+  // which more was mapped. Along drives through maps that go on 0.7 to 0.95 is mapped, and places
+  // stray by 0.01 to 0.05 m; at the edge of one of half a deck 0.65 to 0.3 is, and where that
+  // repeats itself they stray by 0.2 to 1 m a scan.
+  double checked_ground_mapped = 0.7;
+  double strayed_m = 0.3;
+  double strayed_rad = 0.05;
+  double straying_kept = 0.9;  // from scan to scan: own motion errs, too
   double same_step_m = 0.5;
   double same_step_rad = 0.05;
   // So far around where a place that is not confirmed has come to its own motion is looked for.
@@ -183,14 +190,21 @@ class PlaceTracker {
   };
   std::optional<SeenMotion> MotionSeen(const ScanFeatures& scan);
   // Requires Start() or Suppose(), and Prepare() for each scan. `features` are those of a scan
-  // levelled by `R_level_sensor`.
-  LocalizationResult Track(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor);
+  // levelled by `R_level_sensor`. `step`: the vehicle's own, from the last scan, where somebody
+  // looked; a place that is not confirmed goes along with it.
+  LocalizationResult Track(const ScanFeatures& features,
+                           const Eigen::Quaterniond& R_level_sensor,
+                           const std::optional<OwnStep>& step);
 
   // Whether it is known that the vehicle is where it is tracked (core/localization/confirmation).
   bool is_confirmed() const { return confirmation_.is_confirmed(); }
   // The last answer, when another place may be the right one as well.
   LocalizationResult Doubted(LocalizationResult result) const;
   double usual_fit() const { return usual_fit_; }
+  // Whether it is where scans fit, and nothing says yet that it is not another place.
+  bool goes_along() const {
+    return !is_first_ && carried_ == 0 && lost_ == 0 && !confirmation_.is_confirmed();
+  }
   // Whether it went off the map and is carried on by its own motion from where it was known.
   bool is_carried() const { return carried_ > 0; }
   // Whether it can be there by now; everywhere, where it is not carried.
@@ -227,25 +241,39 @@ class PlaceTracker {
                                        const ScanFeatures& features) const;
   static PosePrior PriorOf(const MotionModel& motion);
   PosePrior Prior() const { return PriorOf(motion_); }
+  // Where `step` leads from the last scan.
+  Pose LedBy(const OwnStep& step) const;
+  void GoAlong(const OwnStep& step);
   Place At(const RegistrationResult& registration, bool has_prior) const;
   // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
   void SpreadStarts(const PosePrior& prior);
   // ... and where the ground that is seen would lie on what was mapped, for a start that was told.
   void RaiseStarts(const PosePrior& prior, const ScanFeatures& features);
   Tracked Follow(const ScanFeatures& features);
+  // Near there, or elsewhere, where that is in doubt.
+  struct Located {
+    RegistrationResult registration;
+    std::optional<Eigen::Vector2d> rival;  // Tracked
+    bool is_found = false;                 // elsewhere
+  };
+  Located Locate(const ScanFeatures& features, Tracked tracked);
   std::optional<Eigen::Vector2d> RivalOf(const std::vector<Place>& places, const Place& best) const;
   bool IsDoubtful(const RegistrationResult& result) const;
   // By what the last scans saw, where there are any and this one goes with them.
   bool CarryOn(const ScanFeatures& features);
+  // Goes off the map, if a place where little is mapped went elsewhere than the vehicle, as its
+  // scans tell.
+  bool Strays(const RegistrationResult& found, const ScanFeatures& features);
   // Goes off the map, if that is where it drove, or where it was told to be.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
   // Of a step, with what errs on the way there.
   PoseCovariance StepCovariance(const ScanMotion& moved);
   // Whether that is near enough to where it is expected.
   bool IsWithinReach(const Pose& T_world_level) const;
-  // Whether from the last scan that fitted to this one the place moved as the vehicle did, as both
-  // scans tell. Where there was no last one, it did.
+  // Whether a place that is not confirmed moved as the vehicle did, as its scans tell, since it was
+  // taken up or last did not. At the first scan it did.
   bool MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result);
+  bool IsSameStep(const Eigen::Vector4d& difference) const;
   // Whether the last scans that were kept say that this one was taken where it is expected.
   bool GoesWithRecent(const ScanFeatures& features, const PosePrior& expected) const;
   // Whether so much of the ground is mapped that the scan would fit if this were the place.
@@ -255,6 +283,8 @@ class PlaceTracker {
   // Share of the ground near the vehicle that is in the map at its height; none where no ground is
   // seen.
   std::optional<double> GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
+  // Whether so much is that what fits is believed without more ado.
+  bool IsMappedAround(const ScanFeatures& features, const Pose& T_world_level) const;
   // Whether little of the map is left to hold it, and its own motion brought it there, too.
   bool IsNearEdge(const ScanFeatures& features, const LocalizationResult& result);
   // On the map again.
@@ -321,8 +351,10 @@ class PlaceTracker {
   RecentScans recent_;                          // while it is known where each was taken
   int carried_ = 0;                             // scans in a row, the one at hand as well
   double carried_m_ = 0.0;                      // the way that it made meanwhile
-  std::optional<Eigen::Vector4d> off_carried_;  // from there to where the last scan fitted
-  Pose last_kept_ = Pose::Identity();           // where the last of recent_ was taken
+  std::optional<Eigen::Vector4d> off_carried_;  // from there to where a scan fitted, MovesAsSeen()
+  Eigen::Vector4d strayed_ = Eigen::Vector4d::Zero();  // ... and where it is not carried, in all
+  std::optional<OwnStep> own_step_;                    // to the scan at hand, from elsewhere
+  Pose last_kept_ = Pose::Identity();                  // where the last of recent_ was taken
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;

@@ -69,9 +69,8 @@ void PlaceTracker::Keep(const ScanFeatures& features,
   if (!is_carried) {
     carried_ = 0;
     off_carried_.reset();
-    if (!is_lost && !is_known) {  // the next scan tells whether it moves
+    if (!is_lost && !is_known) {
       recent_.Clear();
-      recent_.Add(features, result.registration.T_world_level);
       return;
     }
     if (result.health != LocalizationHealth::kGood && !IsNearEdge(features, result)) {
@@ -98,27 +97,6 @@ bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationRe
   return agrees;
 }
 
-bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result) {
-  if (carried_ > 0) {
-    const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, result.T_world_level);
-    const auto before = std::exchange(off_carried_, off);
-    return !before || ((off - *before).head<3>().norm() <= options_.same_step_m &&
-                       std::abs(std::remainder(off(3) - (*before)(3), 2.0 * std::numbers::pi)) <=
-                           options_.same_step_rad);
-  }
-  const Eigen::Vector4d sigmas(options_.unsure_m, options_.unsure_m, options_.step_up_m,
-                               options_.same_step_rad);
-  return recent_.is_empty() ||
-         GoesWithRecent(features, {result.T_world_level, sigmas.cwiseAbs2().asDiagonal()});
-}
-
-bool PlaceTracker::GoesWithRecent(const ScanFeatures& features, const PosePrior& expected) const {
-  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
-  return moved.fit >= options_.odometry.min_fit &&
-         !AreApart(moved.T_world_level, expected.T_world_level, options_.same_step_m,
-                   options_.same_step_rad);
-}
-
 bool PlaceTracker::IsOnMap(const RegistrationResult& result,
                            const ScanFeatures& features,
                            double unknown_share) const {
@@ -141,6 +119,10 @@ std::optional<double> PlaceTracker::GroundMapped(const ScanFeatures& features,
     mapped += map_.window().NearestSurface(R * p + t, options_.ground_reach_m) ? 1 : 0;
   }
   return near == 0 ? std::nullopt : std::optional(static_cast<double>(mapped) / near);
+}
+
+bool PlaceTracker::IsMappedAround(const ScanFeatures& features, const Pose& T_world_level) const {
+  return GroundMapped(features, T_world_level).value_or(1.0) >= options_.checked_ground_mapped;
 }
 
 bool PlaceTracker::IsWithinReach(const Pose& T_world_sensor) const {

@@ -19,9 +19,10 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
     return is_told ? Surprise::kNone : Surprise::kNew;
   }
   if (carried_ > 0) {
-    const bool is_as_usual =
-        carried_ <= options_.max_coasting && confirmation_.IsAsUsual(result, features, usual_fit_);
-    return is_as_usual ? Surprise::kNone : Surprise::kOdd;
+    const bool is_back_soon = carried_ <= options_.max_coasting &&
+                              IsMappedAround(features, result.T_world_level) &&
+                              confirmation_.IsAsUsual(result, features, usual_fit_);
+    return is_back_soon ? Surprise::kNone : Surprise::kOdd;
   }
   if (lost_ == 0 && !is_found) {
     return has_stood_ ? Surprise::kOdd : Surprise::kNone;
@@ -54,9 +55,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
   const double up_m = result.registration.T_world_level.translation().z();
   // At the edge of the map another deck, of which more was mapped, explains more of a scan.
   const bool is_compared =
-      !confirmation_.is_confirmed() ||
-      GroundMapped(features, result.registration.T_world_level).value_or(1.0) >=
-          options_.compared_ground_mapped;
+      !confirmation_.is_confirmed() || IsMappedAround(features, result.registration.T_world_level);
   auto there = is_compared ? confirmation_.Weigh(map_.window(), features, result.registration,
                                                  usual_fit_, IsDoubtful(result.registration))
                            : std::nullopt;

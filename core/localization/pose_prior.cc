@@ -8,6 +8,20 @@
 
 namespace atlas {
 
+Pose LevelFrame(const Pose& T_world_sensor) {
+  Pose level = Pose::Identity();
+  const double yaw_rad = SplitYaw(Eigen::Quaterniond(T_world_sensor.linear())).yaw_rad;
+  level.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  level.translation() = T_world_sensor.translation();
+  return level;
+}
+
+PoseCovariance Turned(const Eigen::Matrix3d& R_to_from, const PoseCovariance& covariance) {
+  Eigen::Matrix4d R = Eigen::Matrix4d::Identity();
+  R.topLeftCorner<3, 3>() = R_to_from;
+  return R * covariance * R.transpose();
+}
+
 Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to) {
   Eigen::Vector4d difference;
   difference.head<3>() = to.translation() - from.translation();

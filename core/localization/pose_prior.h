@@ -27,6 +27,11 @@ struct StartHint {
 // How well a start is known: a hint, or believed as far as its covariance, positive definite, says.
 using StartKnowledge = std::variant<StartHint, PoseCovariance>;
 
+// T_world_sensor without its tilt.
+Pose LevelFrame(const Pose& T_world_sensor);
+// Along the axes of a frame that is `R_to_from` to those it is given along.
+PoseCovariance Turned(const Eigen::Matrix3d& R_to_from, const PoseCovariance& covariance);
+
 // (x, y, z, yaw) that take `from` to `to`.
 Eigen::Vector4d PoseDifference(const Pose& from, const Pose& to);
 

@@ -2,6 +2,8 @@
 #include "core/localization/confirmation.h"
 
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -74,7 +76,8 @@ TEST(ConfirmationTest, AVehicleCarriedToAnotherDeckIsFoundOnItAndNotCalledGoodBe
   }
 }
 
-// A place that is known, as scans say it that fit so well there.
+// A place on the lower deck that is known. So large a share of each scan's columns is as the upper
+// deck shows it from the same spot.
 class KnownPlace {
  public:
   explicit KnownPlace(const ConfirmationOptions& options = {})
@@ -82,44 +85,57 @@ class KnownPlace {
     confirmation_.Trust();
   }
 
-  void Weigh(double fit) {
-    RegistrationResult here;
-    here.T_world_level = pose_;
-    here.fit = fit;
-    here.evidence = fit * static_cast<double>(features_.columns.size());
-    here.column_inliers = 1.0;
-    EXPECT_FALSE(confirmation_.Weigh(window_, features_, here, 0.7, true));
+  void Weigh(double share_above) {
+    ScanFeatures features = here_;
+    features.columns.clear();
+    Mix(here_.columns, 1.0 - share_above, features.columns);
+    Mix(above_.columns, share_above, features.columns);
+    const RegistrationResult here = Register(window_, features, pose_, RegistrationOptions());
+    EXPECT_FALSE(confirmation_.Weigh(window_, features, here, 0.7, true));
   }
   const Confirmation& known() const { return confirmation_; }
 
  private:
+  static void Mix(const std::vector<Eigen::Vector3f>& columns,
+                  double share,
+                  std::vector<Eigen::Vector3f>& mixed) {
+    double due = 0.0;
+    for (const Eigen::Vector3f& column : columns) {
+      due += share;
+      if (due < 1.0) continue;
+      due -= 1.0;
+      mixed.push_back(column);
+    }
+  }
+
   Pose pose_ = OnDeck(0.0, -2.0, -3.0, 0.4);
   MapWindow window_ = GarageMap().Window({0.0, 0.0, 1.8}, 25.0);
-  ScanFeatures features_ = FeaturesAt(testing::GarageCorner(), pose_);
+  ScanFeatures here_ = FeaturesAt(testing::GarageCorner(), pose_);
+  ScanFeatures above_ = FeaturesAt(testing::GarageCorner(), OnDeck(kFloor_m, -2.0, -3.0, 0.4));
   Confirmation confirmation_;
 };
 
 TEST(ConfirmationTest, SingleScansThatFitBetterOnAnotherDeckPutNoKnownPlaceInDoubt) {
-  const auto is_suspected = [](double fit) {
+  const auto is_suspected = [](double share_above) {
     KnownPlace fresh;
-    fresh.Weigh(fit);
+    fresh.Weigh(share_above);
     return fresh.known().is_suspected();
   };
-  double worse = 1.0;  // hardly so much that it counts
-  while (worse > 0.0 && !is_suspected(worse)) worse -= 0.02;
-  ASSERT_GT(worse, 0.0);
+  double above = 0.0;  // hardly so much that it counts
+  while (above < 1.0 && !is_suspected(above)) above += 0.02;
+  ASSERT_LT(above, 1.0);
   KnownPlace place;
   const int enough = ConfirmationOptions().suspected_scans;
   for (int round = 0; round < 3; ++round) {
     for (int i = 1; i < enough; ++i) {
-      place.Weigh(worse);
+      place.Weigh(above);
       EXPECT_TRUE(place.known().is_suspected()) << i;
     }
-    place.Weigh(1.0);
+    place.Weigh(0.0);
     EXPECT_TRUE(place.known().is_confirmed());
     EXPECT_FALSE(place.known().is_suspected());
   }
-  for (int i = 0; i < enough; ++i) place.Weigh(worse);
+  for (int i = 0; i < enough; ++i) place.Weigh(above);
   EXPECT_FALSE(place.known().is_confirmed());
 }
 
@@ -127,12 +143,23 @@ TEST(ConfirmationTest, AScanOfFewColumnsSaysLessOfADeck) {
   ConfirmationOptions options;
   options.many_columns = 1.0;
   KnownPlace many(options);
-  many.Weigh(0.1);
+  many.Weigh(1.0);
   EXPECT_TRUE(many.known().is_suspected());
   options.many_columns = 1e6;
   KnownPlace few(options);
-  few.Weigh(0.1);
+  few.Weigh(1.0);
   EXPECT_FALSE(few.known().is_suspected());
+}
+
+// Half of the lower deck was not mapped, and the upper one is as the lower one: it explains more.
+TEST(ConfirmationTest, ADeckThatWasMappedBetterIsNotTheLikelierOne) {
+  const std::vector<std::optional<float>> here{0.9F, 0.8F, std::nullopt, std::nullopt};
+  const std::vector<std::optional<float>> there{0.8F, 0.8F, 0.9F, 0.9F};
+  EXPECT_NEAR(CommonLead(here, there, 1.0), 2.5 * 0.05, 1e-6);
+  EXPECT_NEAR(CommonLead(there, here, 1.0), -2.5 * 0.05, 1e-6);
+  EXPECT_NEAR(CommonLead(here, there, 8.0), 0.5 * 2.5 * 0.05, 1e-6);
+  const std::vector<std::optional<float>> unknown(4);
+  EXPECT_EQ(CommonLead(here, unknown, 1.0), 0.0);
 }
 
 }  // namespace

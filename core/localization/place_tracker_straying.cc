@@ -1,0 +1,93 @@
+// Whether a place goes where the vehicle does, as its scans tell: one that looks like it goes along
+// with what repeats itself (decision 0632).
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "core/localization/place_tracker.h"
+
+namespace atlas {
+
+bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& features) {
+  const Eigen::Vector4d before = options_.straying_kept * strayed_;
+  strayed_ = before;
+  if (is_first_ || !confirmation_.is_confirmed() || recent_.is_empty() ||
+      IsMappedAround(features, found.T_world_level)) {
+    return false;
+  }
+  const PosePrior expected{Prior().T_world_level, motion_.StepCovariance()};
+  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
+  if (moved.fit < options_.odometry.sure_fit) {
+    return false;
+  }
+  const Eigen::Vector4d off = PoseDifference(moved.T_world_level, found.T_world_level);
+  const double unknown_m = options_.reachable_sigmas * SpreadOf(moved.covariance).along_m;
+  if (off.head<2>().norm() > unknown_m) strayed_ += off;
+  if (strayed_.head<3>().norm() <= options_.strayed_m &&
+      std::abs(strayed_(3)) <= options_.strayed_rad) {
+    return false;
+  }
+  strayed_.setZero();
+  carried_m_ = 0.0;
+  motion_.Carry(moved.T_world_level, StepCovariance(moved));
+  motion_.TakeBack(before);
+  return true;
+}
+
+bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result) {
+  if (carried_ > 0) {
+    const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, result.T_world_level);
+    if (!off_carried_) off_carried_ = off;
+    if (IsSameStep(off - *off_carried_)) {
+      return true;
+    }
+    off_carried_ = off;
+    return false;
+  }
+  std::optional<Pose> moved;
+  if (own_step_) {
+    if (own_step_->is_known) moved = LedBy(*own_step_);
+  } else if (recent_.is_empty()) {
+    moved = result.T_world_level;
+  } else {
+    const Eigen::Vector4d sigmas(options_.unsure_m, options_.unsure_m, options_.step_up_m,
+                                 options_.same_step_rad);
+    const PosePrior expected{result.T_world_level, sigmas.cwiseAbs2().asDiagonal()};
+    const ScanMotion seen = MotionSince(recent_, features, expected, options_.odometry);
+    if (seen.fit >= options_.odometry.min_fit) moved = seen.T_world_level;
+  }
+  if (moved) {
+    strayed_ += PoseDifference(*moved, result.T_world_level);
+    if (IsSameStep(strayed_)) {
+      return true;
+    }
+  }
+  strayed_.setZero();
+  return false;
+}
+
+bool PlaceTracker::IsSameStep(const Eigen::Vector4d& difference) const {
+  return difference.head<3>().norm() <= options_.same_step_m &&
+         std::abs(std::remainder(difference(3), 2.0 * std::numbers::pi)) <= options_.same_step_rad;
+}
+
+void PlaceTracker::GoAlong(const OwnStep& step) {
+  own_step_ = step;
+  if (!step.is_known) {
+    return;
+  }
+  motion_.Carry(LedBy(step), Turned(LevelFrame(motion_.last()).linear(), step.covariance));
+}
+
+Pose PlaceTracker::LedBy(const OwnStep& step) const {
+  return LevelFrame(motion_.last()) * step.T_last_now;
+}
+
+bool PlaceTracker::GoesWithRecent(const ScanFeatures& features, const PosePrior& expected) const {
+  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
+  return moved.fit >= options_.odometry.min_fit &&
+         !AreApart(moved.T_world_level, expected.T_world_level, options_.same_step_m,
+                   options_.same_step_rad);
+}
+
+}  // namespace atlas
