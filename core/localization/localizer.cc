@@ -1,7 +1,6 @@
 #include "core/localization/localizer.h"
 
 #include <algorithm>
-#include <iterator>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -110,7 +109,10 @@ Status Localizer::Expect(const LeveledScan& scan,
       ATLAS_RETURN_IF_ERROR(place.tracker.Prepare());
     }
   }
-  std::move(found.begin(), found.end(), std::back_inserter(places_));
+  for (SupposedPlace& place : found) {
+    place.number = ++supposed_;
+    places_.push_back(std::move(place));
+  }
   return {};
 }
 
@@ -173,13 +175,14 @@ bool Localizer::IsFollowed(const Pose& T_world_sensor) const {
 void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor) {
   if (places_.size() == 1) {
     places_.front().scores.clear();
+    leads_.clear();
   }
   const std::optional<OwnStep> step = StepOf(features);
   for (SupposedPlace& place : places_) {
     place.result = place.tracker.Track(features, R_level_sensor, step);
-    if (places_.size() > 1) Note(PlaceScore(place.result.registration, features), place.scores);
     place.lost = place.result.health == LocalizationHealth::kLost ? place.lost + 1 : 0;
   }
+  if (places_.size() > 1) Note(features);
   Join();
   GiveUp();
   Choose();
@@ -203,9 +206,24 @@ std::optional<OwnStep> Localizer::StepOf(const ScanFeatures& features) {
                                              : std::nullopt;
 }
 
-void Localizer::Note(double score, std::vector<double>& scores) const {
-  if (scores.size() == options_.most_scores) scores.erase(scores.begin());
-  scores.push_back(score);
+void Localizer::Note(const ScanFeatures& features) {
+  for (SupposedPlace& place : places_) {
+    if (place.scores.size() == options_.most_scores) place.scores.erase(place.scores.begin());
+    place.scores.push_back(PlaceScore(place.result.registration, features));
+    place.tracker.ColumnWeights(features, place.result.registration.T_world_level, place.weights);
+  }
+  const auto columns = static_cast<double>(features.columns.size());
+  for (const SupposedPlace& place : places_) {
+    for (const SupposedPlace& other : places_) {
+      if (&place == &other) continue;
+      Lead& lead = leads_[{place.number, other.number}];
+      const double by_all = place.scores.back() - other.scores.back();
+      lead.sum += place.lost > 0 || other.lost > 0
+                      ? by_all
+                      : std::min(by_all, CommonLead(place.weights, other.weights, columns));
+      ++lead.scans;
+    }
+  }
 }
 
 void Localizer::Join() {
@@ -259,14 +277,13 @@ bool Localizer::IsGivenUp(const SupposedPlace& place) const {
   });
 }
 
-Localizer::Lead Localizer::LeadOver(const SupposedPlace& place, const SupposedPlace& other) {
-  const auto both = static_cast<std::ptrdiff_t>(std::min(place.scores.size(), other.scores.size()));
-  const double sum = std::accumulate(place.scores.end() - both, place.scores.end(), 0.0) -
-                     std::accumulate(other.scores.end() - both, other.scores.end(), 0.0);
-  return {sum, static_cast<int>(both)};
+Localizer::Lead Localizer::LeadOver(const SupposedPlace& place, const SupposedPlace& other) const {
+  const auto lead = leads_.find({place.number, other.number});
+  return lead == leads_.end() ? Lead() : lead->second;
 }
 
-// Where it was tracked to is one of all places only while there are others.
+// Where it was tracked to is one of all places only while there are others; where it was tracked
+// from scan to scan it is, unless another is ahead.
 bool Localizer::IsBelieved(const SupposedPlace& place) const {
   const double sum = std::accumulate(place.scores.begin(), place.scores.end(), 0.0);
   return place.lost == 0 && place.tracker.is_confirmed() && IsAhead(place) &&
@@ -274,13 +291,16 @@ bool Localizer::IsBelieved(const SupposedPlace& place) const {
 }
 
 bool Localizer::IsAhead(const SupposedPlace& place) const {
+  const bool is_tracked_on = &place == &places_.front() && place.tracker.is_tracked_on();
   return std::all_of(places_.begin(), places_.end(), [&](const SupposedPlace& other) {
-    if (&other == &place) {
-      return true;
-    }
-    const Lead lead = LeadOver(place, other);
-    return options_.lead.IsClear(lead.sum, lead.scans);
+    return &other == &place ||
+           (is_tracked_on ? !IsClearlyAhead(other, place) : IsClearlyAhead(place, other));
   });
+}
+
+bool Localizer::IsClearlyAhead(const SupposedPlace& place, const SupposedPlace& other) const {
+  const Lead lead = LeadOver(place, other);
+  return options_.lead.IsClear(lead.sum, lead.scans);
 }
 
 void Localizer::Choose() {
@@ -296,6 +316,7 @@ void Localizer::Choose() {
   }
   std::swap(*believed, places_.front());
   places_.erase(places_.begin() + 1, places_.end());
+  places_.front().tracker.Settle();
 }
 
 }  // namespace atlas

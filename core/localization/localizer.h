@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -14,7 +15,7 @@
 #include "core/base/status.h"
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
-#include "core/localization/odometry/own_motion.h"
+#include "core/localization/own_motion.h"
 #include "core/localization/place_tracker.h"
 #include "core/localization/pose_prior.h"
 #include "core/localization/relocalizer.h"
@@ -100,9 +101,11 @@ class Localizer {
     explicit SupposedPlace(PlaceTracker at) : tracker(std::move(at)) {}
 
     PlaceTracker tracker;
-    LocalizationResult result;   // of the last scan
-    std::vector<double> scores;  // of the scans since others are supposed, too
-    int lost = 0;                // scans in a row
+    int number = 0;                             // of all places that were supposed
+    LocalizationResult result;                  // of the last scan
+    std::vector<double> scores;                 // of the scans since others are supposed, too
+    std::vector<std::optional<float>> weights;  // of the last scan's columns there
+    int lost = 0;                               // scans in a row
   };
 
   PlaceTracker NewTracker() const;
@@ -115,7 +118,8 @@ class Localizer {
                                           const Eigen::Quaterniond& R_level_sensor) const;
   bool IsFollowed(const Pose& T_world_sensor) const;
   void Follow(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor);
-  void Note(double score, std::vector<double>& scores) const;
+  // What the scan says of each place, and of each over each other.
+  void Note(const ScanFeatures& features);
   // The vehicle's step from the last scan, where a place that is not known needs it.
   std::optional<OwnStep> StepOf(const ScanFeatures& features);
   // Of two that came to the same place one stays.
@@ -124,14 +128,17 @@ class Localizer {
   // Those that are lost, far behind, or too many.
   void GiveUp();
   bool IsGivenUp(const SupposedPlace& place) const;
-  // How much more a place scores than another, of scans that both have: their sum and number.
+  // How much more a place scores than another, of scans that both have: their sum and number. By
+  // all that the map knows of either and, where both fit, by what it knows of both, whichever is
+  // less: what was mapped better explains more, wherever the vehicle is.
   struct Lead {
     double sum = 0.0;
     int scans = 0;
   };
-  static Lead LeadOver(const SupposedPlace& place, const SupposedPlace& other);
+  Lead LeadOver(const SupposedPlace& place, const SupposedPlace& other) const;
   bool IsBelieved(const SupposedPlace& place) const;
   bool IsAhead(const SupposedPlace& place) const;
+  bool IsClearlyAhead(const SupposedPlace& place, const SupposedPlace& other) const;
   // The first of the places is then the one that is believed, if any is.
   void Choose();
 
@@ -143,6 +150,8 @@ class Localizer {
   RelocalizerSource relocalizer_;
   // The first is the one that is told of: where it was tracked to. Others are while it is astray.
   std::vector<SupposedPlace> places_;
+  std::map<std::pair<int, int>, Lead> leads_;  // by the places' numbers
+  int supposed_ = 0;                           // places so far
   int astray_ = 0;        // scans in a row in which it was lost, in doubt, or adrift too far
   OwnMotion own_motion_;  // while it is
   double scans_ = 0.0;    // that were expected since the last one was followed

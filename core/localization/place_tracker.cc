@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/localization/feature_fit.h"
 #include "core/localization/other_decks.h"
 
 namespace atlas {
@@ -40,6 +41,7 @@ void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known
   }
   confirmation_.Trust();
   is_first_ = true;
+  is_elsewhere_ = false;
   untracked_ = 0.0;
   usual_fit_ = 0.0;
   lost_ = 0;
@@ -53,7 +55,15 @@ void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known
 void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
   Start(T_world_sensor, StartHint());
   confirmation_.Doubt();
+  is_elsewhere_ = true;
   usual_fit_ = usual_fit;
+}
+
+void PlaceTracker::ColumnWeights(const ScanFeatures& features,
+                                 const Pose& T_world_level,
+                                 std::vector<std::optional<float>>& weights) const {
+  FeatureFit(map_.window(), features, options_.registration.features)
+      .ColumnWeights(T_world_level, options_.registration.fine_radius_m, weights);
 }
 
 MotionModel PlaceTracker::Next() const {

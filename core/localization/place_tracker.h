@@ -16,9 +16,9 @@
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
 #include "core/localization/motion_model.h"
-#include "core/localization/odometry/own_motion.h"
 #include "core/localization/odometry/recent_scans.h"
 #include "core/localization/odometry/scan_odometry.h"
+#include "core/localization/own_motion.h"
 #include "core/localization/places/place_index.h"
 #include "core/localization/pose_search.h"
 #include "core/localization/registration.h"
@@ -201,6 +201,14 @@ class PlaceTracker {
   // The last answer, when another place may be the right one as well.
   LocalizationResult Doubted(LocalizationResult result) const;
   double usual_fit() const { return usual_fit_; }
+  // Whether it was tracked there from scan to scan since it was told or settled, however the scans
+  // fitted: else it was found.
+  bool is_tracked_on() const { return !is_elsewhere_; }
+  void Settle() { is_elsewhere_ = false; }
+  // FeatureFit::ColumnWeights(), in the map around it.
+  void ColumnWeights(const ScanFeatures& features,
+                     const Pose& T_world_level,
+                     std::vector<std::optional<float>>& weights) const;
   // Whether it is where scans fit, and nothing says yet that it is not another place.
   bool goes_along() const {
     return !is_first_ && carried_ == 0 && lost_ == 0 && !confirmation_.is_confirmed();
@@ -341,6 +349,7 @@ class PlaceTracker {
   bool is_first_ = true;
   bool is_told_ = false;                        // where it is at the first scan, and how surely
   StartHint hint_;                              // where it is not
+  bool is_elsewhere_ = false;                   // it was found, and is not known to be there
   double scans_ = 1.0;                          // from the last scan to the next
   double untracked_ = 0.0;                      // of these, expected so far
   bool has_stood_ = false;                      // in a pause before the scan at hand

@@ -46,6 +46,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
   }
   if (surprise == Surprise::kNew) {
     confirmation_.Doubt();
+    is_elsewhere_ = true;
   } else if (surprise == Surprise::kOdd) {
     confirmation_.Question();
   }
@@ -65,6 +66,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
       return;
     }
     result.registration = *std::move(there);
+    is_elsewhere_ = true;
     motion_.Raise(result.registration.T_world_level.translation().z() - up_m);
   }
   if (!confirmation_.is_confirmed() || confirmation_.is_suspected()) {

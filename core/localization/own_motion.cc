@@ -1,4 +1,4 @@
-#include "core/localization/odometry/own_motion.h"
+#include "core/localization/own_motion.h"
 
 namespace atlas {
 namespace {

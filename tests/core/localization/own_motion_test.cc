@@ -1,5 +1,5 @@
 // How a vehicle moves from scan to scan, wherever it is.
-#include "core/localization/odometry/own_motion.h"
+#include "core/localization/own_motion.h"
 
 #include <cmath>
 
