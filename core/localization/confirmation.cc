@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/localization/feature_fit.h"
+#include "core/localization/map_edge.h"
 
 namespace atlas {
 
@@ -60,8 +61,8 @@ std::optional<RegistrationResult> Confirmation::Weigh(const MapWindow& map,
   Compare(map, features, here);
   const auto better =
       std::min_element(rivals_.begin(), rivals_.end(),
-                       [](const Rival& a, const Rival& b) { return a.margin() < b.margin(); });
-  const bool is_better = better != rivals_.end() && better->margin() <= -options_.taken_margin;
+                       [&](const Rival& a, const Rival& b) { return Margin(a) < Margin(b); });
+  const bool is_better = better != rivals_.end() && Margin(*better) <= -options_.taken_margin;
   if (is_confirmed_) {
     is_confirmed_ = !is_better || better->scans < options_.suspected_scans;
     is_new_ = !is_confirmed_;
@@ -86,11 +87,18 @@ void Confirmation::Count(bool is_good, bool is_usual) {
   if (is_spoken_for && IsAhead()) Trust();
 }
 
+// Of a place that is new the map has to tell more than that it ends at the rival.
 bool Confirmation::IsAhead() const {
   return std::all_of(rivals_.begin(), rivals_.end(), [&](const Rival& rival) {
-    return is_new_ ? options_.lead.IsClear(rival.sure_lead, rival.scans)
-                   : rival.margin() >= -options_.tracked_margin;
+    const double lead = rival.is_at_edge ? std::min(rival.by_all, rival.by_common) : rival.by_all;
+    return is_new_ ? options_.lead.IsClear(lead, rival.scans)
+                   : Margin(rival) >= -options_.tracked_margin;
   });
+}
+
+double Confirmation::Margin(const Rival& rival) const {
+  const bool is_by_both = is_confirmed_ || !is_new_ || is_at_edge_;
+  return (is_by_both ? std::max(rival.by_all, rival.by_common) : rival.by_all) / rival.scans;
 }
 
 void Confirmation::Compare(const MapWindow& map,
@@ -106,6 +114,7 @@ void Confirmation::Compare(const MapWindow& map,
   }
   const FeatureFit fit(map, features, registration_.features);
   fit.ColumnWeights(here.T_world_level, registration_.fine_radius_m, here_weights_);
+  is_at_edge_ = IsAtEdge(map, features, here.T_world_level);
   for (const double up_m : ups_m) {
     Pose start = here.T_world_level;
     start.translation().z() += up_m;
@@ -120,16 +129,15 @@ void Confirmation::Compare(const MapWindow& map,
       return std::abs(other.up_m - rival.up_m) < 0.5 * options_.decks.apart_m;
     });
     if (before != before_.end()) {
-      rival.lead = before->lead;
-      rival.sure_lead = before->sure_lead;
+      rival.by_all = before->by_all;
+      rival.by_common = before->by_common;
       rival.scans = before->scans;
     }
-    const double lead = weight * (score - PlaceScore(rival.registration, features));
+    rival.by_all += weight * (score - PlaceScore(rival.registration, features));
     fit.ColumnWeights(rival.registration.T_world_level, registration_.fine_radius_m,
                       rival_weights_);
-    const double common = CommonLead(here_weights_, rival_weights_, options_.many_columns);
-    rival.lead += std::max(lead, common);
-    rival.sure_lead += std::min(lead, common);
+    rival.by_common += CommonLead(here_weights_, rival_weights_, options_.many_columns);
+    rival.is_at_edge = IsAtEdge(map, features, rival.registration.T_world_level);
     ++rival.scans;
     rivals_.push_back(rival);
   }

@@ -106,16 +106,18 @@ class Confirmation {
   struct Rival {
     double up_m = 0.0;
     // Sums of how much better each scan fits here, by all that the map knows of either place and by
-    // what it knows of both, whichever is more, and whichever is less: a deck that was mapped
-    // better explains more, whichever the vehicle is on.
-    double lead = 0.0;
-    double sure_lead = 0.0;
+    // what it knows of both: a deck that was mapped better explains more, whichever the vehicle is
+    // on.
+    double by_all = 0.0;
+    double by_common = 0.0;
     int scans = 0;
+    bool is_at_edge = false;          // of the map, at the last scan
     RegistrationResult registration;  // of the last scan
-
-    double margin() const { return lead / scans; }
   };
 
+  // How far a rival is behind, on average of its scans: by both, where the vehicle was tracked here
+  // or the map ends here.
+  double Margin(const Rival& rival) const;
   // Renews rivals_.
   void Compare(const MapWindow& map, const ScanFeatures& features, const RegistrationResult& here);
   bool IsAhead() const;  // of all rivals
@@ -129,6 +131,7 @@ class Confirmation {
   int good_scans_ = 0;
   int uncompared_ = 0;  // scans, while it is confirmed
   DeckFinder decks_;
+  bool is_at_edge_ = false;  // of the map, at the last scan
   std::vector<Rival> rivals_;
   std::vector<Rival> before_;  // rivals_ at the scan before; kept for its memory
   std::vector<std::optional<float>> here_weights_;  // of the scan at hand; kept for their memory

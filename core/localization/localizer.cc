@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "core/geometry/motion_share.h"
@@ -210,6 +209,7 @@ void Localizer::Note(const ScanFeatures& features) {
   for (SupposedPlace& place : places_) {
     if (place.scores.size() == options_.most_scores) place.scores.erase(place.scores.begin());
     place.scores.push_back(PlaceScore(place.result.registration, features));
+    place.is_at_edge = place.tracker.IsAtEdge(features, place.result.registration.T_world_level);
     place.tracker.ColumnWeights(features, place.result.registration.T_world_level, place.weights);
   }
   const auto columns = static_cast<double>(features.columns.size());
@@ -218,9 +218,10 @@ void Localizer::Note(const ScanFeatures& features) {
       if (&place == &other) continue;
       Lead& lead = leads_[{place.number, other.number}];
       const double by_all = place.scores.back() - other.scores.back();
-      lead.sum += place.lost > 0 || other.lost > 0
-                      ? by_all
-                      : std::min(by_all, CommonLead(place.weights, other.weights, columns));
+      lead.by_all += by_all;
+      lead.by_common += place.lost > 0 || other.lost > 0
+                            ? by_all
+                            : CommonLead(place.weights, other.weights, columns);
       ++lead.scans;
     }
   }
@@ -244,14 +245,12 @@ void Localizer::Join() {
   }
 }
 
-// Both are at one place now, whatever they scored where they came from. One that is carried knows
-// where the vehicle cannot be.
-bool Localizer::IsBetter(const SupposedPlace& a, const SupposedPlace& b) {
+// One that is carried knows where the vehicle cannot be, whatever it scored on its way.
+bool Localizer::IsBetter(const SupposedPlace& a, const SupposedPlace& b) const {
   const auto rank = [](const SupposedPlace& place) {
-    return std::tuple(place.tracker.is_confirmed(), place.tracker.is_carried(),
-                      place.scores.back());
+    return std::pair(place.tracker.is_confirmed(), place.tracker.is_carried());
   };
-  return rank(a) > rank(b);
+  return rank(a) != rank(b) ? rank(a) > rank(b) : LeadOver(a, b).by_all > 0.0;
 }
 
 void Localizer::GiveUp() {
@@ -273,7 +272,8 @@ bool Localizer::IsGivenUp(const SupposedPlace& place) const {
   }
   return std::any_of(places_.begin(), places_.end(), [&](const SupposedPlace& other) {
     const Lead lead = LeadOver(other, place);
-    return lead.scans >= options_.lead.scans && lead.sum > options_.max_behind * lead.scans;
+    return lead.scans >= options_.lead.scans &&
+           SumOf(lead, place) > options_.max_behind * lead.scans;
   });
 }
 
@@ -293,14 +293,18 @@ bool Localizer::IsBelieved(const SupposedPlace& place) const {
 bool Localizer::IsAhead(const SupposedPlace& place) const {
   const bool is_tracked_on = &place == &places_.front() && place.tracker.is_tracked_on();
   return std::all_of(places_.begin(), places_.end(), [&](const SupposedPlace& other) {
-    return &other == &place ||
-           (is_tracked_on ? !IsClearlyAhead(other, place) : IsClearlyAhead(place, other));
+    if (&other == &place) {
+      return true;
+    }
+    const Lead lead = LeadOver(place, other);
+    const Lead behind = LeadOver(other, place);
+    return is_tracked_on ? !options_.lead.IsClear(behind.by_both(), behind.scans)
+                         : options_.lead.IsClear(SumOf(lead, other), lead.scans);
   });
 }
 
-bool Localizer::IsClearlyAhead(const SupposedPlace& place, const SupposedPlace& other) const {
-  const Lead lead = LeadOver(place, other);
-  return options_.lead.IsClear(lead.sum, lead.scans);
+double Localizer::SumOf(const Lead& lead, const SupposedPlace& other) {
+  return other.is_at_edge ? lead.by_both() : lead.by_all;
 }
 
 void Localizer::Choose() {

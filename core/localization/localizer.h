@@ -3,6 +3,7 @@
 // scans of a short drive tell which of the places it is.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <memory>
@@ -105,6 +106,7 @@ class Localizer {
     LocalizationResult result;                  // of the last scan
     std::vector<double> scores;                 // of the scans since others are supposed, too
     std::vector<std::optional<float>> weights;  // of the last scan's columns there
+    bool is_at_edge = false;                    // of the map, at the last scan
     int lost = 0;                               // scans in a row
   };
 
@@ -124,21 +126,24 @@ class Localizer {
   std::optional<OwnStep> StepOf(const ScanFeatures& features);
   // Of two that came to the same place one stays.
   void Join();
-  static bool IsBetter(const SupposedPlace& a, const SupposedPlace& b);
+  bool IsBetter(const SupposedPlace& a, const SupposedPlace& b) const;
   // Those that are lost, far behind, or too many.
   void GiveUp();
   bool IsGivenUp(const SupposedPlace& place) const;
-  // How much more a place scores than another, of scans that both have: their sum and number. By
-  // all that the map knows of either and, where both fit, by what it knows of both, whichever is
-  // less: what was mapped better explains more, wherever the vehicle is.
+  // How much more a place scores than another, of scans that both have: sums by all that the map
+  // knows of either and, where both fit, by what it knows of both. What was mapped better explains
+  // more, wherever the vehicle is: where the map ends at the other one it has to be ahead by both.
   struct Lead {
-    double sum = 0.0;
+    double by_all = 0.0;
+    double by_common = 0.0;
     int scans = 0;
+
+    double by_both() const { return std::min(by_all, by_common); }
   };
   Lead LeadOver(const SupposedPlace& place, const SupposedPlace& other) const;
+  static double SumOf(const Lead& lead, const SupposedPlace& other);
   bool IsBelieved(const SupposedPlace& place) const;
   bool IsAhead(const SupposedPlace& place) const;
-  bool IsClearlyAhead(const SupposedPlace& place, const SupposedPlace& other) const;
   // The first of the places is then the one that is believed, if any is.
   void Choose();
 

@@ -45,6 +45,7 @@ void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known
   untracked_ = 0.0;
   usual_fit_ = 0.0;
   lost_ = 0;
+  known_ = 0;
   unheld_ = 0;
   without_map_ = 0;
   recent_.Clear();
@@ -87,6 +88,8 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
                                        const Eigen::Quaterniond& R_level_sensor,
                                        const std::optional<OwnStep>& step) {
   own_step_.reset();
+  has_broken_ = false;
+  has_strayed_ = false;
   has_stood_ = HasStood(features);
   if (!has_stood_) {
     motion_ = Next();
@@ -109,7 +112,6 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   }
   Located located = Locate(features, std::move(tracked));
   if (is_on_map && carried_ == 0 && Strays(located.registration, features)) {
-    carried_ = 1;
     located = Locate(features, Follow(features));
   }
   LocalizationResult result;
@@ -131,8 +133,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
     result.health = LocalizationHealth::kWeak;
   }
   // Of a first scan at the edge of the map no motion tells whether it is there.
-  const bool is_unchecked =
-      is_first_ && !IsMappedAround(features, result.registration.T_world_level);
+  const bool is_unchecked = is_first_ && IsAtEdge(features, result.registration.T_world_level);
   Remember(result, Seen(result.registration, cover, located.rival), is_found);
   Keep(features, result, is_found);
   result.covariance = Covariance(result);
@@ -214,6 +215,7 @@ void PlaceTracker::Remember(const LocalizationResult& result,
                             bool is_found) {
   const bool is_next = !is_first_ && lost_ == 0;
   is_first_ = false;
+  known_ = result.health == LocalizationHealth::kGood ? known_ + 1 : 0;
   if (result.health == LocalizationHealth::kGood) {
     const double fit = result.registration.fit;
     usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;

@@ -15,6 +15,7 @@
 #include "core/localization/confirmation.h"
 #include "core/localization/local_map.h"
 #include "core/localization/localization_result.h"
+#include "core/localization/map_edge.h"
 #include "core/localization/motion_model.h"
 #include "core/localization/odometry/recent_scans.h"
 #include "core/localization/odometry/scan_odometry.h"
@@ -93,19 +94,19 @@ struct PlaceTrackerOptions {
   // too.
   int asked_again_after = 5;
 
-  // Where less than this share of the ground within `near_ground_m` was mapped at its height, a
+  // Where less than this share of the ground around was mapped at its height (map_edge), a
   // vehicle that is known goes on by its own motion when the scan does not fit: what else is near
   // in the map is another deck, or looks like it. Until that motion has a break in it, no place
   // counts that is further than so many standard deviations from where it came to.
   double min_ground_mapped = 0.5;
   // Where less than this share is, weak places are checked by that motion, which is to agree.
   double edge_ground_mapped = 0.9;
-  // Where less than this share is, a place moves as the vehicle does: where it came further than so
-  // from where its own motion leads, in all, the vehicle left the map. Nor do other decks count, of
-  // which more was mapped. Along drives through maps that go on 0.7 to 0.95 is mapped, and places
-  // stray by 0.01 to 0.05 m; at the edge of one of half a deck 0.65 to 0.3 is, and where that
-  // repeats itself they stray by 0.2 to 1 m a scan.
-  double checked_ground_mapped = 0.7;
+  // Where the map ends (map_edge) a place goes where the vehicle does: where it came further than
+  // so from where its own motion leads, in all, the vehicle left the map. Where all is well places
+  // stray by 0.01 to 0.05 m a scan, where what is left of the map repeats itself by 0.2 to 1 m.
+  // So it has to where it is so far from where it was expected: a vehicle brakes by less a scan.
+  double unexpected_m = 0.15;
+  int long_known = 20;  // scans, from which on it is its motion that is believed
   double strayed_m = 0.3;
   double strayed_rad = 0.05;
   double straying_kept = 0.9;  // from scan to scan: own motion errs, too
@@ -113,8 +114,6 @@ struct PlaceTrackerOptions {
   double same_step_rad = 0.05;
   // So far around where a place that is not confirmed has come to its own motion is looked for.
   double unsure_m = 1.0;
-  float near_ground_m = 15.0F;
-  float ground_reach_m = 0.6F;
   double reachable_sigmas = 3.5;     // of (x, y, yaw) in all, and of the height: 0.997 of what
   double reachable_up_sigmas = 3.0;  // a covariance says. A deck is no further than that is.
   // ... nor does less of the ground keep it on the map where the scan fits well enough.
@@ -205,6 +204,10 @@ class PlaceTracker {
   // fitted: else it was found.
   bool is_tracked_on() const { return !is_elsewhere_; }
   void Settle() { is_elsewhere_ = false; }
+  // Whether the map ends where a scan was taken.
+  bool IsAtEdge(const ScanFeatures& features, const Pose& T_world_level) const {
+    return atlas::IsAtEdge(map_.window(), features, T_world_level);
+  }
   // FeatureFit::ColumnWeights(), in the map around it.
   void ColumnWeights(const ScanFeatures& features,
                      const Pose& T_world_level,
@@ -269,8 +272,12 @@ class PlaceTracker {
   bool IsDoubtful(const RegistrationResult& result) const;
   // By what the last scans saw, where there are any and this one goes with them.
   bool CarryOn(const ScanFeatures& features);
-  // Goes off the map, if a place where little is mapped went elsewhere than the vehicle, as its
-  // scans tell.
+  // Whether it is not where the motion before led.
+  bool IsUnexpected(const RegistrationResult& found) const;
+  // Where the map ends, or the scan is not where and as it was expected: whether the place went
+  // elsewhere than the vehicle, as its scans tell. Where the map ends the vehicle is where their
+  // motion leads, and carried on from there; else it is in doubt, and where scans do not fit to
+  // each other it may be anywhere.
   bool Strays(const RegistrationResult& found, const ScanFeatures& features);
   // Goes off the map, if that is where it drove, or where it was told to be.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
@@ -288,11 +295,6 @@ class PlaceTracker {
   bool IsOnMap(const RegistrationResult& result,
                const ScanFeatures& features,
                double unknown_share) const;
-  // Share of the ground near the vehicle that is in the map at its height; none where no ground is
-  // seen.
-  std::optional<double> GroundMapped(const ScanFeatures& features, const Pose& T_world_level) const;
-  // Whether so much is that what fits is believed without more ado.
-  bool IsMappedAround(const ScanFeatures& features, const Pose& T_world_level) const;
   // Whether little of the map is left to hold it, and its own motion brought it there, too.
   bool IsNearEdge(const ScanFeatures& features, const LocalizationResult& result);
   // On the map again.
@@ -353,8 +355,11 @@ class PlaceTracker {
   double scans_ = 1.0;                          // from the last scan to the next
   double untracked_ = 0.0;                      // of these, expected so far
   bool has_stood_ = false;                      // in a pause before the scan at hand
+  bool has_broken_ = false;                     // its motion, before the scan at hand
+  bool has_strayed_ = false;                    // from its motion, on the map
   double usual_fit_ = 0.0;                      // of good results, exponentially forgotten
   int lost_ = 0;                                // scans in a row
+  int known_ = 0;                               // good scans in a row
   int unheld_ = 0;                              // scans in a row
   int without_map_ = 0;                         // scans in a row on which the map was not all there
   RecentScans recent_;                          // while it is known where each was taken

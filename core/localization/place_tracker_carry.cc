@@ -88,7 +88,7 @@ void PlaceTracker::Keep(const ScanFeatures& features,
 bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationResult& result) {
   const Pose& there = result.registration.T_world_level;
   if (result.health != LocalizationHealth::kWeak || recent_.is_empty() ||
-      GroundMapped(features, there).value_or(1.0) > options_.edge_ground_mapped) {
+      GroundMapped(map_.window(), features, there).value_or(1.0) > options_.edge_ground_mapped) {
     return false;
   }
   const bool agrees =
@@ -102,27 +102,8 @@ bool PlaceTracker::IsOnMap(const RegistrationResult& result,
                            double unknown_share) const {
   const double asked = confirmation_.IsEnough(result, features) ? options_.least_ground_mapped
                                                                 : options_.min_ground_mapped;
-  return GroundMapped(features, result.T_world_level).value_or(unknown_share) >= asked;
-}
-
-std::optional<double> PlaceTracker::GroundMapped(const ScanFeatures& features,
-                                                 const Pose& T_world_level) const {
-  const Eigen::Matrix3f R = T_world_level.linear().cast<float>();
-  const Eigen::Vector3f t = (T_world_level.translation() - map_.window().origin()).cast<float>();
-  int near = 0;
-  int mapped = 0;
-  for (const Eigen::Vector3f& p : features.ground) {
-    if (p.norm() > options_.near_ground_m) {
-      continue;
-    }
-    ++near;
-    mapped += map_.window().NearestSurface(R * p + t, options_.ground_reach_m) ? 1 : 0;
-  }
-  return near == 0 ? std::nullopt : std::optional(static_cast<double>(mapped) / near);
-}
-
-bool PlaceTracker::IsMappedAround(const ScanFeatures& features, const Pose& T_world_level) const {
-  return GroundMapped(features, T_world_level).value_or(1.0) >= options_.checked_ground_mapped;
+  return GroundMapped(map_.window(), features, result.T_world_level).value_or(unknown_share) >=
+         asked;
 }
 
 bool PlaceTracker::IsWithinReach(const Pose& T_world_sensor) const {

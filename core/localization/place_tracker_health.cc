@@ -20,16 +20,22 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
   }
   if (carried_ > 0) {
     const bool is_back_soon = carried_ <= options_.max_coasting &&
-                              IsMappedAround(features, result.T_world_level) &&
+                              !IsAtEdge(features, result.T_world_level) &&
                               confirmation_.IsAsUsual(result, features, usual_fit_);
     return is_back_soon ? Surprise::kNone : Surprise::kOdd;
   }
   if (lost_ == 0 && !is_found) {
-    return has_stood_ ? Surprise::kOdd : Surprise::kNone;
+    return has_stood_ || has_broken_ || has_strayed_ ? Surprise::kOdd : Surprise::kNone;
   }
   const bool is_near =
       off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;
   const bool is_likely = LogDensity(prior, result.T_world_level) > options_.surprising_log_density;
+  if (has_strayed_) {
+    return Surprise::kOdd;
+  }
+  if (has_broken_) {
+    return is_near ? Surprise::kOdd : Surprise::kNew;
+  }
   if ((lost_ == 0 && is_likely) || (lost_ <= options_.max_coasting && is_near &&
                                     confirmation_.IsAsUsual(result, features, usual_fit_))) {
     return Surprise::kNone;
@@ -49,6 +55,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
     is_elsewhere_ = true;
   } else if (surprise == Surprise::kOdd) {
     confirmation_.Question();
+    is_elsewhere_ = is_elsewhere_ || has_broken_;
   }
   if (!confirmation_.is_confirmed() && !MovesAsSeen(features, result.registration)) {
     confirmation_.Miss();
@@ -56,7 +63,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
   const double up_m = result.registration.T_world_level.translation().z();
   // At the edge of the map another deck, of which more was mapped, explains more of a scan.
   const bool is_compared =
-      !confirmation_.is_confirmed() || IsMappedAround(features, result.registration.T_world_level);
+      !confirmation_.is_confirmed() || !IsAtEdge(features, result.registration.T_world_level);
   auto there = is_compared ? confirmation_.Weigh(map_.window(), features, result.registration,
                                                  usual_fit_, IsDoubtful(result.registration))
                            : std::nullopt;

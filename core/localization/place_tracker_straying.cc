@@ -11,12 +11,14 @@ namespace atlas {
 bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& features) {
   const Eigen::Vector4d before = options_.straying_kept * strayed_;
   strayed_ = before;
+  const bool is_at_edge = IsAtEdge(features, found.T_world_level);
   if (is_first_ || !confirmation_.is_confirmed() || recent_.is_empty() ||
-      IsMappedAround(features, found.T_world_level)) {
+      !(is_at_edge || IsDoubtful(found) || IsUnexpected(found))) {
     return false;
   }
   const PosePrior expected{Prior().T_world_level, motion_.StepCovariance()};
   const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
+  has_broken_ = moved.fit < options_.odometry.min_fit;
   if (moved.fit < options_.odometry.sure_fit) {
     return false;
   }
@@ -28,10 +30,20 @@ bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& f
     return false;
   }
   strayed_.setZero();
+  has_strayed_ = !is_at_edge && known_ < options_.long_known;
+  if (has_strayed_) {
+    return false;
+  }
+  carried_ = is_at_edge ? 1 : 0;
   carried_m_ = 0.0;
   motion_.Carry(moved.T_world_level, StepCovariance(moved));
   motion_.TakeBack(before);
   return true;
+}
+
+bool PlaceTracker::IsUnexpected(const RegistrationResult& found) const {
+  const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, found.T_world_level);
+  return off.head<2>().norm() > options_.unexpected_m;
 }
 
 bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result) {
