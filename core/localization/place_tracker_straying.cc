@@ -1,5 +1,5 @@
 // Whether a place goes where the vehicle does, as its scans tell: one that looks like it goes along
-// with what repeats itself (decision 0632).
+// with what repeats itself (decisions 0632 and 0634).
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -41,7 +41,12 @@ bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& f
   return true;
 }
 
+// Of a vehicle whose speed is known to that.
 bool PlaceTracker::IsUnexpected(const RegistrationResult& found) const {
+  constexpr double kKnown_m = 0.5;  // a scan
+  if (SpreadOf(motion_.StepCovariance()).along_m > kKnown_m) {
+    return false;
+  }
   const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, found.T_world_level);
   return off.head<2>().norm() > options_.unexpected_m;
 }
