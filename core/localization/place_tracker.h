@@ -106,7 +106,7 @@ struct PlaceTrackerOptions {
   // stray by 0.01 to 0.05 m a scan, where what is left of the map repeats itself by 0.2 to 1 m.
   // So it has to where it is so far from where it was expected: a vehicle brakes by less a scan.
   double unexpected_m = 0.15;
-  int long_known = 20;  // scans, from which on it is its motion that is believed
+  int long_known = 20;  // good scans, from which on its motion is believed
   double strayed_m = 0.3;
   double strayed_rad = 0.05;
   double straying_kept = 0.9;  // from scan to scan: own motion errs, too
@@ -275,9 +275,9 @@ class PlaceTracker {
   // Whether it is not where the motion before led.
   bool IsUnexpected(const RegistrationResult& found) const;
   // Where the map ends, or the scan is not where and as it was expected: whether the place went
-  // elsewhere than the vehicle, as its scans tell. Where the map ends the vehicle is where their
-  // motion leads, and carried on from there; else it is in doubt, and where scans do not fit to
-  // each other it may be anywhere.
+  // elsewhere than the vehicle, as its scans tell. Where the map ends, and where it was known for
+  // long, the vehicle is where their motion leads then, in the first case carried on from there;
+  // else the place is in doubt. Scans that do not fit to each other mean that it may be anywhere.
   bool Strays(const RegistrationResult& found, const ScanFeatures& features);
   // Goes off the map, if that is where it drove, or where it was told to be.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
