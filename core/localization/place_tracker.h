@@ -89,6 +89,8 @@ struct PlaceTrackerOptions {
   double unique_log_ratio = 1.0;
   SearchReach search_reach;  // of the first search; each lost scan adds as much
   SearchReach max_search_reach{8.0, 8.0, std::numbers::pi};
+  // So far beside a place that was found another one has to fit less before it is known.
+  SearchReach beside{3.0, 3.0, 0.1};
 
   // Where the map is not all there, it is asked for again after so many scans, at a standstill,
   // too.
@@ -324,6 +326,8 @@ class PlaceTracker {
                       bool is_found) const;
   // Takes the place up, which may be a new one, or another deck's.
   void Confirm(const ScanFeatures& features, Surprise surprise, LocalizationResult& result);
+  // Whether a place beside it fits as well.
+  bool RepeatsBeside(const RegistrationResult& found, const ScanFeatures& features);
   PoseCovariance Covariance(const LocalizationResult& result) const;
   bool IsHeld(const RegistrationResult& result, const ScanFeatures& features) const;
   LocalizationHealth Judge(const RegistrationResult& result,

@@ -1,6 +1,8 @@
 // How far a localizer's answer can be believed.
+#include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "core/localization/place_tracker.h"
 
@@ -60,6 +62,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
   if (!confirmation_.is_confirmed() && !MovesAsSeen(features, result.registration)) {
     confirmation_.Miss();
   }
+  const bool was_confirmed = confirmation_.is_confirmed();
   const double up_m = result.registration.T_world_level.translation().z();
   // At the edge of the map another deck, of which more was mapped, explains more of a scan.
   const bool is_compared =
@@ -76,9 +79,28 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
     is_elsewhere_ = true;
     motion_.Raise(result.registration.T_world_level.translation().z() - up_m);
   }
+  if (!was_confirmed && confirmation_.is_confirmed() && is_elsewhere_ &&
+      RepeatsBeside(result.registration, features)) {
+    confirmation_.Doubt();
+  }
   if (!confirmation_.is_confirmed() || confirmation_.is_suspected()) {
     result.health = LocalizationHealth::kWeak;
   }
+}
+
+// Of rows of posts or bays one is as good as the next, and moves as the vehicle does.
+bool PlaceTracker::RepeatsBeside(const RegistrationResult& found, const ScanFeatures& features) {
+  const std::vector<Pose> starts =
+      SearchPoses(map_.coarse(), map_.window().origin(), features, found.T_world_level,
+                  options_.beside, options_.search);
+  return std::any_of(starts.begin(), starts.end(), [&](const Pose& start) {
+    const RegistrationResult other =
+        Register(map_.window(), features, start, options_.registration);
+    return AreApart(other.T_world_level, found.T_world_level, options_.search.apart_m,
+                    options_.search.apart_rad) &&
+           At(other, false).log_likelihood >
+               At(found, false).log_likelihood - options_.unique_log_ratio;
+  });
 }
 
 bool PlaceTracker::IsHeld(const RegistrationResult& result, const ScanFeatures& features) const {
