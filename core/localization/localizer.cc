@@ -36,7 +36,7 @@ Localizer::Localizer(const MapProfile& profile,
       options_(options),
       features_(options.features),
       relocalizer_(std::move(relocalizer)),
-      own_motion_(options.tracker.motion, options.tracker.odometry) {
+      own_motion_(options.tracker.motion, options.tracker.trail.odometry) {
   places_.emplace_back(NewTracker());
 }
 
@@ -172,10 +172,8 @@ bool Localizer::IsFollowed(const Pose& T_world_sensor) const {
 }
 
 void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R_level_sensor) {
-  if (places_.size() == 1) {
-    places_.front().scores.clear();
-    leads_.clear();
-  }
+  if (places_.size() == 1) places_.front().scores.clear();
+  std::erase_if(leads_, [&](const auto& lead) { return !IsThere(lead.first); });
   const std::optional<OwnStep> step = StepOf(features);
   for (SupposedPlace& place : places_) {
     place.result = place.tracker.Track(features, R_level_sensor, step);
@@ -187,9 +185,10 @@ void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R
   Choose();
   const SupposedPlace& told = places_.front();
   const bool is_astray = places_.size() > 1 || told.lost > 0 || !told.tracker.is_confirmed() ||
-                         told.tracker.spread_m() > options_.adrift_m;
+                         told.tracker.spread_m() > options_.adrift_m ||
+                         told.tracker.is_just_found();
   astray_ = is_astray ? astray_ + 1 : 0;
-  if (!is_astray) {
+  if (!is_astray && !told.tracker.goes_along()) {
     own_motion_.Forget();
   } else if (!step) {
     own_motion_.Begin(features);
@@ -277,6 +276,14 @@ bool Localizer::IsGivenUp(const SupposedPlace& place) const {
   });
 }
 
+bool Localizer::IsThere(const std::pair<int, int>& numbers) const {
+  const auto is_one = [&](int number) {
+    return std::any_of(places_.begin(), places_.end(),
+                       [&](const SupposedPlace& place) { return place.number == number; });
+  };
+  return is_one(numbers.first) && is_one(numbers.second);
+}
+
 Localizer::Lead Localizer::LeadOver(const SupposedPlace& place, const SupposedPlace& other) const {
   const auto lead = leads_.find({place.number, other.number});
   return lead == leads_.end() ? Lead() : lead->second;
@@ -303,8 +310,10 @@ bool Localizer::IsAhead(const SupposedPlace& place) const {
   });
 }
 
-double Localizer::SumOf(const Lead& lead, const SupposedPlace& other) {
-  return other.is_at_edge ? lead.by_both() : lead.by_all;
+double Localizer::SumOf(const Lead& lead, const SupposedPlace& other) const {
+  const bool is_known =
+      &other == &places_.front() && other.lost == 0 && other.tracker.is_confirmed();
+  return is_known || other.is_at_edge ? lead.by_both() : lead.by_all;
 }
 
 void Localizer::Choose() {

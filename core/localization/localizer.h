@@ -132,7 +132,8 @@ class Localizer {
   bool IsGivenUp(const SupposedPlace& place) const;
   // How much more a place scores than another, of scans that both have: sums by all that the map
   // knows of either and, where both fit, by what it knows of both. What was mapped better explains
-  // more, wherever the vehicle is: where the map ends at the other one it has to be ahead by both.
+  // more, wherever the vehicle is: where the map ends at the other one, and where the vehicle is
+  // known to be at the other one, it has to be ahead by both.
   struct Lead {
     double by_all = 0.0;
     double by_common = 0.0;
@@ -140,8 +141,9 @@ class Localizer {
 
     double by_both() const { return std::min(by_all, by_common); }
   };
+  bool IsThere(const std::pair<int, int>& numbers) const;  // both
   Lead LeadOver(const SupposedPlace& place, const SupposedPlace& other) const;
-  static double SumOf(const Lead& lead, const SupposedPlace& other);
+  double SumOf(const Lead& lead, const SupposedPlace& other) const;
   bool IsBelieved(const SupposedPlace& place) const;
   bool IsAhead(const SupposedPlace& place) const;
   // The first of the places is then the one that is believed, if any is.

@@ -130,10 +130,7 @@ void MotionModel::Relocate(const Pose& T_world_sensor, const Eigen::Matrix4d& se
   covariance_.topLeftCorner<4, 4>() = (prior.inverse() + seen).inverse();
 }
 
-void MotionModel::TakeBack(const Eigen::Vector4d& strayed) {
-  pose_.translation() -= strayed.head<3>();
-  pose_.linear() =
-      Eigen::AngleAxisd(-strayed(3), Eigen::Vector3d::UnitZ()).toRotationMatrix() * pose_.linear();
+void MotionModel::Widen(const Eigen::Vector4d& strayed) {
   covariance_.diagonal().head<4>() += strayed.cwiseAbs2();
 }
 

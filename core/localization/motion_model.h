@@ -59,8 +59,8 @@ class MotionModel {
   void ForgetMotion();
   // It is on another deck, so much higher; all else is as it was.
   void Raise(double up_m) { pose_.translation().z() += up_m; }
-  // Since it was last sure it strayed by so much in (x, y, z, yaw), more or less.
-  void TakeBack(const Eigen::Vector4d& strayed);
+  // It may have strayed by so much in (x, y, z, yaw), either way.
+  void Widen(const Eigen::Vector4d& strayed);
   // The IMU's tilt; the place and the heading stay.
   void SetTilt(const Eigen::Matrix3d& R_world_sensor);
 

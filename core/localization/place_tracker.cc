@@ -28,7 +28,7 @@ PlaceTracker::PlaceTracker(const MapProfile& profile,
       map_(profile, std::move(tiles), options.map),
       motion_(options.motion),
       confirmation_(options.confirmation, options.registration),
-      recent_(options.odometry.scans) {}
+      trail_(options.trail) {}
 
 void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known) {
   const auto* covariance = std::get_if<PoseCovariance>(&known);
@@ -42,15 +42,18 @@ void PlaceTracker::Start(const Pose& T_world_sensor, const StartKnowledge& known
   confirmation_.Trust();
   is_first_ = true;
   is_elsewhere_ = false;
+  was_anywhere_ = false;
   untracked_ = 0.0;
   usual_fit_ = 0.0;
   lost_ = 0;
   known_ = 0;
   unheld_ = 0;
   without_map_ = 0;
-  recent_.Clear();
+  trail_.Clear();
   strayed_.setZero();
+  moved_off_.setZero();
   carried_ = 0;
+  off_carried_.reset();
 }
 
 void PlaceTracker::Suppose(const Pose& T_world_sensor, double usual_fit) {
@@ -119,7 +122,7 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   const bool is_found = located.is_found;
   const Surprise surprise = SurpriseOf(result.registration, features, is_found);
   result.health = Judge(result.registration, features, surprise);
-  Confirm(features, surprise, result);
+  Confirm(features, surprise, is_found, result);
   unheld_ = carried_ > 0 || IsHeld(result.registration, features) ? 0 : unheld_ + 1;
   result.T_world_sensor = result.health == LocalizationHealth::kLost
                               ? Prior().T_world_level
@@ -213,7 +216,7 @@ Eigen::Matrix4d PlaceTracker::Seen(const RegistrationResult& registration,
 void PlaceTracker::Remember(const LocalizationResult& result,
                             const Eigen::Matrix4d& seen,
                             bool is_found) {
-  const bool is_next = !is_first_ && lost_ == 0;
+  const bool is_next = !is_first_ && lost_ == 0 && carried_ == 0;
   is_first_ = false;
   known_ = result.health == LocalizationHealth::kGood ? known_ + 1 : 0;
   if (result.health == LocalizationHealth::kGood) {

@@ -17,8 +17,8 @@
 #include "core/localization/localization_result.h"
 #include "core/localization/map_edge.h"
 #include "core/localization/motion_model.h"
-#include "core/localization/odometry/recent_scans.h"
 #include "core/localization/odometry/scan_odometry.h"
+#include "core/localization/odometry/scan_trail.h"
 #include "core/localization/own_motion.h"
 #include "core/localization/places/place_index.h"
 #include "core/localization/pose_search.h"
@@ -33,7 +33,7 @@ struct PlaceTrackerOptions {
   MotionOptions motion;
   PoseSearchOptions search;
   ConfirmationOptions confirmation;
-  ScanOdometryOptions odometry;
+  ScanTrailOptions trail;
 
   // Of RegistrationResult; less is lost. Wrong places on real drives, found from starts up to 6 m
   // and 20 degrees off, fit 0.385 at most, right ones 0.48 and more but for two in a hundred.
@@ -90,7 +90,7 @@ struct PlaceTrackerOptions {
   SearchReach search_reach;  // of the first search; each lost scan adds as much
   SearchReach max_search_reach{8.0, 8.0, std::numbers::pi};
   // So far beside a place that was found another one has to fit less before it is known.
-  SearchReach beside{3.0, 3.0, 0.1};
+  SearchReach beside{8.0, 8.0, 0.1};
 
   // Where the map is not all there, it is asked for again after so many scans, at a standstill,
   // too.
@@ -120,17 +120,6 @@ struct PlaceTrackerOptions {
   double reachable_up_sigmas = 3.0;  // a covariance says. A deck is no further than that is.
   // ... nor does less of the ground keep it on the map where the scan fits well enough.
   double least_ground_mapped = 0.25;
-  // However well scans fit to each other, a step of a metre or more is known no better than this,
-  // standard deviations; a shorter one as much better as it is shorter.
-  double step_m = 0.02;
-  double step_up_m = 0.015;
-  double step_rad = 0.0015;
-  // What errs all the way, the IMU's tilt first of all: standard deviations, a metre of the way.
-  double drift = 0.003;
-  double drift_up = 0.003;
-  // Scans are kept that are so far from each other: of one spot one is enough.
-  double kept_apart_m = 0.3;
-  double kept_apart_rad = 0.1;
 
   int told_lost_after = 5;  // scans, from which on its covariance is that of an unknown place
 
@@ -205,7 +194,10 @@ class PlaceTracker {
   // Whether it was tracked there from scan to scan since it was told or settled, however the scans
   // fitted: else it was found.
   bool is_tracked_on() const { return !is_elsewhere_; }
-  void Settle() { is_elsewhere_ = false; }
+  void Settle() { is_elsewhere_ = was_anywhere_ = false; }
+  // Whether it was found of late, where nobody expected it: elsewhere in the map it may fit as
+  // well.
+  bool is_just_found() const { return was_anywhere_ && known_ < options_.long_known; }
   // Whether the map ends where a scan was taken.
   bool IsAtEdge(const ScanFeatures& features, const Pose& T_world_level) const {
     return atlas::IsAtEdge(map_.window(), features, T_world_level);
@@ -214,9 +206,11 @@ class PlaceTracker {
   void ColumnWeights(const ScanFeatures& features,
                      const Pose& T_world_level,
                      std::vector<std::optional<float>>& weights) const;
-  // Whether it is where scans fit, and nothing says yet that it is not another place.
+  // Whether it is where scans fit, and either nothing says yet that it is not another place, or
+  // what was mapped does not hold it.
   bool goes_along() const {
-    return !is_first_ && carried_ == 0 && lost_ == 0 && !confirmation_.is_confirmed();
+    return !is_first_ && carried_ == 0 && lost_ == 0 &&
+           (!confirmation_.is_confirmed() || spread_m() > options_.fan_sigma_m);
   }
   // Whether it went off the map and is carried on by its own motion from where it was known.
   bool is_carried() const { return carried_ > 0; }
@@ -283,8 +277,8 @@ class PlaceTracker {
   bool Strays(const RegistrationResult& found, const ScanFeatures& features);
   // Goes off the map, if that is where it drove, or where it was told to be.
   bool LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features);
-  // Of a step, with what errs on the way there.
-  PoseCovariance StepCovariance(const ScanMotion& moved);
+  // To where its own scans say.
+  void Go(const ScanMotion& moved);
   // Whether that is near enough to where it is expected.
   bool IsWithinReach(const Pose& T_world_level) const;
   // Whether a place that is not confirmed moved as the vehicle did, as its scans tell, since it was
@@ -325,7 +319,10 @@ class PlaceTracker {
                       const ScanFeatures& features,
                       bool is_found) const;
   // Takes the place up, which may be a new one, or another deck's.
-  void Confirm(const ScanFeatures& features, Surprise surprise, LocalizationResult& result);
+  void Confirm(const ScanFeatures& features,
+               Surprise surprise,
+               bool is_found,
+               LocalizationResult& result);
   // Whether a place beside it fits as well.
   bool RepeatsBeside(const RegistrationResult& found, const ScanFeatures& features);
   PoseCovariance Covariance(const LocalizationResult& result) const;
@@ -353,26 +350,28 @@ class PlaceTracker {
   MotionModel motion_;
   Confirmation confirmation_;
   bool is_first_ = true;
-  bool is_told_ = false;                        // where it is at the first scan, and how surely
-  StartHint hint_;                              // where it is not
-  bool is_elsewhere_ = false;                   // it was found, and is not known to be there
-  double scans_ = 1.0;                          // from the last scan to the next
-  double untracked_ = 0.0;                      // of these, expected so far
-  bool has_stood_ = false;                      // in a pause before the scan at hand
-  bool has_broken_ = false;                     // its motion, before the scan at hand
-  bool has_strayed_ = false;                    // from its motion, on the map
-  double usual_fit_ = 0.0;                      // of good results, exponentially forgotten
-  int lost_ = 0;                                // scans in a row
-  int known_ = 0;                               // good scans in a row
-  int unheld_ = 0;                              // scans in a row
-  int without_map_ = 0;                         // scans in a row on which the map was not all there
-  RecentScans recent_;                          // while it is known where each was taken
-  int carried_ = 0;                             // scans in a row, the one at hand as well
-  double carried_m_ = 0.0;                      // the way that it made meanwhile
-  std::optional<Eigen::Vector4d> off_carried_;  // from there to where a scan fitted, MovesAsSeen()
-  Eigen::Vector4d strayed_ = Eigen::Vector4d::Zero();  // ... and where it is not carried, in all
-  std::optional<OwnStep> own_step_;                    // to the scan at hand, from elsewhere
-  Pose last_kept_ = Pose::Identity();                  // where the last of recent_ was taken
+  bool is_told_ = false;             // where it is at the first scan, and how surely
+  StartHint hint_;                   // where it is not
+  bool is_elsewhere_ = false;        // it was found, and is not known to be there
+  bool was_anywhere_ = false;        // when it was found
+  double scans_ = 1.0;               // from the last scan to the next
+  double untracked_ = 0.0;           // of these, expected so far
+  bool has_stood_ = false;           // in a pause before the scan at hand
+  bool has_broken_ = false;          // its motion, before the scan at hand
+  bool has_strayed_ = false;         // from its motion, on the map
+  double usual_fit_ = 0.0;           // of good results, exponentially forgotten
+  int lost_ = 0;                     // scans in a row
+  int known_ = 0;                    // good scans in a row
+  int unheld_ = 0;                   // scans in a row
+  int without_map_ = 0;              // scans in a row on which the map was not all there
+  ScanTrail trail_;                  // while it is known where each was taken
+  int carried_ = 0;                  // scans in a row, the one at hand as well
+  std::optional<OwnStep> own_step_;  // to the scan at hand, from elsewhere
+  // From where its own motion leads to where it was found, (x, y, z, yaw): summed up, Strays();
+  // and since it was taken up or last moved otherwise, MovesAsSeen(), at first where it is carried.
+  Eigen::Vector4d strayed_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d moved_off_ = Eigen::Vector4d::Zero();
+  std::optional<Eigen::Vector4d> off_carried_;
   // Of the scan at hand; kept for their memory.
   std::vector<Pose> starts_;
   std::vector<Place> places_;

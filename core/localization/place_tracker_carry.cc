@@ -1,10 +1,8 @@
 // A vehicle that drove off the map, carried on by its own motion from where it was known or told to
 // be (decision 0624). Until it is known again the map does not move it: what fits there may be
 // another place.
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <Eigen/LU>
@@ -14,7 +12,7 @@
 namespace atlas {
 
 bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatures& features) {
-  carried_m_ = 0.0;
+  trail_.BeginWay();
   if (is_first_) {
     return is_told_ && (IsDoubtful(tracked) || !IsWithinReach(tracked.T_world_level) ||
                         !IsOnMap(tracked, features, 1.0));
@@ -31,30 +29,22 @@ bool PlaceTracker::LeavesMap(const RegistrationResult& tracked, const ScanFeatur
 }
 
 bool PlaceTracker::CarryOn(const ScanFeatures& features) {
-  if (recent_.is_empty()) {
+  if (trail_.is_empty()) {
     return false;
   }
   const PosePrior expected{Prior().T_world_level, motion_.StepCovariance()};
-  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
-  if (moved.fit < options_.odometry.min_fit) {
-    recent_.Clear();
+  const ScanMotion moved = trail_.MotionTo(features, expected);
+  if (!trail_.IsKnown(moved)) {
+    trail_.Clear();
     return false;
   }
-  motion_.Carry(moved.T_world_level, StepCovariance(moved));
+  Go(moved);
   return true;
 }
 
-// What errs alike all the way adds the more to the variance the longer that is.
-PoseCovariance PlaceTracker::StepCovariance(const ScanMotion& moved) {
+void PlaceTracker::Go(const ScanMotion& moved) {
   const double step_m = motion_.LastStep(moved.T_world_level).head<3>().norm();
-  carried_m_ += step_m;
-  const Eigen::Vector4d each(options_.step_m, options_.step_m, options_.step_up_m,
-                             options_.step_rad);
-  const Eigen::Vector4d drift(options_.drift, options_.drift, options_.drift_up, 0.0);
-  PoseCovariance covariance = moved.covariance;
-  covariance.diagonal() +=
-      std::min(1.0, step_m) * each.cwiseAbs2() + 2.0 * carried_m_ * step_m * drift.cwiseAbs2();
-  return covariance;
+  motion_.Carry(moved.T_world_level, trail_.Go(moved, step_m));
 }
 
 void PlaceTracker::Keep(const ScanFeatures& features,
@@ -64,36 +54,31 @@ void PlaceTracker::Keep(const ScanFeatures& features,
   const bool is_known = !is_lost && confirmation_.is_confirmed();
   const bool is_carried = carried_ > 0 && !is_known;
   if (!is_carried && (carried_ > 0 || is_found || is_lost)) {
-    recent_.Clear();  // they lie where it is not
+    trail_.Clear();  // they lie where it is not
   }
   if (!is_carried) {
     carried_ = 0;
     off_carried_.reset();
     if (!is_lost && !is_known) {
-      recent_.Clear();
+      trail_.Clear();
       return;
     }
     if (result.health != LocalizationHealth::kGood && !IsNearEdge(features, result)) {
       return;
     }
   }
-  const Pose there = is_carried ? Prior().T_world_level : result.registration.T_world_level;
-  if (recent_.is_empty() ||
-      AreApart(there, last_kept_, options_.kept_apart_m, options_.kept_apart_rad)) {
-    recent_.Add(features, there);
-    last_kept_ = there;
-  }
+  trail_.Keep(features, is_carried ? Prior().T_world_level : result.registration.T_world_level);
 }
 
 bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationResult& result) {
   const Pose& there = result.registration.T_world_level;
-  if (result.health != LocalizationHealth::kWeak || recent_.is_empty() ||
+  if (result.health != LocalizationHealth::kWeak || trail_.is_empty() ||
       GroundMapped(map_.window(), features, there).value_or(1.0) > options_.edge_ground_mapped) {
     return false;
   }
   const bool agrees =
       confirmation_.is_confirmed() && GoesWithRecent(features, {there, PoseCovariance::Zero()});
-  if (!agrees) recent_.Clear();
+  if (!agrees) trail_.Clear();
   return agrees;
 }
 

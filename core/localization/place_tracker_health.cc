@@ -47,14 +47,16 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
 
 void PlaceTracker::Confirm(const ScanFeatures& features,
                            Surprise surprise,
+                           bool is_found,
                            LocalizationResult& result) {
   if (result.health == LocalizationHealth::kLost) {
     confirmation_.Miss();
     return;
   }
-  if (surprise == Surprise::kNew) {
+  if (surprise == Surprise::kNew || (is_found && IsAdrift())) {
     confirmation_.Doubt();
     is_elsewhere_ = true;
+    was_anywhere_ = was_anywhere_ || surprise == Surprise::kNew;
   } else if (surprise == Surprise::kOdd) {
     confirmation_.Question();
     is_elsewhere_ = is_elsewhere_ || has_broken_;
@@ -83,6 +85,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
       RepeatsBeside(result.registration, features)) {
     confirmation_.Doubt();
   }
+  if (confirmation_.is_confirmed()) moved_off_.setZero();
   if (!confirmation_.is_confirmed() || confirmation_.is_suspected()) {
     result.health = LocalizationHealth::kWeak;
   }

@@ -36,8 +36,8 @@ std::optional<double> PlaceTracker::LikelihoodNear(const MotionModel& model,
   const PosePrior prior = PriorOf(model);
   if (carried_ > 0) {
     const PosePrior step{prior.T_world_level, model.StepCovariance()};
-    const double fit = MotionSince(recent_, features, step, options_.odometry).fit;
-    return fit >= options_.odometry.min_fit ? std::optional(fit) : std::nullopt;
+    const ScanMotion moved = trail_.MotionTo(features, step);
+    return trail_.IsKnown(moved) ? std::optional(moved.fit) : std::nullopt;
   }
   const RegistrationResult here =
       Register(map_.window(), features, prior.T_world_level, prior, options_.registration);

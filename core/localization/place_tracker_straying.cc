@@ -9,17 +9,17 @@
 namespace atlas {
 
 bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& features) {
-  const Eigen::Vector4d before = options_.straying_kept * strayed_;
-  strayed_ = before;
+  strayed_ *= options_.straying_kept;
+  const Eigen::Vector4d before = strayed_;
   const bool is_at_edge = IsAtEdge(features, found.T_world_level);
-  if (is_first_ || !confirmation_.is_confirmed() || recent_.is_empty() ||
+  if (is_first_ || !confirmation_.is_confirmed() || trail_.is_empty() ||
       !(is_at_edge || IsDoubtful(found) || IsUnexpected(found))) {
     return false;
   }
   const PosePrior expected{Prior().T_world_level, motion_.StepCovariance()};
-  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
-  has_broken_ = moved.fit < options_.odometry.min_fit;
-  if (moved.fit < options_.odometry.sure_fit) {
+  const ScanMotion moved = trail_.MotionTo(features, expected);
+  has_broken_ = !trail_.IsKnown(moved);
+  if (!trail_.IsSure(moved)) {
     return false;
   }
   const Eigen::Vector4d off = PoseDifference(moved.T_world_level, found.T_world_level);
@@ -35,9 +35,9 @@ bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& f
     return false;
   }
   carried_ = is_at_edge ? 1 : 0;
-  carried_m_ = 0.0;
-  motion_.Carry(moved.T_world_level, StepCovariance(moved));
-  motion_.TakeBack(before);
+  trail_.BeginWay();
+  Go(moved);
+  motion_.Widen(before);
   return true;
 }
 
@@ -63,23 +63,25 @@ bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationR
   }
   std::optional<Pose> moved;
   if (own_step_) {
-    if (own_step_->is_known) moved = LedBy(*own_step_);
-  } else if (recent_.is_empty()) {
+    const bool tells =
+        own_step_->is_known && SpreadOf(own_step_->covariance).along_m <= options_.same_step_m;
+    if (tells) moved = LedBy(*own_step_);
+  } else if (trail_.is_empty()) {
     moved = result.T_world_level;
   } else {
-    const Eigen::Vector4d sigmas(options_.unsure_m, options_.unsure_m, options_.step_up_m,
+    const Eigen::Vector4d sigmas(options_.unsure_m, options_.unsure_m, options_.trail.step_up_m,
                                  options_.same_step_rad);
     const PosePrior expected{result.T_world_level, sigmas.cwiseAbs2().asDiagonal()};
-    const ScanMotion seen = MotionSince(recent_, features, expected, options_.odometry);
-    if (seen.fit >= options_.odometry.min_fit) moved = seen.T_world_level;
+    const ScanMotion seen = trail_.MotionTo(features, expected);
+    if (trail_.IsKnown(seen)) moved = seen.T_world_level;
   }
   if (moved) {
-    strayed_ += PoseDifference(*moved, result.T_world_level);
-    if (IsSameStep(strayed_)) {
+    moved_off_ += PoseDifference(*moved, result.T_world_level);
+    if (IsSameStep(moved_off_)) {
       return true;
     }
   }
-  strayed_.setZero();
+  moved_off_.setZero();
   return false;
 }
 
@@ -101,10 +103,9 @@ Pose PlaceTracker::LedBy(const OwnStep& step) const {
 }
 
 bool PlaceTracker::GoesWithRecent(const ScanFeatures& features, const PosePrior& expected) const {
-  const ScanMotion moved = MotionSince(recent_, features, expected, options_.odometry);
-  return moved.fit >= options_.odometry.min_fit &&
-         !AreApart(moved.T_world_level, expected.T_world_level, options_.same_step_m,
-                   options_.same_step_rad);
+  const ScanMotion moved = trail_.MotionTo(features, expected);
+  return trail_.IsKnown(moved) && !AreApart(moved.T_world_level, expected.T_world_level,
+                                            options_.same_step_m, options_.same_step_rad);
 }
 
 }  // namespace atlas

@@ -324,6 +324,23 @@ def edges(bin_dir):
         assert good >= least and wrong == 0
 
 
+def half(bin_dir):
+    """Half an interchange, which looks the same from both sides, and little of what the other drive sees of it: who was
+    adrift on the plain before it is found where he is, and who fits there twice is good at neither place."""
+    with tempfile.TemporaryDirectory() as work:
+        atlas = Atlas(bin_dir, work)
+        atlas.run("ingest", drive("sim_overpass_A"), "--range", "0:120")
+        atlas.run("wait")
+        done = atlas.call("localize", drive("sim_overpass_B")).stdout.splitlines()
+        assert atlas.stop() == 0
+    scans = [json.loads(line) for line in done[:-1]]
+    good, wrong = good_and_wrong(scans)
+    held = sum(scan["error_m"] <= 1.0 for scan in scans[:121])
+    print(f"half of an interchange: {good} of {len(scans)} good, {wrong} of them elsewhere; {held} of the first leg's 121 "
+          "scans within 1 m")
+    assert held >= 90 and good >= 5 and wrong == 0
+
+
 def told(bin_dir):
     """The same garage, whoever starts off the map: told how high he is he is taken to no other deck, in none of three ways."""
     with tempfile.TemporaryDirectory() as work:
@@ -571,8 +588,8 @@ def main():
                 assert atlas.stop() == 0
     else:
         {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped,
-         "edges": edges, "told": told, "decks": decks, "segmentation": segmentation, "order": order, "ground": ground,
-         "street": street}[name](bin_dir)
+         "edges": edges, "half": half, "told": told, "decks": decks, "segmentation": segmentation, "order": order,
+         "ground": ground, "street": street}[name](bin_dir)
 
 
 if __name__ == "__main__":

@@ -113,20 +113,29 @@ class ScanFit {
         columns_(Upright(recent.Columns(origin)), 0.8F),
         ground_(recent.Ground(origin), 2.5F) {}
 
-  // Of the features that are near: how many, and the sum of their robust weights.
+  // Of features: how many, and the sum of their robust weights.
   struct Share {
-    int near = 0;
+    int features = 0;
     double fit = 0.0;
 
-    double mean() const { return near == 0 ? 0.0 : fit / near; }
+    void Add(double weight) {
+      ++features;
+      fit += weight;
+    }
+    double mean() const { return features == 0 ? 0.0 : fit / features; }
   };
   struct Evidence {
     NormalEquations equations;
+    Share near_columns;
     Share columns;
-    Share ground;
+    Share near_ground;
 
-    double Fit(int few_columns) const {
-      return columns.near < few_columns ? ground.mean() : columns.mean();
+    // Ground fits wherever there is some: it counts where nothing stands.
+    double Fit(const ScanOdometryOptions& options) const {
+      if (near_columns.features >= options.few_columns) return near_columns.mean();
+      return columns.features >= options.few_columns
+                 ? std::min(1.0, columns.mean() / options.far_known)
+                 : near_ground.mean();
     }
   };
 
@@ -135,22 +144,19 @@ class ScanFit {
     const Eigen::Matrix3f R = pose.linear().cast<float>();
     const Eigen::Vector3f t = pose.translation().cast<float>();
     for (const Eigen::Vector3f& p : scan_columns_) {
-      Add(p, AddColumn(R * p, t, reach_m, evidence.equations), evidence.columns);
+      const double weight{AddColumn(R * p, t, reach_m, evidence.equations)};
+      evidence.columns.Add(weight);
+      if (IsNear(p)) evidence.near_columns.Add(weight);
     }
     for (const Eigen::Vector3f& p : scan_ground_) {
-      Add(p, AddGround(R * p, t, reach_m, evidence.equations), evidence.ground);
+      const double weight{AddGround(R * p, t, reach_m, evidence.equations)};
+      if (IsNear(p)) evidence.near_ground.Add(weight);
     }
     return evidence;
   }
 
  private:
-  void Add(const Eigen::Vector3f& p, float weight, Share& share) const {
-    if (p.norm() > options_.max_range_m) {
-      return;
-    }
-    ++share.near;
-    share.fit += double{weight};
-  }
+  bool IsNear(const Eigen::Vector3f& p) const { return p.norm() <= options_.max_range_m; }
 
   // A wall's line holds across itself, what is no wall in both directions. Its robust weight; 0
   // where nothing is near.
@@ -190,6 +196,8 @@ class ScanFit {
                   double{residual}, weight);
   }
 
+  // Holds height and tilt alone: it is seen along rings around the sensor, which lie best on those
+  // before where it stands still.
   float AddGround(const Eigen::Vector3f& arm,
                   const Eigen::Vector3f& t,
                   float reach_m,
@@ -202,13 +210,13 @@ class ScanFit {
       return 0.0F;
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> spread(near->covariance);
-    Eigen::Vector3f normal = spread.eigenvectors().col(0);
+    const Eigen::Vector3f normal = spread.eigenvectors().col(0);
     if (std::abs(normal.z()) < kSteepest) {
       return 0.0F;
     }
     const float residual = normal.dot(arm + t - near->center);
     const float robust = RobustWeight(std::abs(residual), 0.5F * reach_m);
-    equations.Add(normal.cast<double>(), arm.cast<double>(), double{residual},
+    equations.Add({0.0, 0.0, double{normal.z()}}, arm.cast<double>(), double{residual},
                   robust / (options_.ground_sigma_m * options_.ground_sigma_m));
     return robust;
   }
@@ -302,7 +310,7 @@ std::vector<Start> FannedTurns(const std::vector<Start>& fanned,
   for (const Start& start : fanned) {
     for (const Start& turned : TurnedStarts(start.pose, options)) {
       const Start free{turned.pose, turned.pose};
-      const double fit = scan.At(free.pose, options.coarse_reach_m).Fit(options.few_columns);
+      const double fit = scan.At(free.pose, options.coarse_reach_m).Fit(options);
       looked.push_back({fit, free});
     }
   }
@@ -323,19 +331,40 @@ class BestMotion {
   void Try(const Start& start) {
     const Pose pose = Descend(scan_, start, options_);
     const ScanFit::Evidence evidence = scan_.At(pose, options_.fine_reach_m);
-    if (const double fit = evidence.Fit(options_.few_columns); fit > motion_.fit) {
+    const double fit = evidence.Fit(options_);
+    tried_.push_back({pose, fit});
+    if (fit > motion_.fit) {
       motion_.T_world_level = pose;
       motion_.covariance = UncertaintyOf(evidence.equations, options_.information_share);
       motion_.fit = fit;
     }
   }
   bool is_sure() const { return motion_.fit >= options_.sure_fit; }
-  const ScanMotion& motion() const { return motion_; }
+  // As uncertain as others that fit as well are far from it.
+  ScanMotion Motion() const {
+    ScanMotion motion = motion_;
+    Eigen::Vector4d furthest = Eigen::Vector4d::Zero();
+    for (const Tried& tried : tried_) {
+      const Eigen::Vector4d off = PoseDifference(motion.T_world_level, tried.pose);
+      if (tried.fit >= motion.fit - options_.as_good_fit &&
+          off.head<2>().norm() > furthest.head<2>().norm()) {
+        furthest = off;
+      }
+    }
+    motion.covariance += furthest * furthest.transpose();
+    return motion;
+  }
 
  private:
+  struct Tried {
+    Pose pose;
+    double fit;
+  };
+
   ScanFit& scan_;
   const ScanOdometryOptions& options_;
   ScanMotion motion_;
+  std::vector<Tried> tried_;
 };
 
 }  // namespace
@@ -362,7 +391,7 @@ ScanMotion MotionSince(const RecentScans& recent,
       if (best.is_sure()) break;
     }
   }
-  ScanMotion motion = best.motion();
+  ScanMotion motion = best.Motion();
   motion.T_world_level.translation() += origin;
   return motion;
 }

@@ -29,24 +29,28 @@ struct ScanOdometryOptions {
   double fan_sigma_m = 0.8;
   double fan_sigmas = 1.5;
   double fan_step_m = 0.75;
+  double as_good_fit = 0.05;  // so much less fits as well: ground, or a wall, alone
   // Where a scan fits by less than this, it may have turned more than expected: so many times so
   // much is tried to either side.
   double sure_fit = 0.5;
   int turns = 3;
   double turn_rad = 0.12;
   std::size_t fanned_turns = 8;  // of all starts that are fanned and turned so many, the best ones
-  float max_range_m = 25.0F;     // the fit is that of nearer features: further off much is new
+  float max_range_m = 25.0F;     // the fit is that of nearer columns: further off much is new
 
   // A scan that fits less was taken elsewhere: the vehicle was moved, or saw too little.
   double min_fit = 0.35;
-  int few_columns = 30;             // with fewer that are near it is the ground that fits, or not
+  // With fewer columns that are near all count, of which so many were seen before, or else the
+  // ground.
+  int few_columns = 30;
+  double far_known = 0.4;
   double information_share = 0.08;  // neighbouring features err together (PlaceTrackerOptions)
 };
 
 struct ScanMotion {
   Pose T_world_level = Pose::Identity();
   PoseCovariance covariance = PoseCovariance::Zero();  // as far as the scans tell
-  double fit = 0.0;  // mean robust weight of the columns that are near, 0..1
+  double fit = 0.0;  // mean robust weight, 0..1: of the columns that are near, where there are
 };
 
 // Where the scan was taken, near where it is `expected`; the covariance is that of the step to

@@ -85,16 +85,26 @@ Status CheckReadable(const DriveLocalizationReport& report) {
   if (report.unreadable.empty()) return {};
   const Status& first = report.unreadable.front().why;
   const std::size_t count = report.unreadable.size();
+  const LocalizationScore& score = report.score;
+  const std::string others = score.successes() == 0
+                                 ? StrCat("; none of all ", report.scans, " scans was localized")
+                                 : StrCat("; of all ", report.scans, " scans ", score.failures(),
+                                          " failed with that, of the others the error is ",
+                                          FixedText(score.translation_rmse_m(), 3), " m RMSE");
   return {first.code(), StrCat(count, count == 1 ? " scan" : " scans",
-                               " could not be read, the first: ", first.message(), "; of all ",
-                               report.scans, " scans ", report.score.failures(),
-                               " failed with that, of the others the error is ",
-                               FixedText(report.score.translation_rmse_m(), 3), " m RMSE")};
+                               " could not be read, the first: ", first.message(), others)};
 }
 
 void NoteLost(const DriveLocalizationReport& report, bool is_tracked, std::ostream& err) {
   const LocalizationScore& score = report.score;
-  if (score.shots() == 0 || score.lost() < score.shots()) return;
+  if (score.shots() == 0) return;
+  if (is_tracked && report.good == 0 && score.lost() < score.shots()) {
+    err << "note: none of " << report.scans
+        << " scans is good: what is mapped there does not tell whether the drive is there; "
+           "--prior-radius and --prior-height say how surely its poses.txt knows where it begins\n";
+    return;
+  }
+  if (score.lost() < score.shots()) return;
   err << "note: none of " << report.scans
       << " scans was localized, all are lost: the map may be of another place, or not have this "
          "one yet (atlas wait), or "

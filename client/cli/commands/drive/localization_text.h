@@ -21,7 +21,7 @@ void PrintLocalization(const DriveLocalizationReport& report,
 
 // Scans that could not be read, in the words of the first of them.
 Status CheckReadable(const DriveLocalizationReport& report);
-// Where all scans are lost: what that may mean and what to do.
+// Where all scans are lost, or none of a tracked drive is good: what that may mean, what to do.
 void NoteLost(const DriveLocalizationReport& report, bool is_tracked, std::ostream& err);
 
 }  // namespace atlas

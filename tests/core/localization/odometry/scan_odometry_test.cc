@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -163,6 +164,73 @@ TEST(ScanOdometryTest, BetweenWallsAStepIsUncertainAlongThem) {
       MotionSince(recent, Seen(testing::Corridor(), at(3.0)), Sure(at(3.0)), options);
   EXPECT_GT(std::sqrt(motion.covariance(0, 0)), 0.1);
   EXPECT_LT(std::sqrt(motion.covariance(1, 1)), 0.04);
+}
+
+// ... and of a vehicle whose speed nobody knows each step along them fits as well.
+TEST(ScanOdometryTest, BetweenWallsASpeedThatNobodyKnowsStaysUnknown) {
+  const ScanOdometryOptions options;
+  RecentScans recent(options.scans);
+  const Pose first = UprightPose({0.0, 0.0, 1.8}, 0.0);
+  recent.Add(Seen(testing::Corridor(), first), first);
+  MotionModel motion{MotionOptions()};
+  motion.Start(first);
+  motion.Predict();
+  const ScanFeatures scan = Seen(testing::Corridor(), Moved(first, 2.0, 0.0, 0.0, 0.0));
+  const ScanMotion moved = MotionSince(recent, scan, {first, motion.StepCovariance()}, options);
+  EXPECT_GT(std::sqrt(moved.covariance(0, 0)), 2.0);
+  EXPECT_LT(std::sqrt(moved.covariance(1, 1)), 0.2);
+}
+
+// Rings on a plain are around the sensor wherever it is.
+TEST(ScanOdometryTest, APlainDoesNotStandStill) {
+  const ScanOdometryOptions options;
+  ShapeWorld plain;
+  plain.patches.push_back({});
+  const Pose first = UprightPose({0.0, 0.0, 1.8}, 0.0);
+  const Pose truth = Moved(first, 1.5, 0.0, 0.0, 0.0);
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(0.0F, 0.02F);
+  const auto seen = [&](const Pose& pose) {
+    ScanFeatures scan = Seen(plain, pose);
+    for (Eigen::Vector3f& p : scan.ground) p.z() += noise(random);
+    return scan;
+  };
+  RecentScans recent(options.scans);
+  recent.Add(seen(first), first);
+  const ScanMotion moved = MotionSince(recent, seen(truth), Sure(truth), options);
+  EXPECT_LT(ErrorOf(moved.T_world_level, truth).horizontal_m, 0.02);
+  EXPECT_LT(ErrorOf(moved.T_world_level, truth).vertical_m, 0.02);
+  EXPECT_GT(std::sqrt(moved.covariance(0, 0)), 2.0);
+  EXPECT_LT(std::sqrt(moved.covariance(2, 2)), 0.05);
+}
+
+TEST(ScanOdometryTest, WhereNothingIsNearWhatIsFarTells) {
+  const ScanOdometryOptions options;
+  ShapeWorld world;
+  world.patches.push_back({});
+  for (const double bearing_rad : {0.3, 1.4, 2.2, 3.5, 4.4, 5.6}) {
+    const Eigen::Vector3d foot(33.0 * std::cos(bearing_rad), 33.0 * std::sin(bearing_rad), 0.0);
+    world.boxes.push_back(
+        {foot - Eigen::Vector3d(2.0, 1.5, 0.0), foot + Eigen::Vector3d(2.0, 1.5, 6.0)});
+  }
+  FeatureOptions far = testing::QuickOptions().features;
+  far.max_range_m = 60.0F;
+  const auto seen = [&](const Pose& pose) {
+    return ExtractFeatures(CastLeveledScan(testing::QuickSensor(), world, pose), far);
+  };
+  const Pose first = UprightPose({0.0, 0.0, 1.8}, 0.0);
+  RecentScans recent(options.scans);
+  recent.Add(seen(first), first);
+  MotionModel motion{MotionOptions()};
+  motion.Start(first);
+  motion.Predict();
+  for (const double step_m : {0.0, 1.0, 2.5}) {
+    const Pose truth = Moved(first, step_m, 0.0, 0.0, 0.05 * step_m);
+    const ScanMotion moved =
+        MotionSince(recent, seen(truth), {first, motion.StepCovariance()}, options);
+    EXPECT_GT(moved.fit, options.min_fit) << step_m;
+    EXPECT_LT(ErrorOf(moved.T_world_level, truth).horizontal_m, 0.1) << step_m;
+  }
 }
 
 TEST(RecentScansTest, TheOldestGoesFirst) {
