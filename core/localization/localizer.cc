@@ -188,7 +188,7 @@ void Localizer::Follow(const ScanFeatures& features, const Eigen::Quaterniond& R
                          told.tracker.spread_m() > options_.adrift_m ||
                          told.tracker.is_just_found();
   astray_ = is_astray ? astray_ + 1 : 0;
-  if (!is_astray && !told.tracker.goes_along()) {
+  if (!is_astray && !told.tracker.GoesAlong()) {
     own_motion_.Forget();
   } else if (!step) {
     own_motion_.Begin(features);
@@ -199,7 +199,7 @@ std::optional<OwnStep> Localizer::StepOf(const ScanFeatures& features) {
   const double scans = std::exchange(scans_, 0.0);
   const bool is_needed =
       std::any_of(places_.begin(), places_.end(),
-                  [](const SupposedPlace& place) { return place.tracker.goes_along(); });
+                  [](const SupposedPlace& place) { return place.tracker.GoesAlong(); });
   return is_needed && own_motion_.is_begun() ? std::optional(own_motion_.Next(features, scans))
                                              : std::nullopt;
 }

@@ -17,12 +17,18 @@ void OwnMotion::Begin(const ScanFeatures& features) {
 }
 
 OwnStep OwnMotion::Next(const ScanFeatures& features, double scans) {
+  constexpr double kMostMissing = 5.0;     // PlaceTrackerOptions
   constexpr double kMostPredicted = 20.0;  // scans missing: it may have done anything
   if (scans > kMostPredicted) motion_.ForgetMotion();
   const Pose last = motion_.T_world_sensor();
   motion_.Predict(scans);
   const PosePrior expected{motion_.T_world_sensor(), motion_.StepCovariance()};
-  const ScanMotion moved = MotionSince(recent_, features, expected, odometry_);
+  ScanMotion moved = MotionSince(recent_, features, expected, odometry_);
+  if (scans > kMostMissing) {  // it may have stood meanwhile
+    const ScanMotion stood =
+        MotionSince(recent_, features, {last, PoseCovariance::Zero()}, odometry_);
+    if (stood.fit >= moved.fit - odometry_.as_good_fit) moved = stood;
+  }
   if (moved.fit < odometry_.min_fit) {
     Begin(features);
     return {};
@@ -33,7 +39,8 @@ OwnStep OwnMotion::Next(const ScanFeatures& features, double scans) {
   motion_.Carry(moved.T_world_level, covariance);
   recent_.Add(features, motion_.T_world_sensor());
   const Pose T_last_world = last.inverse();
-  return {T_last_world * motion_.T_world_sensor(), Turned(T_last_world.linear(), covariance), true};
+  return {T_last_world * motion_.T_world_sensor(), Turned(T_last_world.linear(), covariance), true,
+          moved.fit >= odometry_.sure_fit};
 }
 
 }  // namespace atlas

@@ -15,8 +15,9 @@ namespace atlas {
 struct OwnStep {
   Pose T_last_now = Pose::Identity();
   PoseCovariance covariance = PoseCovariance::Zero();
-  bool is_known =
-      false;  // else the scans do not fit to each other: it was moved, or saw too little
+  // Else the scans do not fit to each other: it was moved, or saw too little.
+  bool is_known = false;
+  bool is_sure = false;  // they fit well
 };
 
 class OwnMotion {

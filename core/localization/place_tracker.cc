@@ -81,6 +81,12 @@ MotionModel PlaceTracker::Next() const {
   return next;
 }
 
+bool PlaceTracker::GoesAlong() const {
+  return !is_first_ && carried_ == 0 && lost_ == 0 &&
+         (!confirmation_.is_confirmed() ||
+          SpreadOf(Next().covariance()).along_m > options_.fan_sigma_m);
+}
+
 Status PlaceTracker::Prepare() {
   const MotionModel next = Next();
   return map_.Renew(next.T_world_sensor().translation(),
@@ -93,16 +99,18 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   own_step_.reset();
   has_broken_ = false;
   has_strayed_ = false;
+  const bool goes_along = step && GoesAlong();
+  has_paused_ = !is_first_ && scans_ > options_.most_missing;
   has_stood_ = HasStood(features);
   if (!has_stood_) {
     motion_ = Next();
   }
   untracked_ = 0.0;
-  if (step && goes_along()) {
+  if (goes_along) {
     GoAlong(*step);
   }
   if (carried_ > 0) {
-    ++carried_;
+    carried_ += has_paused_ ? options_.max_coasting : 1;
     if (!CarryOn(features)) {
       lost_ = std::exchange(carried_, 0);  // as anyone who is
     }
@@ -219,6 +227,7 @@ void PlaceTracker::Remember(const LocalizationResult& result,
   const bool is_next = !is_first_ && lost_ == 0 && carried_ == 0;
   is_first_ = false;
   known_ = result.health == LocalizationHealth::kGood ? known_ + 1 : 0;
+  was_anywhere_ = was_anywhere_ && known_ < options_.long_known;
   if (result.health == LocalizationHealth::kGood) {
     const double fit = result.registration.fit;
     usual_fit_ = usual_fit_ == 0.0 ? fit : 0.8 * usual_fit_ + 0.2 * fit;

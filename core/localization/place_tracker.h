@@ -197,7 +197,7 @@ class PlaceTracker {
   void Settle() { is_elsewhere_ = was_anywhere_ = false; }
   // Whether it was found of late, where nobody expected it: elsewhere in the map it may fit as
   // well.
-  bool is_just_found() const { return was_anywhere_ && known_ < options_.long_known; }
+  bool is_just_found() const { return was_anywhere_; }
   // Whether the map ends where a scan was taken.
   bool IsAtEdge(const ScanFeatures& features, const Pose& T_world_level) const {
     return atlas::IsAtEdge(map_.window(), features, T_world_level);
@@ -206,12 +206,10 @@ class PlaceTracker {
   void ColumnWeights(const ScanFeatures& features,
                      const Pose& T_world_level,
                      std::vector<std::optional<float>>& weights) const;
-  // Whether it is where scans fit, and either nothing says yet that it is not another place, or
-  // what was mapped does not hold it.
-  bool goes_along() const {
-    return !is_first_ && carried_ == 0 && lost_ == 0 &&
-           (!confirmation_.is_confirmed() || spread_m() > options_.fan_sigma_m);
-  }
+  // Whether it goes along with the vehicle's own motion to the next scan: it is where scans fit,
+  // and either nothing says yet that it is not another place, or it is badly known where the next
+  // one will be.
+  bool GoesAlong() const;
   // Whether it went off the map and is carried on by its own motion from where it was known.
   bool is_carried() const { return carried_ > 0; }
   // Whether it can be there by now; everywhere, where it is not carried.
@@ -242,10 +240,11 @@ class PlaceTracker {
   MotionModel Next() const;  // at the next scan
   // Whether the scan says that the vehicle stood since the last one; then that is its motion.
   bool HasStood(const ScanFeatures& features);
-  // How well it fits near where that motion led, carried to the scans before it, else to the map;
-  // none where it does not fit as usual.
+  // How well it fits near where that motion led: to the map, none where it does not fit as usual;
+  // and to the scans before it, which is asked off the map and where that ends.
   std::optional<double> LikelihoodNear(const MotionModel& model,
                                        const ScanFeatures& features) const;
+  std::optional<double> FitOnTrail(const MotionModel& model, const ScanFeatures& features) const;
   static PosePrior PriorOf(const MotionModel& motion);
   PosePrior Prior() const { return PriorOf(motion_); }
   // Where `step` leads from the last scan.
@@ -353,10 +352,11 @@ class PlaceTracker {
   bool is_told_ = false;             // where it is at the first scan, and how surely
   StartHint hint_;                   // where it is not
   bool is_elsewhere_ = false;        // it was found, and is not known to be there
-  bool was_anywhere_ = false;        // when it was found
+  bool was_anywhere_ = false;        // when it was found, and is not known for long
   double scans_ = 1.0;               // from the last scan to the next
   double untracked_ = 0.0;           // of these, expected so far
-  bool has_stood_ = false;           // in a pause before the scan at hand
+  bool has_paused_ = false;          // before the scan at hand,
+  bool has_stood_ = false;           // meanwhile
   bool has_broken_ = false;          // its motion, before the scan at hand
   bool has_strayed_ = false;         // from its motion, on the map
   double usual_fit_ = 0.0;           // of good results, exponentially forgotten

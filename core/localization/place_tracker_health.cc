@@ -27,7 +27,9 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
     return is_back_soon ? Surprise::kNone : Surprise::kOdd;
   }
   if (lost_ == 0 && !is_found) {
-    return has_stood_ || has_broken_ || has_strayed_ ? Surprise::kOdd : Surprise::kNone;
+    const bool may_have_stood = has_paused_ && IsAtEdge(features, result.T_world_level);
+    return has_stood_ || may_have_stood || has_broken_ || has_strayed_ ? Surprise::kOdd
+                                                                       : Surprise::kNone;
   }
   const bool is_near =
       off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;

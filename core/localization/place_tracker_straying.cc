@@ -92,7 +92,7 @@ bool PlaceTracker::IsSameStep(const Eigen::Vector4d& difference) const {
 
 void PlaceTracker::GoAlong(const OwnStep& step) {
   own_step_ = step;
-  if (!step.is_known) {
+  if (!(confirmation_.is_confirmed() ? step.is_sure : step.is_known)) {
     return;
   }
   motion_.Carry(LedBy(step), Turned(LevelFrame(motion_.last()).linear(), step.covariance));

@@ -301,25 +301,37 @@ def unmapped(bin_dir):
     assert scans[-1]["health"] == "lost" and scans[-1]["error_m"] < 1.0
 
 
+def stand_still(folder, scan, pause_s):
+    """The recorder pauses before that scan, and the vehicle with it."""
+    times = [float(line) for line in (folder / "times.txt").read_text().splitlines()]
+    (folder / "times.txt").write_text("".join(f"{time_s + (pause_s if number >= scan else 0.0):.6f}\n"
+                                              for number, time_s in enumerate(times)))
+
+
 def edges(bin_dir):
     """Maps that end in the middle of a deck, where more of another one was mapped, or on a ramp, which looks the same
-    further on: nobody is good elsewhere, there or when he comes back to the map from where he was told to start."""
+    further on: nobody is good elsewhere, there or when he comes back to the map from where he was told to start, nor
+    after he stood there while the recorder paused."""
     near = ("--prior-radius", 1, "--prior-height", 1)
     vague = ("--prior-radius", 2, "--prior-height", 1)
-    for mapped, seed, scans, flags, least in (
-            ("80:130", 1, "111:216", (), 35), ("0:50", 1, "110:216", (*near, "--seed", 1), 50),
-            ("0:90", 1, "150:216", near, 40), ("0:90", 2, "110:216", vague, 0), ("60:110", 1, "110:216", near, 40)):
+    for mapped, seed, scans, flags, pause, least in (
+            ("80:130", 1, "111:216", (), None, 35), ("0:50", 1, "110:216", (*near, "--seed", 1), None, 50),
+            ("0:90", 1, "150:216", near, None, 40), ("0:90", 2, "110:216", vague, None, 0),
+            ("60:110", 1, "110:216", near, None, 40), ("20:60", 2, "0:40", near, 5, 28), ("20:60", 6, "0:40", near, 4, 28),
+            ("90:140", 2, "80:120", (), 3, 30)):
         with tempfile.TemporaryDirectory() as work:
             atlas = Atlas(bin_dir, work)
             for drive, kept in ((0, mapped), (seed, scans)):
                 subprocess.run([bin_dir / "atlas", "simulate", "garage", "-o", f"{work}/{drive}", "--seed", str(drive),
                                 "--range", kept], check=True, stdout=subprocess.DEVNULL)
+            if pause:
+                stand_still(pathlib.Path(f"{work}/{seed}"), pause, 1.9)
             atlas.run("ingest", f"{work}/0")
             atlas.run("wait")
             done = atlas.call("localize", f"{work}/{seed}", *flags).stdout.splitlines()
             assert atlas.stop() == 0
         good, wrong = good_and_wrong([json.loads(line) for line in done[:-1]])
-        print(f"scans {mapped} mapped, scans {scans} of seed {seed}: {good} of {len(done) - 1} good, {wrong} of them "
+        print(f"scans {mapped} mapped, scans {scans} of seed {seed}, pause before {pause}: {good} of {len(done) - 1} good, {wrong} of them "
               "elsewhere")
         assert good >= least and wrong == 0
 
