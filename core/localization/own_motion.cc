@@ -40,7 +40,7 @@ OwnStep OwnMotion::Next(const ScanFeatures& features, double scans) {
   recent_.Add(features, motion_.T_world_sensor());
   const Pose T_last_world = last.inverse();
   return {T_last_world * motion_.T_world_sensor(), Turned(T_last_world.linear(), covariance), true,
-          moved.fit >= odometry_.sure_fit};
+          moved.is_clear && moved.fit >= odometry_.sure_fit};
 }
 
 }  // namespace atlas

@@ -17,7 +17,7 @@ struct OwnStep {
   PoseCovariance covariance = PoseCovariance::Zero();
   // Else the scans do not fit to each other: it was moved, or saw too little.
   bool is_known = false;
-  bool is_sure = false;  // they fit well
+  bool is_sure = false;  // they fit well, and nowhere else nearly as well
 };
 
 class OwnMotion {

@@ -161,6 +161,10 @@ PlaceTracker::Located PlaceTracker::Locate(const ScanFeatures& features, Tracked
   if (!IsDoubtful(located.registration) && !IsAdrift() && !IsVagueStart() && carried_ == 0) {
     return located;
   }
+  // Lost for long it is anywhere, and looked for in all the map.
+  if (lost_ > options_.max_coasting && lost_ % options_.looked_again_after != 0) {
+    return located;
+  }
   Searched searched = Search(features, located.registration);
   if (searched.found) {
     return {*std::move(searched.found), std::nullopt, true};

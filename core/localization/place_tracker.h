@@ -48,7 +48,8 @@ struct PlaceTrackerOptions {
   int most_unheld = 2;
   double max_weak_sigma_m = 0.10;  // of the worst horizontal direction; more is weak,
   double max_weak_up_m = 0.3;      // as is a height that is known no better, standard deviation
-  int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did
+  int max_coasting = 10;           // scans that a lost vehicle is taken to go on as it did,
+  int looked_again_after = 5;      // from then on it is looked for around there as often
 
   // Where more than so many scans are missing the vehicle may have stood meanwhile (a recorder that
   // waits at a red light with it), where more than that nothing is known of its motion.
@@ -250,6 +251,8 @@ class PlaceTracker {
   // Where `step` leads from the last scan.
   Pose LedBy(const OwnStep& step) const;
   void GoAlong(const OwnStep& step);
+  // Whether it is known which step that was.
+  bool Tells(const OwnStep& step) const;
   Place At(const RegistrationResult& registration, bool has_prior) const;
   // Fills starts_ with what is tried first: the prediction, and others where it is uncertain.
   void SpreadStarts(const PosePrior& prior);

@@ -63,9 +63,7 @@ bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationR
   }
   std::optional<Pose> moved;
   if (own_step_) {
-    const bool tells =
-        own_step_->is_known && SpreadOf(own_step_->covariance).along_m <= options_.same_step_m;
-    if (tells) moved = LedBy(*own_step_);
+    if (Tells(*own_step_)) moved = LedBy(*own_step_);
   } else if (trail_.is_empty()) {
     moved = result.T_world_level;
   } else {
@@ -90,9 +88,17 @@ bool PlaceTracker::IsSameStep(const Eigen::Vector4d& difference) const {
          std::abs(std::remainder(difference(3), 2.0 * std::numbers::pi)) <= options_.same_step_rad;
 }
 
+// Of posts in a row any fits: a step of which that is true is uncertain by as much as they are
+// apart.
+bool PlaceTracker::Tells(const OwnStep& step) const {
+  return step.is_known && SpreadOf(step.covariance).along_m <= options_.same_step_m;
+}
+
 void PlaceTracker::GoAlong(const OwnStep& step) {
   own_step_ = step;
-  if (!(confirmation_.is_confirmed() ? step.is_sure : step.is_known)) {
+  const bool is_believed =
+      confirmation_.is_confirmed() ? step.is_sure && Tells(step) : step.is_known;
+  if (!is_believed) {
     return;
   }
   motion_.Carry(LedBy(step), Turned(LevelFrame(motion_.last()).linear(), step.covariance));

@@ -346,8 +346,11 @@ class BestMotion {
     Eigen::Vector4d furthest = Eigen::Vector4d::Zero();
     for (const Tried& tried : tried_) {
       const Eigen::Vector4d off = PoseDifference(motion.T_world_level, tried.pose);
-      if (tried.fit >= motion.fit - options_.as_good_fit &&
-          off.head<2>().norm() > furthest.head<2>().norm()) {
+      const double off_m = off.head<2>().norm();
+      if (off_m > options_.clear_m && tried.fit >= options_.clear_share * motion.fit) {
+        motion.is_clear = false;
+      }
+      if (off_m > furthest.head<2>().norm() && tried.fit >= motion.fit - options_.as_good_fit) {
         furthest = off;
       }
     }

@@ -30,6 +30,10 @@ struct ScanOdometryOptions {
   double fan_sigmas = 1.5;
   double fan_step_m = 0.75;
   double as_good_fit = 0.05;  // so much less fits as well: ground, or a wall, alone
+  // Clear is a motion if none that is further than this from it fits so much of it: of a row of
+  // posts those at its ends are new where it drove on, and none of them where it stood.
+  double clear_share = 0.75;
+  double clear_m = 0.5;
   // Where a scan fits by less than this, it may have turned more than expected: so many times so
   // much is tried to either side.
   double sure_fit = 0.5;
@@ -50,6 +54,7 @@ struct ScanOdometryOptions {
 struct ScanMotion {
   Pose T_world_level = Pose::Identity();
   PoseCovariance covariance = PoseCovariance::Zero();  // as far as the scans tell
+  bool is_clear = true;                                // of all that were tried
   double fit = 0.0;  // mean robust weight, 0..1: of the columns that are near, where there are
 };
 
