@@ -9,9 +9,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "core/base/fast_floor.h"
 #include "core/localization/icp/point_index.h"
 #include "core/localization/normal_equations.h"
+#include "core/localization/odometry/upright_columns.h"
 
 namespace atlas {
 namespace {
@@ -22,38 +22,6 @@ float RobustWeight(float residual, float reach) {
   const float ratio = residual / (kScale * reach);
   const float denominator = 1.0F + ratio * ratio;
   return 1.0F / (denominator * denominator);
-}
-
-// What stands upright: a ceiling or a floor is seen along rings around the sensor, which move as it
-// does, and fit best where it stands still.
-std::vector<Eigen::Vector3f> Upright(const std::vector<Eigen::Vector3f>& columns) {
-  constexpr float kCell_m = 0.5F;
-  constexpr float kLeast_m = 0.4F;  // from its lowest return to its highest
-  struct Placed {
-    std::pair<int, int> cell;
-    std::size_t index;
-  };
-  std::vector<Placed> placed;
-  placed.reserve(columns.size());
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    placed.push_back(
-        {{FastFloor(columns[i].x() / kCell_m), FastFloor(columns[i].y() / kCell_m)}, i});
-  }
-  std::stable_sort(placed.begin(), placed.end(),
-                   [](const Placed& a, const Placed& b) { return a.cell < b.cell; });
-  std::vector<Eigen::Vector3f> upright;
-  for (auto begin = placed.begin(); begin != placed.end();) {
-    const auto end = std::find_if(begin, placed.end(),
-                                  [&](const Placed& other) { return other.cell != begin->cell; });
-    const auto [low, high] = std::minmax_element(begin, end, [&](const Placed& a, const Placed& b) {
-      return columns[a.index].z() < columns[b.index].z();
-    });
-    if (columns[high->index].z() - columns[low->index].z() >= kLeast_m) {
-      for (; begin != end; ++begin) upright.push_back(columns[begin->index]);
-    }
-    begin = end;
-  }
-  return upright;
 }
 
 // What a cloud is around one of its points.
@@ -108,9 +76,9 @@ class ScanFit {
           const Eigen::Vector3d& origin,
           const ScanOdometryOptions& options)
       : options_(options),
-        scan_columns_(Upright(features.columns)),
+        scan_columns_(UprightColumns(features.columns)),
         scan_ground_(features.ground),
-        columns_(Upright(recent.Columns(origin)), 0.8F),
+        columns_(UprightColumns(recent.Columns(origin)), 0.8F),
         ground_(recent.Ground(origin), 2.5F) {}
 
   // Of features: how many, and the sum of their robust weights.
