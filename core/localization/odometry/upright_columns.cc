@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <tuple>
 #include <utility>
 
 #include "core/base/fast_floor.h"
@@ -21,8 +22,9 @@ std::vector<Eigen::Vector3f> UprightColumns(const std::vector<Eigen::Vector3f>& 
     placed.push_back(
         {{FastFloor(columns[i].x() / kCell_m), FastFloor(columns[i].y() / kCell_m)}, i});
   }
-  std::stable_sort(placed.begin(), placed.end(),
-                   [](const Placed& a, const Placed& b) { return a.cell < b.cell; });
+  std::sort(placed.begin(), placed.end(), [](const Placed& a, const Placed& b) {
+    return std::tie(a.cell, a.index) < std::tie(b.cell, b.index);
+  });
   std::vector<Eigen::Vector3f> upright;
   for (auto begin = placed.begin(); begin != placed.end();) {
     const auto end = std::find_if(begin, placed.end(),

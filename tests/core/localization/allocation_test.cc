@@ -13,11 +13,14 @@ namespace {
 
 std::atomic<std::size_t> allocations{0};
 
-// Both out of line: inlined, a compiler takes them for a mismatched pair.
-[[gnu::noinline]] void* Allocate(std::size_t size, std::size_t alignment) {
+// All out of line: inlined, a compiler takes them for a mismatched pair.
+[[gnu::noinline]] void* TryToAllocate(std::size_t size, std::size_t alignment) {
   ++allocations;
   const std::size_t whole = (size + alignment - 1) / alignment * alignment;
-  void* memory = std::aligned_alloc(alignment, whole == 0 ? alignment : whole);
+  return std::aligned_alloc(alignment, whole == 0 ? alignment : whole);
+}
+[[gnu::noinline]] void* Allocate(std::size_t size, std::size_t alignment) {
+  void* memory = TryToAllocate(size, alignment);
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
@@ -32,6 +35,10 @@ void* operator new(std::size_t size) {
 }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return Allocate(size, static_cast<std::size_t>(alignment));
+}
+// What std::stable_sort asks for.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  return TryToAllocate(size, alignof(std::max_align_t));
 }
 void operator delete(void* memory) noexcept {
   Release(memory);
