@@ -97,7 +97,7 @@ class DriveLocalization {
     Pose start = scan.T_world_sensor;
     start.translation() =
         PerturbedPosition(scan.T_world_sensor, radius_m, height_m, {options_.seed, scan.number, 0});
-    const PlaceTrackerOptions believed;
+    const EdgeOptions believed;
     const double sigma_m = radius_m / believed.reachable_sigmas;
     const Eigen::Vector4d sigmas(sigma_m, sigma_m, height_m / believed.reachable_up_sigmas,
                                  MotionOptions().start_rad);
@@ -217,10 +217,10 @@ Status DriveLocalizationOptions::Validate() const {
   if (shots && shots->trials < 1) {
     return {StatusCode::kInvalidArgument, "trials 0: expected at least one"};
   }
-  const PlaceTrackerOptions searched;
-  if (shots && !(shots->translation_m <= searched.max_start_m)) {
+  const StartOptions searched;
+  if (shots && !(shots->translation_m <= searched.max_m)) {
     return {StatusCode::kInvalidArgument,
-            StrCat("starts ", shots->translation_m, " m off: expected ", searched.max_start_m,
+            StrCat("starts ", shots->translation_m, " m off: expected ", searched.max_m,
                    " at most; whoever is further off is to be relocalized")};
   }
   if (start) {

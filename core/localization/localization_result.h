@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/geometry/pose.h"
+#include "core/localization/map_cover.h"
 #include "core/localization/pose_prior.h"
 #include "core/localization/registration.h"
 
@@ -17,14 +18,6 @@ enum class LocalizationHealth : std::uint8_t {
   kLost,  // the scan does not fit the map here: the pose is the predicted one
 };
 std::string_view LocalizationHealthName(LocalizationHealth health);
-
-// What the map has of the ground that a scan saw.
-enum class MapCover : std::uint8_t {
-  kNone,    // (nearly) nothing: it was never mapped, or its tiles have not arrived
-  kCoarse,  // most of it from tiles above level 0: the finer ones have not arrived
-  kFine,
-};
-std::string_view MapCoverName(MapCover cover);
 
 struct LocalizationResult {
   Pose T_world_sensor = Pose::Identity();

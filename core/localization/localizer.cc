@@ -36,7 +36,7 @@ Localizer::Localizer(const MapProfile& profile,
       options_(options),
       features_(options.features),
       relocalizer_(std::move(relocalizer)),
-      own_motion_(options.tracker.motion, options.tracker.trail.odometry) {
+      own_motion_(options.tracker.motion, options.tracker.pause, options.tracker.trail.odometry) {
   places_.emplace_back(NewTracker());
 }
 
@@ -232,8 +232,8 @@ void Localizer::Join() {
         places_.begin(), places_.begin() + static_cast<std::ptrdiff_t>(i),
         [&](const SupposedPlace& other) {
           return other.lost == 0 && places_[i].lost == 0 &&
-                 !AreApart(other.result.T_world_sensor, places_[i].result.T_world_sensor,
-                           options_.tracker.search.apart_m, options_.tracker.search.apart_rad);
+                 IsSamePlace(other.result.T_world_sensor, places_[i].result.T_world_sensor,
+                             options_.tracker.hypotheses);
         });
     if (same == places_.begin() + static_cast<std::ptrdiff_t>(i)) {
       ++i;

@@ -33,6 +33,14 @@ struct MotionOptions {
   double turn_surprise_rad = 0.2;
 };
 
+// Where scans are missing.
+struct PauseOptions {
+  // More than so many: the vehicle may have stood meanwhile (a recorder that waits at a red light
+  // with it). More than that: nothing is known of its motion.
+  double most_missing = 5.0;
+  double most_predicted = 20.0;
+};
+
 class MotionModel {
  public:
   explicit MotionModel(const MotionOptions& options);

@@ -17,14 +17,12 @@ void OwnMotion::Begin(const ScanFeatures& features) {
 }
 
 OwnStep OwnMotion::Next(const ScanFeatures& features, double scans) {
-  constexpr double kMostMissing = 5.0;     // PlaceTrackerOptions
-  constexpr double kMostPredicted = 20.0;  // scans missing: it may have done anything
-  if (scans > kMostPredicted) motion_.ForgetMotion();
+  if (scans > pause_.most_predicted) motion_.ForgetMotion();
   const Pose last = motion_.T_world_sensor();
   motion_.Predict(scans);
   const PosePrior expected{motion_.T_world_sensor(), motion_.StepCovariance()};
   ScanMotion moved = MotionSince(recent_, features, expected, odometry_);
-  if (scans > kMostMissing) {  // it may have stood meanwhile
+  if (scans > pause_.most_missing) {  // it may have stood meanwhile
     const ScanMotion stood =
         MotionSince(recent_, features, {last, PoseCovariance::Zero()}, odometry_);
     if (stood.fit >= moved.fit - odometry_.as_good_fit) moved = stood;

@@ -22,8 +22,10 @@ struct OwnStep {
 
 class OwnMotion {
  public:
-  OwnMotion(const MotionOptions& motion, const ScanOdometryOptions& odometry)
-      : odometry_(odometry), recent_(odometry.scans), motion_(motion) {}
+  OwnMotion(const MotionOptions& motion,
+            const PauseOptions& pause,
+            const ScanOdometryOptions& odometry)
+      : pause_(pause), odometry_(odometry), recent_(odometry.scans), motion_(motion) {}
 
   void Forget() { recent_.Clear(); }
   bool is_begun() const { return !recent_.is_empty(); }
@@ -34,6 +36,7 @@ class OwnMotion {
   OwnStep Next(const ScanFeatures& features, double scans);
 
  private:
+  PauseOptions pause_;
   ScanOdometryOptions odometry_;
   RecentScans recent_;  // in a frame that begins where it did
   MotionModel motion_;

@@ -1,11 +1,8 @@
 // A vehicle that drove off the map, carried on by its own motion from where it was known or told to
 // be (decision 0624). Until it is known again the map does not move it: what fits there may be
 // another place.
-#include <array>
 #include <cmath>
 #include <utility>
-
-#include <Eigen/LU>
 
 #include "core/localization/place_tracker.h"
 
@@ -58,7 +55,7 @@ void PlaceTracker::Keep(const ScanFeatures& features,
   }
   if (!is_carried) {
     carried_ = 0;
-    off_carried_.reset();
+    drift_.EndCarry();
     if (!is_lost && !is_known) {
       trail_.Clear();
       return;
@@ -73,7 +70,8 @@ void PlaceTracker::Keep(const ScanFeatures& features,
 bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationResult& result) {
   const Pose& there = result.registration.T_world_level;
   if (result.health != LocalizationHealth::kWeak || trail_.is_empty() ||
-      GroundMapped(map_.window(), features, there).value_or(1.0) > options_.edge_ground_mapped) {
+      GroundMapped(map_.window(), features, there).value_or(1.0) >
+          options_.edge.edge_ground_mapped) {
     return false;
   }
   const bool agrees =
@@ -85,21 +83,15 @@ bool PlaceTracker::IsNearEdge(const ScanFeatures& features, const LocalizationRe
 bool PlaceTracker::IsOnMap(const RegistrationResult& result,
                            const ScanFeatures& features,
                            double unknown_share) const {
-  const double asked = confirmation_.IsEnough(result, features) ? options_.least_ground_mapped
-                                                                : options_.min_ground_mapped;
+  const double asked = confirmation_.IsEnough(result, features) ? options_.edge.least_ground_mapped
+                                                                : options_.edge.min_ground_mapped;
   return GroundMapped(map_.window(), features, result.T_world_level).value_or(unknown_share) >=
          asked;
 }
 
-bool PlaceTracker::IsWithinReach(const Pose& T_world_sensor) const {
-  constexpr std::array<int, 3> kPlane{0, 1, 3};
-  const PosePrior prior = Prior();
-  const Eigen::Vector4d off = PoseDifference(prior.T_world_level, T_world_sensor);
-  const Eigen::Vector3d in_plane = off(kPlane);
-  const Eigen::Matrix3d plane = prior.covariance(kPlane, kPlane);
-  const double sigmas = std::sqrt(in_plane.dot(plane.inverse() * in_plane));
-  return sigmas <= options_.reachable_sigmas &&
-         std::abs(off(2)) <= options_.reachable_up_sigmas * std::sqrt(prior.covariance(2, 2));
+bool PlaceTracker::IsWithinReach(const Pose& T_world_level) const {
+  return IsWithin(Prior(), T_world_level, options_.edge.reachable_sigmas,
+                  options_.edge.reachable_up_sigmas);
 }
 
 bool PlaceTracker::IsReachable(const Pose& T_world_sensor) const {
@@ -115,9 +107,9 @@ std::optional<PlacePrior> PlaceTracker::Within() const {
   const PoseCovariance covariance = next.covariance();
   PlacePrior prior;
   prior.center = expected.head<2>();
-  prior.radius_m = options_.reachable_sigmas * SpreadOf(covariance).along_m;
+  prior.radius_m = options_.edge.reachable_sigmas * SpreadOf(covariance).along_m;
   prior.z_m = expected.z();
-  prior.height_m = options_.reachable_up_sigmas * std::sqrt(covariance(2, 2));
+  prior.height_m = options_.edge.reachable_up_sigmas * std::sqrt(covariance(2, 2));
   return prior;
 }
 

@@ -17,30 +17,31 @@ PlaceTracker::Surprise PlaceTracker::SurpriseOf(const RegistrationResult& result
   const Eigen::Vector4d off = PoseDifference(prior.T_world_level, result.T_world_level);
   if (is_first_ && carried_ == 0) {
     const bool is_told =
-        IsWithinStart(result.T_world_level) && std::abs(off(2)) <= options_.start_up_m;
+        IsWithinStart(result.T_world_level) && std::abs(off(2)) <= options_.start.up_m;
     return is_told ? Surprise::kNone : Surprise::kNew;
   }
   if (carried_ > 0) {
-    const bool is_back_soon = carried_ <= options_.max_coasting &&
+    const bool is_back_soon = carried_ <= options_.doubt.max_coasting &&
                               !IsAtEdge(features, result.T_world_level) &&
                               confirmation_.IsAsUsual(result, features, usual_fit_);
     return is_back_soon ? Surprise::kNone : Surprise::kOdd;
   }
   if (lost_ == 0 && !is_found) {
-    const bool may_have_stood = has_paused_ && IsAtEdge(features, result.T_world_level);
-    return has_stood_ || may_have_stood || has_broken_ || has_strayed_ ? Surprise::kOdd
-                                                                       : Surprise::kNone;
+    const bool may_have_stood = at_hand_.has_paused && IsAtEdge(features, result.T_world_level);
+    return at_hand_.has_stood || may_have_stood || at_hand_.has_broken || at_hand_.has_strayed
+               ? Surprise::kOdd
+               : Surprise::kNone;
   }
-  const bool is_near =
-      off.head<3>().norm() <= options_.expected_m && std::abs(off(3)) <= options_.expected_rad;
-  const bool is_likely = LogDensity(prior, result.T_world_level) > options_.surprising_log_density;
-  if (has_strayed_) {
+  const bool is_near = off.head<3>().norm() <= options_.surprise.near_m &&
+                       std::abs(off(3)) <= options_.surprise.near_rad;
+  const bool is_likely = LogDensity(prior, result.T_world_level) > options_.surprise.log_density;
+  if (at_hand_.has_strayed) {
     return Surprise::kOdd;
   }
-  if (has_broken_) {
+  if (at_hand_.has_broken) {
     return is_near ? Surprise::kOdd : Surprise::kNew;
   }
-  if ((lost_ == 0 && is_likely) || (lost_ <= options_.max_coasting && is_near &&
+  if ((lost_ == 0 && is_likely) || (lost_ <= options_.doubt.max_coasting && is_near &&
                                     confirmation_.IsAsUsual(result, features, usual_fit_))) {
     return Surprise::kNone;
   }
@@ -61,7 +62,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
     was_anywhere_ = was_anywhere_ || surprise == Surprise::kNew;
   } else if (surprise == Surprise::kOdd) {
     confirmation_.Question();
-    is_elsewhere_ = is_elsewhere_ || has_broken_;
+    is_elsewhere_ = is_elsewhere_ || at_hand_.has_broken;
   }
   if (!confirmation_.is_confirmed() && !MovesAsSeen(features, result.registration)) {
     confirmation_.Miss();
@@ -87,7 +88,7 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
       RepeatsBeside(result.registration, features)) {
     confirmation_.Doubt();
   }
-  if (confirmation_.is_confirmed()) moved_off_.setZero();
+  if (confirmation_.is_confirmed()) drift_.Confirm();
   if (!confirmation_.is_confirmed() || confirmation_.is_suspected()) {
     result.health = LocalizationHealth::kWeak;
   }
@@ -97,20 +98,19 @@ void PlaceTracker::Confirm(const ScanFeatures& features,
 bool PlaceTracker::RepeatsBeside(const RegistrationResult& found, const ScanFeatures& features) {
   const std::vector<Pose> starts =
       SearchPoses(map_.coarse(), map_.window().origin(), features, found.T_world_level,
-                  options_.beside, options_.search);
+                  options_.doubt.beside, options_.search);
   return std::any_of(starts.begin(), starts.end(), [&](const Pose& start) {
     const RegistrationResult other =
         Register(map_.window(), features, start, options_.registration);
-    return AreApart(other.T_world_level, found.T_world_level, options_.search.apart_m,
-                    options_.search.apart_rad) &&
+    return !IsSamePlace(other.T_world_level, found.T_world_level, options_.hypotheses) &&
            At(other, false).log_likelihood >
-               At(found, false).log_likelihood - options_.unique_log_ratio;
+               At(found, false).log_likelihood - options_.hypotheses.unique_log_ratio;
   });
 }
 
 bool PlaceTracker::IsHeld(const RegistrationResult& result, const ScanFeatures& features) const {
-  return features.columns.size() < options_.few_columns ||
-         result.column_inliers >= options_.min_columns;
+  return features.columns.size() < options_.health.few_columns ||
+         result.column_inliers >= options_.health.min_columns;
 }
 
 LocalizationHealth PlaceTracker::Judge(const RegistrationResult& result,
@@ -121,11 +121,11 @@ LocalizationHealth PlaceTracker::Judge(const RegistrationResult& result,
   }
   if ((surprise != Surprise::kNone && !is_first_) || !confirmation_.is_confirmed()
           ? !confirmation_.IsEnough(result, features)
-          : result.fit < options_.min_fit) {
+          : result.fit < options_.health.min_fit) {
     return LocalizationHealth::kLost;
   }
-  return WorstSigma(result) > options_.max_weak_sigma_m || result.fit < options_.good_fit ||
-                 !IsHeld(result, features)
+  return WorstSigma(result) > options_.health.max_weak_sigma_m ||
+                 result.fit < options_.health.good_fit || !IsHeld(result, features)
              ? LocalizationHealth::kWeak
              : LocalizationHealth::kGood;
 }
@@ -138,12 +138,12 @@ LocalizationResult PlaceTracker::Doubted(LocalizationResult result) const {
 
 // Wider where it is not known that this is the place.
 PoseCovariance PlaceTracker::Covariance(const LocalizationResult& result) const {
-  const bool is_poor =
-      result.health == LocalizationHealth::kWeak && result.registration.fit < options_.good_fit;
+  const bool is_poor = result.health == LocalizationHealth::kWeak &&
+                       result.registration.fit < options_.health.good_fit;
   const bool is_carried = carried_ > 0 && result.health == LocalizationHealth::kLost;
-  const bool is_known =
-      is_carried || (confirmation_.is_confirmed() && !is_poor && unheld_ <= options_.most_unheld &&
-                     lost_ < options_.told_lost_after);
+  const bool is_known = is_carried || (confirmation_.is_confirmed() && !is_poor &&
+                                       unheld_ <= options_.health.most_unheld &&
+                                       lost_ < options_.health.told_lost_after);
   return is_known ? motion_.covariance() : motion_.covariance() + confirmation_.Spread();
 }
 

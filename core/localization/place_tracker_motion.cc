@@ -27,7 +27,7 @@ void Thin(const ScanFeatures& scan, ScanFeatures& thinned) {
 }  // namespace
 
 std::optional<PlaceTracker::SeenMotion> PlaceTracker::MotionSeen(const ScanFeatures& scan) {
-  if (is_first_ || lost_ > 0 || carried_ > 0 || scans_ > options_.most_missing) {
+  if (is_first_ || lost_ > 0 || carried_ > 0 || scans_ > options_.pause.most_missing) {
     return std::nullopt;
   }
   Thin(scan, thinned_);
@@ -35,18 +35,18 @@ std::optional<PlaceTracker::SeenMotion> PlaceTracker::MotionSeen(const ScanFeatu
   MotionModel moved = Next();
   const PosePrior prior = PriorOf(moved);
   const PosePrior among_features{prior.T_world_level,
-                                 options_.information_share * prior.covariance};
+                                 options_.seen.information_share * prior.covariance};
   RegistrationResult seen =
       Register(map_.window(), features, prior.T_world_level, among_features, options_.registration);
   if (IsDoubtful(seen)) {
     for (const Pose& start :
          SearchPoses(map_.coarse(), map_.window().origin(), features, prior.T_world_level,
-                     options_.search_reach, options_.search)) {
+                     options_.doubt.search_reach, options_.search)) {
       RegistrationResult other = Register(map_.window(), features, start, options_.registration);
       if (other.evidence > seen.evidence) seen = std::move(other);
     }
   }
-  if (seen.fit < options_.min_fit) {
+  if (seen.fit < options_.health.min_fit) {
     return std::nullopt;
   }
   moved.Turn(seen.T_world_level, Eigen::Matrix4d::Identity());

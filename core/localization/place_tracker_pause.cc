@@ -7,7 +7,7 @@
 namespace atlas {
 
 bool PlaceTracker::HasStood(const ScanFeatures& features) {
-  if (lost_ > 0 || !has_paused_) {
+  if (lost_ > 0 || !at_hand_.has_paused) {
     return false;
   }
   MotionModel stood = motion_;
@@ -21,9 +21,10 @@ bool PlaceTracker::HasStood(const ScanFeatures& features) {
   const auto likelihood_near = [&](const MotionModel& model) {
     return is_by_trail ? FitOnTrail(model, features) : LikelihoodNear(model, features);
   };
-  bool has_stood = scans_ > options_.most_predicted;
-  double asked = likelihood_near(has_stood ? stood : Next()).value_or(kNone) +
-                 (is_by_trail ? -options_.trail.odometry.as_good_fit : options_.believed_log_ratio);
+  bool has_stood = scans_ > options_.pause.most_predicted;
+  double asked =
+      likelihood_near(has_stood ? stood : Next()).value_or(kNone) +
+      (is_by_trail ? -options_.trail.odometry.as_good_fit : options_.hypotheses.believed_log_ratio);
   if (has_stood) motion_ = stood;
   for (const MotionModel& model : {stood, stopped}) {
     const std::optional<double> likelihood = likelihood_near(model);

@@ -13,17 +13,18 @@ bool PlaceTracker::IsVagueStart() const {
     return false;
   }
   const SearchReach reach = StartReach();
-  return reach.along_m >= options_.search.apart_m || reach.yaw_rad >= options_.search.apart_rad;
+  return reach.along_m >= options_.hypotheses.apart_m ||
+         reach.yaw_rad >= options_.hypotheses.apart_rad;
 }
 
 SearchReach PlaceTracker::StartReach() const {
   if (!is_told_) {
-    const double within_m = std::min(hint_.within_m, options_.max_start_m);
+    const double within_m = std::min(hint_.within_m, options_.start.max_m);
     return {within_m, within_m, std::min(hint_.within_rad, std::numbers::pi)};
   }
   const PoseCovariance covariance = motion_.covariance();
   const HorizontalSpread spread = SpreadOf(covariance);
-  const double sigmas = options_.reachable_sigmas;
+  const double sigmas = options_.edge.reachable_sigmas;
   return {sigmas * spread.along_m, sigmas * spread.beside_m, sigmas * std::sqrt(covariance(3, 3)),
           std::atan2(spread.direction.y(), spread.direction.x())};
 }
@@ -33,8 +34,8 @@ bool PlaceTracker::IsWithinStart(const Pose& T_world_level) const {
     return IsWithinReach(T_world_level);
   }
   const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, T_world_level);
-  return off.head<2>().lpNorm<Eigen::Infinity>() <= hint_.within_m + options_.beyond_start_m &&
-         std::abs(off(3)) <= hint_.within_rad + options_.beyond_start_rad;
+  return off.head<2>().lpNorm<Eigen::Infinity>() <= hint_.within_m + options_.start.beyond_m &&
+         std::abs(off(3)) <= hint_.within_rad + options_.start.beyond_rad;
 }
 
 }  // namespace atlas

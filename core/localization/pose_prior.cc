@@ -1,10 +1,12 @@
 #include "core/localization/pose_prior.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 namespace atlas {
 
@@ -37,6 +39,15 @@ bool AreApart(const Pose& a, const Pose& b, double apart_m, double apart_rad) {
 double LogDensity(const PosePrior& prior, const Pose& pose) {
   const Eigen::Vector4d offset = PoseDifference(prior.T_world_level, pose);
   return -0.5 * offset.dot(prior.covariance.ldlt().solve(offset));
+}
+
+bool IsWithin(const PosePrior& prior, const Pose& pose, double sigmas, double up_sigmas) {
+  constexpr std::array<int, 3> kPlane{0, 1, 3};
+  const Eigen::Vector4d off = PoseDifference(prior.T_world_level, pose);
+  const Eigen::Vector3d in_plane = off(kPlane);
+  const Eigen::Matrix3d plane = prior.covariance(kPlane, kPlane);
+  return std::sqrt(in_plane.dot(plane.inverse() * in_plane)) <= sigmas &&
+         std::abs(off(2)) <= up_sigmas * std::sqrt(prior.covariance(2, 2));
 }
 
 HorizontalSpread SpreadOf(const PoseCovariance& covariance) {

@@ -41,6 +41,10 @@ bool AreApart(const Pose& a, const Pose& b, double apart_m, double apart_rad);
 // Log of the prior's density at `pose`, up to its constant.
 double LogDensity(const PosePrior& prior, const Pose& pose);
 
+// Whether `pose` is within so many of its standard deviations: of (x, y, yaw) in all, and of the
+// height.
+bool IsWithin(const PosePrior& prior, const Pose& pose, double sigmas, double up_sigmas);
+
 // A place's uncertainty in the plane, standard deviations.
 struct HorizontalSpread {
   double along_m = 0.0;   // in the direction in which it is least certain

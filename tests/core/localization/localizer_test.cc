@@ -310,7 +310,7 @@ TEST(SupposedPlaceTest, APlaceThatSlidesAlongPostsIsNotConfirmed) {
   PlaceTrackerOptions options;
   options.confirmation.usual_fit = 0.5;
   PlaceTracker tracker(map.profile(), map.Source(), options, 25.0);
-  OwnMotion own({}, {});
+  OwnMotion own({}, {}, {});
   tracker.Suppose(UprightPose({-7.0, 0.3, 1.8}, 0.0), 0.0);
   for (int i = 0; i < 8; ++i) {
     const Pose truth = UprightPose({-6.0 + 1.2 * i, 0.3, 1.8}, 0.0);
