@@ -8,7 +8,7 @@
 
 #include "client/map/map_view.h"
 #include "core/base/status.h"
-#include "core/localization/local_map.h"
+#include "core/localization/window/local_map.h"
 #include "core/tile/tile.h"
 
 namespace atlas {

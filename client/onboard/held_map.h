@@ -7,9 +7,9 @@
 
 #include "client/vehicle/atlas_view.h"
 #include "core/geometry/map_profile.h"
-#include "core/localization/local_map.h"
 #include "core/localization/localizer.h"
 #include "core/localization/relocalizer.h"
+#include "core/localization/window/local_map.h"
 
 namespace atlas {
 

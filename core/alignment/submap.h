@@ -18,7 +18,7 @@
 #include "core/geometry/pose.h"
 #include "core/keyframe/keyframe.h"
 #include "core/localization/places/range_profile.h"
-#include "core/localization/scan_features.h"
+#include "core/localization/registration/scan_features.h"
 #include "core/tile/tile.h"
 
 namespace atlas {

@@ -12,8 +12,8 @@
 #include "core/alignment/submap.h"
 #include "core/geometry/map_profile.h"
 #include "core/geometry/pose.h"
-#include "core/localization/pose_search.h"
-#include "core/localization/registration.h"
+#include "core/localization/registration/pose_search.h"
+#include "core/localization/registration/registration.h"
 #include "core/localization/window/map_window.h"
 
 namespace atlas {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/geometry/motion_share.h"
-#include "core/localization/place_score.h"
+#include "core/localization/belief/place_score.h"
 #include "core/scan/deskew.h"
 
 namespace atlas {

@@ -14,13 +14,13 @@
 #include <Eigen/Geometry>
 
 #include "core/base/status.h"
-#include "core/localization/local_map.h"
-#include "core/localization/localization_result.h"
-#include "core/localization/own_motion.h"
-#include "core/localization/place_tracker.h"
-#include "core/localization/pose_prior.h"
+#include "core/localization/belief/localization_result.h"
+#include "core/localization/odometry/own_motion.h"
+#include "core/localization/registration/pose_prior.h"
+#include "core/localization/registration/scan_features.h"
 #include "core/localization/relocalizer.h"
-#include "core/localization/scan_features.h"
+#include "core/localization/tracking/place_tracker.h"
+#include "core/localization/window/local_map.h"
 #include "core/scan/leveled_scan.h"
 
 namespace atlas {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/localization/pose_prior.h"
+#include "core/localization/registration/pose_prior.h"
 
 namespace atlas {
 namespace {

@@ -10,12 +10,12 @@
 #include <Eigen/Geometry>
 
 #include "core/base/status.h"
-#include "core/localization/local_map.h"
-#include "core/localization/other_decks.h"
-#include "core/localization/place_score.h"
+#include "core/localization/belief/other_decks.h"
+#include "core/localization/belief/place_score.h"
 #include "core/localization/places/place_index.h"
-#include "core/localization/registration.h"
-#include "core/localization/scan_features.h"
+#include "core/localization/registration/registration.h"
+#include "core/localization/registration/scan_features.h"
+#include "core/localization/window/local_map.h"
 #include "core/scan/leveled_scan.h"
 
 namespace atlas {

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "client/drive/anchor/anchor_fit.h"
-#include "core/localization/pose_prior.h"
+#include "core/localization/registration/pose_prior.h"
 #include "core/localization/relocalizer.h"
 #include "core/scan/drive_folder.h"
 #include "core/scan/position_file.h"

@@ -11,7 +11,7 @@
 #include "core/alignment/submap_match.h"
 #include "core/base/bytes.h"
 #include "core/geometry/pose.h"
-#include "core/localization/pose_search.h"
+#include "core/localization/registration/pose_search.h"
 
 namespace atlas {
 

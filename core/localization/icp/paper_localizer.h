@@ -11,7 +11,7 @@
 #include "core/keyframe/keyframe.h"
 #include "core/localization/icp/point_icp.h"
 #include "core/localization/icp/point_index.h"
-#include "core/localization/local_map.h"
+#include "core/localization/window/local_map.h"
 #include "core/tile/column_points.h"
 
 namespace atlas {

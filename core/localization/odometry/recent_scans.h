@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
-#include "core/localization/scan_features.h"
+#include "core/localization/registration/scan_features.h"
 
 namespace atlas {
 

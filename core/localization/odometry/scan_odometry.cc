@@ -10,8 +10,8 @@
 #include <Eigen/LU>
 
 #include "core/localization/icp/point_index.h"
-#include "core/localization/normal_equations.h"
 #include "core/localization/odometry/upright_columns.h"
+#include "core/localization/registration/normal_equations.h"
 
 namespace atlas {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "core/geometry/pose.h"
 #include "core/localization/odometry/recent_scans.h"
-#include "core/localization/pose_prior.h"
-#include "core/localization/scan_features.h"
+#include "core/localization/registration/pose_prior.h"
+#include "core/localization/registration/scan_features.h"
 
 namespace atlas {
 
@@ -48,7 +48,7 @@ struct ScanOdometryOptions {
   // ground.
   int few_columns = 30;
   double far_known = 0.4;
-  double information_share = 0.08;  // neighbouring features err together (PlaceTrackerOptions)
+  double information_share = 0.08;  // neighbouring features err together (SeenOptions)
 };
 
 struct ScanMotion {

@@ -5,8 +5,8 @@
 #include "core/geometry/pose.h"
 #include "core/localization/odometry/recent_scans.h"
 #include "core/localization/odometry/scan_odometry.h"
-#include "core/localization/pose_prior.h"
-#include "core/localization/scan_features.h"
+#include "core/localization/registration/pose_prior.h"
+#include "core/localization/registration/scan_features.h"
 
 namespace atlas {
 

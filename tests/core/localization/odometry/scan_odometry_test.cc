@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/localization/motion_model.h"
+#include "core/localization/odometry/motion_model.h"
 #include "tests/core/localization/painted_map.h"
 
 namespace atlas {
