@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "client/drive/drive_survey.h"
+#include "client/drive/drive_times.h"
 #include "client/drive/localization_trial.h"
 #include "client/score/cpu_timer.h"
 #include "core/base/str_cat.h"
@@ -13,19 +14,6 @@
 
 namespace atlas {
 namespace {
-
-// Of scans that follow each other, where the drive says when they were made: then a revolution of
-// the sensor is known before the first one.
-std::optional<double> UsualIntervalOf(const DriveFolder& drive,
-                                      const std::vector<SelectedScan>& selected) {
-  std::vector<double> intervals_s;
-  for (std::size_t i = 1; i < selected.size(); ++i) {
-    const auto& before_s = drive.scans[selected[i - 1].index].time_s;
-    const auto& time_s = drive.scans[selected[i].index].time_s;
-    if (before_s && time_s && *time_s > *before_s) intervals_s.push_back(*time_s - *before_s);
-  }
-  return intervals_s.empty() ? std::nullopt : std::optional(UsualInterval_s(intervals_s));
-}
 
 class DriveLocalization {
  public:
@@ -38,8 +26,11 @@ class DriveLocalization {
   Result<DriveLocalizationReport> Run() {
     std::optional<std::uint32_t> last_part;
     const std::vector<SelectedScan> scans = SelectScans(drive_, options_.selection);
-    clock_ = ScanClock(UsualIntervalOf(drive_, scans));
-    for (const SelectedScan& selected : scans) {
+    const std::vector<std::optional<double>> times = TimesOf(drive_, scans);
+    clock_ = ScanClock(UsualIntervalOf(times));
+    for (std::size_t i = 0; i < scans.size(); ++i) {
+      const SelectedScan& selected = scans[i];
+      time_ = times[i];
       const DriveScan& scan = drive_.scans[selected.index];
       const Result<PointCloud> cloud = ReadScan(scan.scan);
       if (!cloud && !(IsDamaged(cloud.error()) && !options_.shots)) return Error(cloud.error());
@@ -110,8 +101,7 @@ class DriveLocalization {
                   LocalizedScan localized) {
     if (options_.monitor != nullptr) options_.monitor->Begin(scan.number);
     const CpuTimer timer;
-    Result<LocatedScan> located =
-        localizer_.Locate(cloud, R_level_sensor, clock_.Tick(scan.time_s));
+    Result<LocatedScan> located = localizer_.Locate(cloud, R_level_sensor, clock_.Tick(time_));
     localized.cpu_s = timer.elapsed_s();
     if (!located) return located.error();
     localized.scan = scan.number;
@@ -160,6 +150,7 @@ class DriveLocalization {
   const std::function<void(const LocalizedScan&)>& on_scan_;
   ScanLocalizer& localizer_;
   ScanClock clock_;
+  std::optional<double> time_;  // of the scan at hand, TimesOf()
   std::optional<Pose> last_;
   DriveLocalizationReport report_;
 };
@@ -182,7 +173,9 @@ SurveyOptions SurveyOptionsFor(const DriveLocalizationOptions& options) {
 double RevolutionsBetween(const DriveFolder& drive, const DriveLocalizationOptions& options) {
   const auto& revolution_s = options.deskew.revolution_s;
   if (!revolution_s) return options.selection.parity == ScanParity::kAll ? 1.0 : 2.0;
-  const auto interval_s = UsualIntervalOf(drive, SelectScans(drive, options.selection));
+  const std::vector<SelectedScan> selected = SelectScans(drive, options.selection);
+  if (!IsTimed(drive, selected)) return 1.0;
+  const auto interval_s = UsualIntervalOf(TimesOf(drive, selected));
   return std::max(1.0, interval_s.value_or(*revolution_s) / *revolution_s);
 }
 

@@ -23,16 +23,21 @@ double UsualInterval_s(std::span<double> intervals_s) {
 }
 
 double ScanClock::Tick(std::optional<double> time_s) {
-  if (!time_s) return 1.0;
+  if (!time_s) {
+    unknown_ += 1.0;
+    return 1.0;
+  }
   const std::optional<double> before_s = std::exchange(last_s_, time_s);
+  const double unknown = std::exchange(unknown_, 0.0);
   if (!before_s) return 1.0;
   if (*time_s <= *before_s) {
     last_s_.reset();  // one of both is wrong, nobody knows which
     return 1.0;
   }
   const double since_s = *time_s - *before_s;
-  intervals_s_[intervals_++ % kKept] = since_s;
-  return std::min(since_s / Usual_s(), kMost);
+  if (unknown == 0.0) intervals_s_[intervals_++ % kKept] = since_s;
+  const double since = intervals_ > 0 || usual_s_ ? since_s / Usual_s() - unknown : 1.0;
+  return std::clamp(since, kLeast, kMost);
 }
 
 double ScanClock::Usual_s() const {

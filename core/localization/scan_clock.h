@@ -20,14 +20,18 @@ class ScanClock {
   // that what is missing among the first scans makes two or three of them look like others.
   explicit ScanClock(std::optional<double> usual_s = std::nullopt) : usual_s_(usual_s) {}
 
-  // `time_s` of the scan at hand; none: nobody knows. Times the usual interval; 1 where that is not
-  // known, and where time does not go on, of the scan behind it, too: its time may have been the
-  // wrong one.
+  // `time_s` of the scan at hand; none: nobody knows. Times the usual interval; 1 where that or the
+  // time is not known, as is counted at the next one that is; and where time does not go on, of the
+  // scan behind it, too: its time may have been the wrong one.
   double Tick(std::optional<double> time_s);
   // The next scan has nothing to do with those before, but is the same sensor's.
-  void Restart() { last_s_.reset(); }
+  void Restart() {
+    last_s_.reset();
+    unknown_ = 0.0;
+  }
 
  private:
+  static constexpr double kLeast = 0.1;   // who has scans in between had time for them
   static constexpr double kMost = 100.0;  // later nothing is left of what was known
   static constexpr std::size_t kKept = 64;
 
@@ -35,6 +39,7 @@ class ScanClock {
 
   std::optional<double> usual_s_;
   std::optional<double> last_s_;
+  double unknown_ = 0.0;  // scans since then
   std::array<double, kKept> intervals_s_{};
   std::size_t intervals_ = 0;  // so far: the last kKept of them are kept
 };

@@ -9,6 +9,8 @@ import json
 import math
 import os
 import pathlib
+import random
+import shutil
 import signal
 import struct
 import subprocess
@@ -336,6 +338,49 @@ def edges(bin_dir):
         assert good >= least and wrong == 0
 
 
+def times(bin_dir):
+    """Scans that are missing where no times say so, one that is stamped late, and times that jitter: all of two worlds
+    is mapped, and nobody is good elsewhere."""
+    def stamp(folder, change):
+        lines = (folder / "times.txt").read_text().splitlines()
+        (folder / "times.txt").write_text("".join(f"{change(number, float(line)):.6f}\n"
+                                                  for number, line in enumerate(lines)))
+
+    def some_missing(folder):
+        (folder / "times.txt").unlink()
+        for number in range(100, 103):
+            (folder / f"velodyne/{number:06}.bin").unlink()
+
+    def late(scan, by_s):
+        return lambda folder: stamp(folder, lambda number, time_s: time_s + (by_s if number == scan else 0.0))
+
+    def jitter(folder):
+        noise = random.Random(3)
+        stamp(folder, lambda number, time_s: 1.0 + time_s + noise.gauss(0.0, 0.04))
+
+    for world, seed, cases in (
+            ("garage", 7, {"three missing": some_missing, "times jitter": jitter, "one late": late(37, 0.2),
+                           "one later than the next": late(60, 0.6)}),
+            ("overpass", 1, {"one late": late(137, 0.1), "times jitter": jitter})):
+        with tempfile.TemporaryDirectory() as work:
+            atlas = Atlas(bin_dir, work)
+            for number in (0, seed):
+                subprocess.run([bin_dir / "atlas", "simulate", world, "-o", f"{work}/{number}", "--seed", str(number)],
+                               check=True, stdout=subprocess.DEVNULL)
+            atlas.run("ingest", f"{work}/0")
+            atlas.run("wait")
+            for name, change in cases.items():
+                folder = pathlib.Path(work) / name.replace(" ", "_")
+                shutil.copytree(f"{work}/{seed}", folder)
+                change(folder)
+                done = atlas.call("localize", folder).stdout.splitlines()
+                good, wrong = good_and_wrong([json.loads(line) for line in done[:-1]])
+                print(f"{world}, {name}: {good} of {len(done) - 1} good, {wrong} of them elsewhere")
+                assert good >= 0.95 * (len(done) - 1) and wrong == 0
+                shutil.rmtree(folder)
+            assert atlas.stop() == 0
+
+
 def half(bin_dir):
     """Half an interchange, which looks the same from both sides, and little of what the other drive sees of it: who was
     adrift on the plain before it is found where he is, and who fits there twice is good at neither place."""
@@ -600,7 +645,7 @@ def main():
                 assert atlas.stop() == 0
     else:
         {"localization": localization, "places": places, "anchor": anchor, "second": second, "unmapped": unmapped,
-         "edges": edges, "half": half, "told": told, "decks": decks, "segmentation": segmentation, "order": order,
+         "edges": edges, "times": times, "half": half, "told": told, "decks": decks, "segmentation": segmentation, "order": order,
          "ground": ground, "street": street}[name](bin_dir)
 
 

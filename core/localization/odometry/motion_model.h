@@ -39,6 +39,17 @@ struct PauseOptions {
   // with it). More than that: nothing is known of its motion.
   double most_missing = 5.0;
   double most_predicted = 20.0;
+  // Fewer: their times may be wrong, by this, standard deviation, of a usual interval. Where a
+  // whole number of them leads so far from where the told time does, the scan tells which it was:
+  // by how well it fits near there and, where it is found at one place from all of them, by how far
+  // from there, standard deviations. Where the speed is not known as well as this, a scan, standard
+  // deviation, it is a whole number.
+  double sigma = 0.5;
+  double apart_m = 0.15;
+  double apart_rad = 0.03;
+  double off_m = 0.15;
+  double off_rad = 0.1;
+  double known_m = 0.5;
 };
 
 class MotionModel {

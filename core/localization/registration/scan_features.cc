@@ -29,7 +29,23 @@ void Interleave(const std::vector<Eigen::Vector3f>& points,
   }
 }
 
+void TakeEveryOther(const std::vector<Eigen::Vector3f>& points,
+                    std::vector<Eigen::Vector3f>& taken) {
+  taken.clear();
+  for (std::size_t i = 0; i < points.size(); i += 2) {
+    taken.push_back(points[i]);
+  }
+}
+
 }  // namespace
+
+// Of the returns those that come first are from everywhere.
+void Thin(const ScanFeatures& scan, ScanFeatures& thinned) {
+  TakeEveryOther(scan.columns, thinned.columns);
+  TakeEveryOther(scan.ground, thinned.ground);
+  const auto few = static_cast<std::ptrdiff_t>(scan.returns.size() / 4);
+  thinned.returns.assign(scan.returns.begin(), scan.returns.begin() + few);
+}
 
 VoxelAverager::VoxelAverager(float side_m, float height_m)
     : voxels_per_m_(1.0F / side_m, 1.0F / side_m, 1.0F / height_m) {}

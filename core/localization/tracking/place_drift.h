@@ -14,7 +14,8 @@ struct PlaceDriftOptions {
   double most_m = 0.3;
   double most_rad = 0.05;
   double kept = 0.9;  // from scan to scan: own motion errs, too
-  // Asked is where a vehicle is so far from where it was expected: it brakes by less a scan.
+  // Asked is where a vehicle is so far, per usual interval, from where it was expected: it brakes
+  // by less.
   double unexpected_m = 0.15;
   // Two steps that differ by no more are the same.
   double same_step_m = 0.5;

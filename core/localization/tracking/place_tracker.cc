@@ -89,8 +89,9 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   const bool goes_along = step && GoesAlong();
   at_hand_.has_paused = !is_first_ && scans_ > options_.pause.most_missing;
   at_hand_.has_stood = HasStood(features);
+  const MotionModel before = motion_;
   if (!at_hand_.has_stood) {
-    motion_ = Next();
+    motion_ = Arrived(features);
   }
   untracked_ = 0.0;
   if (goes_along) {
@@ -111,6 +112,8 @@ LocalizationResult PlaceTracker::Track(const ScanFeatures& features,
   Located located = Locate(features, std::move(tracked));
   if (is_on_map && carried_ == 0 && Strays(located.registration, features)) {
     located = Locate(features, Follow(features));
+  } else if (located.is_found && is_on_map && carried_ == 0 && !goes_along) {
+    ArriveAt(located.registration.T_world_level, before);
   }
   LocalizationResult result;
   result.registration = std::move(located.registration);

@@ -3,6 +3,7 @@
 // vehicle may have come.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -126,6 +127,14 @@ class PlaceTracker {
     std::optional<RegistrationResult> found;  // likelier than what was tracked, and than all others
     std::optional<Eigen::Vector2d> rival;     // as likely as what was tracked, from there
   };
+  // After one of the intervals that may have passed.
+  struct Arrival {
+    MotionModel motion;
+    Pose T_world_level = Pose::Identity();  // where the scan fits
+    double log_likelihood = 0.0;            // of the scan there
+    double log_expected = 0.0;              // of that place
+    double log_odds = 0.0;                  // of that interval
+  };
   // Whether a place is where a vehicle that was known to be somewhere can be now.
   enum class Surprise : std::uint8_t {
     kNone,
@@ -151,8 +160,22 @@ class PlaceTracker {
   SearchReach StartReach() const;
   bool IsWithinStart(const Pose& T_world_level) const;
 
-  // place_tracker_pause: whether the scan says that the vehicle stood since the last one; then that
-  // is its motion.
+  // place_tracker_interval: at the scan at hand, after as long as is told, or a whole number of
+  // usual intervals.
+  MotionModel Arrived(const ScanFeatures& features);
+  std::array<double, 2> WholeIntervals() const;
+  MotionModel After(double scans) const;
+  // Where the scan fits near where `motion`, over so many intervals, leads.
+  Arrival ArrivalBy(const MotionModel& motion, double scans, const ScanFeatures& features) const;
+  // Up to constants: that it was so long, where another time is told; that a vehicle is found
+  // there.
+  double LogOddsOf(double scans) const;
+  double LogExpected(const Pose& expected, const Pose& found) const;
+  bool IsLikelier(const Arrival& a, const Arrival& b) const;
+  bool IsSpeedKnown() const;
+  // Where it was found elsewhere than expected: after the interval that explains it best.
+  void ArriveAt(const Pose& T_world_level, const MotionModel& before);
+  // Whether the scan says that the vehicle stood since the last one; then that is its motion.
   bool HasStood(const ScanFeatures& features);
   // How well it fits near where that motion led: to the map, none where it does not fit as usual;
   // and to the scans before it, which is asked off the map and where that ends.
@@ -192,7 +215,7 @@ class PlaceTracker {
   // carried on from there; else the place is in doubt. Scans that do not fit to each other mean
   // that it may be anywhere.
   bool Strays(const RegistrationResult& found, const ScanFeatures& features);
-  // Whether it is not where the motion before led.
+  // Whether it is not where the motion before led, where that is known.
   bool IsUnexpected(const RegistrationResult& found) const;
   // PlaceDrift::MovesAlong(), or StaysOff(). At the first scan it does.
   bool MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result);

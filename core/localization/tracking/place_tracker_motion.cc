@@ -1,31 +1,10 @@
 // The motion that a scan shows before it is tracked: what it is to be deskewed by (decision 0605).
-#include <cstddef>
-#include <vector>
+#include <optional>
+#include <utility>
 
 #include "core/localization/tracking/place_tracker.h"
 
 namespace atlas {
-namespace {
-
-void TakeEveryOther(const std::vector<Eigen::Vector3f>& points,
-                    std::vector<Eigen::Vector3f>& taken) {
-  taken.clear();
-  for (std::size_t i = 0; i < points.size(); i += 2) {
-    taken.push_back(points[i]);
-  }
-}
-
-// They find the place to some centimetres. Of the returns those that come first are from
-// everywhere.
-void Thin(const ScanFeatures& scan, ScanFeatures& thinned) {
-  TakeEveryOther(scan.columns, thinned.columns);
-  TakeEveryOther(scan.ground, thinned.ground);
-  const auto few = static_cast<std::ptrdiff_t>(scan.returns.size() / 4);
-  thinned.returns.assign(scan.returns.begin(), scan.returns.begin() + few);
-}
-
-}  // namespace
-
 std::optional<PlaceTracker::SeenMotion> PlaceTracker::MotionSeen(const ScanFeatures& scan) {
   if (is_first_ || lost_ > 0 || carried_ > 0 || scans_ > options_.pause.most_missing) {
     return std::nullopt;

@@ -38,14 +38,9 @@ bool PlaceTracker::Strays(const RegistrationResult& found, const ScanFeatures& f
   return true;
 }
 
-// Of a vehicle whose speed is known to that.
 bool PlaceTracker::IsUnexpected(const RegistrationResult& found) const {
-  constexpr double kKnown_m = 0.5;  // a scan
-  if (SpreadOf(motion_.StepCovariance()).along_m > kKnown_m) {
-    return false;
-  }
   const Eigen::Vector4d off = PoseDifference(Prior().T_world_level, found.T_world_level);
-  return off.head<2>().norm() > options_.drift.unexpected_m;
+  return IsSpeedKnown() && off.head<2>().norm() > options_.drift.unexpected_m;
 }
 
 bool PlaceTracker::MovesAsSeen(const ScanFeatures& features, const RegistrationResult& result) {

@@ -25,7 +25,8 @@ TEST(ScanClockTest, WithoutATimeThatGoesOnAScanIsAScan) {
   EXPECT_EQ(clock.Tick(4.0), 1.0);
   EXPECT_EQ(clock.Tick(4.5), 1.0) << "the first interval";
   EXPECT_EQ(clock.Tick(std::nullopt), 1.0);
-  EXPECT_DOUBLE_EQ(clock.Tick(5.5), 2.0) << "since the last time that was told";
+  EXPECT_DOUBLE_EQ(clock.Tick(5.5), 1.0)
+      << "two since the last time that was told, one of them counted";
 }
 
 TEST(ScanClockTest, OneTimeThatIsWrongIsNoGapBehindIt) {
@@ -121,6 +122,28 @@ TEST(ScanClockTest, TimesThatJitterAreEvenOnAverage) {
     if (i > 100) scans += told;
   }
   EXPECT_NEAR(scans, 100.0, 1.0);
+}
+
+TEST(ScanClockTest, AScanOfUnknownTimeCountsAtTheNextOne) {
+  ScanClock clock(0.1);
+  clock.Tick(0.0);
+  EXPECT_EQ(clock.Tick(std::nullopt), 1.0);
+  EXPECT_NEAR(clock.Tick(0.2), 1.0, 1e-9);
+  EXPECT_EQ(clock.Tick(std::nullopt), 1.0);
+  EXPECT_EQ(clock.Tick(std::nullopt), 1.0);
+  EXPECT_NEAR(clock.Tick(0.7), 3.0, 1e-9) << "two are missing";
+  EXPECT_NEAR(clock.Tick(0.8), 1.0, 1e-9) << "they are forgotten";
+  EXPECT_EQ(clock.Tick(std::nullopt), 1.0);
+  EXPECT_GT(clock.Tick(0.85), 0.0) << "whatever times say";
+}
+
+TEST(ScanClockTest, OfScansWithoutATimeNothingIsLearnt) {
+  ScanClock clock;
+  clock.Tick(0.0);
+  EXPECT_EQ(clock.Tick(std::nullopt), 1.0);
+  EXPECT_EQ(clock.Tick(0.2), 1.0) << "two intervals, which nobody knows yet";
+  EXPECT_EQ(clock.Tick(0.3), 1.0) << "the first one that is known";
+  EXPECT_NEAR(clock.Tick(0.5), 2.0, 1e-9);
 }
 
 TEST(ScanClockTest, AnotherPaceIsLearnt) {

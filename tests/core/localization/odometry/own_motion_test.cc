@@ -32,7 +32,7 @@ Pose StepBetween(const Pose& from, const Pose& to) {
 
 TEST(OwnMotionTest, StepsAreTheVehiclesOwnWhereverItHeads) {
   for (const double heading_rad : {0.0, 3.0}) {
-    OwnMotion own({}, {});
+    OwnMotion own({}, {}, {});
     EXPECT_FALSE(own.is_begun());
     own.Begin(Seen(OnStreet(-10.0, heading_rad)));
     EXPECT_TRUE(own.is_begun());
@@ -51,7 +51,7 @@ TEST(OwnMotionTest, StepsAreTheVehiclesOwnWhereverItHeads) {
 }
 
 TEST(OwnMotionTest, AScanThatIsMissingMakesAStepTwiceAsLong) {
-  OwnMotion own({}, {});
+  OwnMotion own({}, {}, {});
   own.Begin(Seen(OnStreet(-10.0, 0.0)));
   for (int i = 1; i <= 4; ++i) own.Next(Seen(OnStreet(-10.0 + i, 0.0)), 1.0);
   const OwnStep step = own.Next(Seen(OnStreet(-4.0, 0.0)), 2.0);
@@ -62,7 +62,7 @@ TEST(OwnMotionTest, AScanThatIsMissingMakesAStepTwiceAsLong) {
 }
 
 TEST(OwnMotionTest, WhoWasMovedBeginsAnew) {
-  OwnMotion own({}, {});
+  OwnMotion own({}, {}, {});
   own.Begin(Seen(OnStreet(-16.0, 0.0)));
   own.Next(Seen(OnStreet(-15.0, 0.0)), 1.0);
   EXPECT_FALSE(own.Next(Seen(OnStreet(12.0, 1.5)), 1.0).is_known);

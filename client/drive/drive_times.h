@@ -1,0 +1,24 @@
+// When the scans of a recorded drive were made.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "client/drive/drive_selection.h"
+#include "core/scan/drive_folder.h"
+
+namespace atlas {
+
+// Whether the drive says of all of them when they were made.
+bool IsTimed(const DriveFolder& drive, const std::vector<SelectedScan>& selected);
+
+// For a ScanClock, of each of `selected`: in seconds, or as they are numbered where the drive is
+// not timed, so that what is missing counts. None where a time is wrong: those are left out, as few
+// as can be, without which all others go on.
+std::vector<std::optional<double>> TimesOf(const DriveFolder& drive,
+                                           const std::vector<SelectedScan>& selected);
+
+// From one scan to the next, as a rule; none of fewer than two.
+std::optional<double> UsualIntervalOf(const std::vector<std::optional<double>>& times);
+
+}  // namespace atlas
