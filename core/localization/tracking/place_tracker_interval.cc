@@ -16,7 +16,7 @@ std::array<double, 2> PlaceTracker::WholeIntervals() const {
 
 MotionModel PlaceTracker::Arrived(const ScanFeatures& features) {
   MotionModel told = Next();
-  if (is_first_ || lost_ > 0 || at_hand_.has_paused) {
+  if (is_first_ || lost_ > 0 || scans_ > options_.pause.most_missing) {
     return told;
   }
   if (!IsSpeedKnown()) {
@@ -93,7 +93,7 @@ bool PlaceTracker::IsLikelier(const Arrival& a, const Arrival& b) const {
 }
 
 void PlaceTracker::ArriveAt(const Pose& T_world_level, const MotionModel& before) {
-  if (is_first_ || lost_ > 0 || at_hand_.has_paused) {
+  if (is_first_ || lost_ > 0 || scans_ > options_.pause.most_missing) {
     return;
   }
   double likeliest = -std::numeric_limits<double>::max();

@@ -9,9 +9,9 @@ std::optional<PlaceTracker::SeenMotion> PlaceTracker::MotionSeen(const ScanFeatu
   if (is_first_ || lost_ > 0 || carried_ > 0 || scans_ > options_.pause.most_missing) {
     return std::nullopt;
   }
+  MotionModel moved = Arrived(scan);
   Thin(scan, thinned_);
   const ScanFeatures& features = thinned_;
-  MotionModel moved = Next();
   const PosePrior prior = PriorOf(moved);
   const PosePrior among_features{prior.T_world_level,
                                  options_.seen.information_share * prior.covariance};
