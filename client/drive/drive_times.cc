@@ -1,6 +1,7 @@
 #include "client/drive/drive_times.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 
 #include "core/localization/scan_clock.h"
@@ -8,27 +9,41 @@
 namespace atlas {
 namespace {
 
-// The longest increasing subsequence (patience sorting): which of `times` are in it.
+// Which of `times` go on. Of two that do not, one is left out if its neighbours go on without it:
+// the one whose neighbours are then further apart. Else the clock was set back, and both are right.
 std::vector<bool> GoOn(const std::vector<double>& times) {
-  std::vector<std::size_t> last;  // by length: the last of the one that ends earliest
-  std::vector<std::size_t> before(times.size());
+  std::vector<bool> goes_on(times.size(), true);
+  std::vector<double> run;  // since the clock was set
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const auto place =
-        std::lower_bound(last.begin(), last.end(), times[i],
-                         [&](std::size_t other, double time) { return times[other] < time; });
-    before[i] = place == last.begin() ? i : *(place - 1);
-    if (place == last.end()) {
-      last.push_back(i);
+    if (run.empty() || times[i] > run.back()) {
+      run.push_back(times[i]);
+      continue;
+    }
+    const bool is_last = i + 1 == times.size();
+    const double without_this = is_last ? 0.0 : times[i + 1] - run.back();
+    const double without_that = run.size() < 2 ? 0.0 : times[i] - run[run.size() - 2];
+    if ((is_last || without_this > 0.0) && without_this >= without_that) {
+      goes_on[i] = false;
+    } else if (run.size() < 2 || without_that > 0.0) {
+      std::size_t that = i - 1;
+      while (!goes_on[that]) --that;
+      goes_on[that] = false;
+      run.back() = times[i];
     } else {
-      *place = i;
+      run.assign(1, times[i]);
     }
   }
-  std::vector<bool> goes_on(times.size(), false);
-  if (last.empty()) return goes_on;
-  std::size_t i = last.back();
-  for (; before[i] != i; i = before[i]) goes_on[i] = true;
-  goes_on[i] = true;
   return goes_on;
+}
+
+// How far the second of three is from the first one to the third, by their numbers.
+double NumberShare(const DriveFolder& drive,
+                   const std::vector<SelectedScan>& selected,
+                   const std::array<std::size_t, 3>& scans) {
+  const auto number = [&](std::size_t i) {
+    return static_cast<double>(drive.scans[selected[scans.at(i)].index].number);
+  };
+  return (number(1) - number(0)) / (number(2) - number(0));
 }
 
 }  // namespace
@@ -50,8 +65,17 @@ std::vector<std::optional<double>> TimesOf(const DriveFolder& drive,
   }
   const std::vector<bool> goes_on = GoOn(told);
   std::vector<std::optional<double>> times(told.size());
+  std::optional<std::size_t> before;
   for (std::size_t i = 0; i < told.size(); ++i) {
-    if (goes_on[i]) times[i] = told[i];
+    if (!goes_on[i]) continue;
+    times[i] = told[i];
+    if (before && told[i] > told[*before]) {
+      for (std::size_t j = *before + 1; j < i; ++j) {
+        const double share = NumberShare(drive, selected, {*before, j, i});
+        times[j] = told[*before] + share * (told[i] - told[*before]);
+      }
+    }
+    before = i;
   }
   return times;
 }

@@ -13,8 +13,9 @@ namespace atlas {
 bool IsTimed(const DriveFolder& drive, const std::vector<SelectedScan>& selected);
 
 // For a ScanClock, of each of `selected`: in seconds, or as they are numbered where the drive is
-// not timed, so that what is missing counts. None where a time is wrong: those are left out, as few
-// as can be, without which all others go on.
+// not timed, so that what is missing counts. A single time that does not go on between its
+// neighbours' is taken between them as the scan is numbered; none, where it has but one. Where a
+// clock was set back times go back.
 std::vector<std::optional<double>> TimesOf(const DriveFolder& drive,
                                            const std::vector<SelectedScan>& selected);
 

@@ -354,14 +354,22 @@ def times(bin_dir):
     def late(scan, by_s):
         return lambda folder: stamp(folder, lambda number, time_s: time_s + (by_s if number == scan else 0.0))
 
+    def whole_seconds(folder):
+        stamp(folder, lambda number, time_s: math.floor(time_s))
+
+    def set_back(folder):
+        stamp(folder, lambda number, time_s: 3600.0 + time_s - (3600.0 if number >= 121 else 0.0))
+        for number in range(130, 134):
+            (folder / f"velodyne/{number:06}.bin").unlink()
+
     def jitter(folder):
         noise = random.Random(3)
         stamp(folder, lambda number, time_s: 1.0 + time_s + noise.gauss(0.0, 0.04))
 
     for world, seed, cases in (
             ("garage", 7, {"three missing": some_missing, "times jitter": jitter, "one late": late(37, 0.2),
-                           "one later than the next": late(60, 0.6)}),
-            ("overpass", 1, {"one late": late(137, 0.1), "times jitter": jitter})):
+                           "one later than the next": late(60, 0.6), "whole seconds": whole_seconds}),
+            ("overpass", 1, {"one late": late(137, 0.1), "times jitter": jitter, "a clock set back, four missing": set_back})):
         with tempfile.TemporaryDirectory() as work:
             atlas = Atlas(bin_dir, work)
             for number in (0, seed):

@@ -37,20 +37,44 @@ TEST(DriveTimesTest, TimesThatGoOnAreTaken) {
   EXPECT_EQ(Times({}), Known{});
 }
 
-TEST(DriveTimesTest, OneThatIsWrongIsLeftOut) {
-  EXPECT_EQ(Times({{0, 0.0}, {1, 0.1}, {2, 9.0}, {3, 0.3}, {4, 0.4}}),
-            (Known{0.0, 0.1, std::nullopt, 0.3, 0.4}))
-      << "too late";
-  EXPECT_EQ(Times({{0, 0.0}, {1, 0.1}, {2, 0.05}, {3, 0.3}, {4, 0.4}}),
-            (Known{0.0, std::nullopt, 0.05, 0.3, 0.4}))
-      << "one of two, nobody knows which";
-  EXPECT_EQ(Times({{0, 7.0}, {1, 0.1}, {2, 0.2}}), (Known{std::nullopt, 0.1, 0.2})) << "the first";
+void ExpectTimes(const std::vector<Scan>& scans, const Known& expected) {
+  const Known times = Times(scans);
+  ASSERT_EQ(times.size(), expected.size());
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    ASSERT_EQ(times[i].has_value(), expected[i].has_value()) << i;
+    if (times[i]) {
+      EXPECT_NEAR(*times[i], *expected[i], 1e-9) << i;
+    }
+  }
 }
 
-TEST(DriveTimesTest, OfEqualOnesOneIsKept) {
-  int known = 0;
-  for (const auto& time : Times({{0, 1.0}, {1, 1.0}, {2, 1.0}})) known += time ? 1 : 0;
-  EXPECT_EQ(known, 1);
+TEST(DriveTimesTest, OneThatIsWrongIsTakenBetweenItsNeighbours) {
+  ExpectTimes({{0, 0.0}, {1, 0.1}, {2, 9.0}, {3, 0.3}, {4, 0.4}}, {0.0, 0.1, 0.2, 0.3, 0.4});
+  ExpectTimes({{0, 0.0}, {1, 0.1}, {2, 0.02}, {3, 0.3}, {4, 0.4}}, {0.0, 0.1, 0.2, 0.3, 0.4});
+  ExpectTimes({{0, 0.0}, {1, 0.1}, {2, 0.35}, {3, 0.3}, {4, 0.4}}, {0.0, 0.1, 0.2, 0.3, 0.4});
+}
+
+TEST(DriveTimesTest, AtAnEndItIsNotKnown) {
+  ExpectTimes({{0, 7.0}, {1, 0.1}, {2, 0.2}}, {std::nullopt, 0.1, 0.2});
+  ExpectTimes({{0, 0.1}, {1, 0.1}}, {0.1, std::nullopt});
+}
+
+TEST(DriveTimesTest, AStampThatIsRepeatedWasRightAtFirst) {
+  ExpectTimes({{0, 0.0}, {1, 0.1}, {2, 0.1}, {3, 0.3}}, {0.0, 0.1, 0.2, 0.3});
+  ExpectTimes({{0, 0.0}, {1, 0.1}, {6, 0.1}, {7, 0.7}}, {0.0, 0.1, 0.6, 0.7});
+}
+
+TEST(DriveTimesTest, AClockThatWasSetBackIsRightBeforeAndBehind) {
+  EXPECT_EQ(Times({{0, 50.0}, {1, 50.1}, {2, 50.2}, {3, 0.0}, {4, 0.1}, {5, 0.2}, {6, 0.3}}),
+            (Known{50.0, 50.1, 50.2, 0.0, 0.1, 0.2, 0.3}));
+}
+
+TEST(DriveTimesTest, CoarseTimesAreFilledIn) {
+  std::vector<Scan> scans;
+  for (std::uint32_t i = 0; i < 20; ++i) scans.push_back({i, i / 4});
+  const Known times = Times(scans);
+  EXPECT_NEAR(UsualIntervalOf(times).value(), 0.25, 0.02);
+  for (std::size_t i = 4; i < 19; ++i) EXPECT_GT(times[i], times[i - 1]) << i;
 }
 
 TEST(DriveTimesTest, WithoutTimesNumbersTellWhatIsMissing) {
