@@ -1,5 +1,6 @@
-// How long ago the last scan was. Times may be wrong (decision 0637), and in a pause the vehicle
-// may have gone on, or stood meanwhile (decision 0631).
+// How long ago the last scan was. Times may be wrong: tried are the told one, one interval and the
+// nearest whole number of them (decision 0637). In a pause the vehicle may have gone on, or stood
+// meanwhile (decision 0631).
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -24,7 +25,9 @@ MotionModel PlaceTracker::Arrived(const ScanFeatures& features) {
   }
   std::optional<Arrival> likeliest;
   Thin(features, thinned_);
+  double tried = 0.0;
   for (const double scans : WholeIntervals()) {
+    if (scans == std::exchange(tried, scans)) continue;  // the nearest whole number is one
     MotionModel other = After(scans);
     const MotionModel& arrived = likeliest ? likeliest->motion : told;
     if (!AreApart(arrived.T_world_sensor(), other.T_world_sensor(), options_.pause.apart_m,
@@ -67,7 +70,8 @@ PlaceTracker::Arrival PlaceTracker::ArrivalBy(const MotionModel& motion,
   return arrival;
 }
 
-// Sensors turn evenly.
+// Sensors turn evenly: a told time that is no whole number errs by as much as it is off the nearest
+// one, another interval by as much as it is off the told time.
 double PlaceTracker::LogOddsOf(double scans) const {
   const double whole = WholeIntervals().back();
   const double errs = (scans_ - (scans == scans_ ? whole : scans)) / options_.pause.sigma;
